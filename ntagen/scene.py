@@ -19,12 +19,13 @@ Each value is checked by the rules of `ntagen.rules` when it is made; a wrong on
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from ntagen import rules
 from ntagen.errors import InputError
+from ntagen.shapes import Shape, Sphere
 
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
@@ -41,7 +42,7 @@ RegionKind = Literal["target", "critical", "detection", "unexplored", "safe"]
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A sphere with a name and a kind.
+    """A solid shape with a name and a kind.
 
     Attributes:
         name: The name in the file, or one that the driver gave (``learned 1``).
@@ -49,29 +50,63 @@ class Region:
             (the shell in which the needle senses a near critical region; plans avoid it too),
             ``unexplored`` (nobody knows what is there; plans avoid it) or ``safe`` (nothing
             critical is there, so none is expected there).
-        center_mm: The centre.
-        radius_mm: The radius, greater than 0.
+        shape: Where it is; a signed distance to its surface, and more.
         around: For a detection region that was written as ``around C1 margin …``, the name of C1.
     """
 
     name: str
     kind: RegionKind
-    center_mm: Vector
-    radius_mm: float
+    shape: Shape
     around: str | None = None
 
+    @staticmethod
+    def ball(
+        name: str, kind: RegionKind, center_mm: Vector, radius_mm: float, around: str | None = None
+    ) -> Region:
+        """A sphere as a region."""
+        return Region(name, kind, Sphere(center_mm, radius_mm), around)
+
+    @property
+    def center_mm(self) -> Vector:
+        """The middle of the shape."""
+        return self.shape.center_mm
+
+    @property
+    def radius_mm(self) -> float:
+        """The radius of a sphere.
+
+        Raises:
+            TypeError: The shape is not a sphere.
+        """
+        if not isinstance(self.shape, Sphere):
+            raise TypeError(f"`{self.name}` is no sphere, so it has no radius")
+        return self.shape.radius_mm
+
+    def distance_mm(self, point_mm: Vector) -> float:
+        """The signed distance of a point to the surface; negative inside."""
+        return self.shape.distance_at_mm(point_mm)
+
+    def grown(self, by_mm: float) -> Region:
+        """The same region, larger on all sides by a length."""
+        return replace(self, shape=self.shape.grown(by_mm))
+
     def __post_init__(self) -> None:
-        what = f"the radius of `{self.name}`"
         if self.kind not in _KINDS:
             raise InputError(f"`{self.name}` is a {self.kind} region\nhint: one of {_KINDS}")
-        _require(
-            rules.finite(self.center_mm, f"the centre of `{self.name}`"),
-            rules.finite([self.radius_mm], what) or rules.positive(self.radius_mm, what),
-        )
+        _require(*self._breaches())
         if self.around is not None and self.kind != "detection":
             raise InputError(
                 f"`{self.name}` is a {self.kind} region, and only a detection region has `around`"
             )
+
+    def _breaches(self) -> Iterator[rules.Breach | None]:
+        """The rules that its measures break."""
+        for part, numbers, is_positive in self.shape.parts():
+            what = f"the {part} of `{self.name}`"
+            breach = rules.finite(numbers, what)
+            if breach is None and is_positive:
+                breach = rules.positive(min(numbers), what)
+            yield breach
 
 
 @dataclass(frozen=True, slots=True)

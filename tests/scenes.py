@@ -16,9 +16,9 @@ PAPER = Scene(
     needle=Needle(Pose((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)), 30.0, 1.0),
     axis=(0.0, -1.0, 0.0),
     limits=Limits(2.0, tuple(math.radians(angle) for angle in (90, 180, 270)), 2, 2.0),
-    targets=(Region("T1", "target", (0.0, -50.0, 0.0), 10.0),),
-    criticals=(Region("C1", "critical", (0.0, -25.0, 0.0), 2.0),),
-    detections=(Region("D1", "detection", (0.0, -25.0, 0.0), 5.0, "C1"),),
+    targets=(Region.ball("T1", "target", (0.0, -50.0, 0.0), 10.0),),
+    criticals=(Region.ball("C1", "critical", (0.0, -25.0, 0.0), 2.0),),
+    detections=(Region.ball("D1", "detection", (0.0, -25.0, 0.0), 5.0, "C1"),),
 )
 """The instance that the paper publishes as numbers."""
 
@@ -67,7 +67,7 @@ def spheres(draw: st.DrawFn, kind: str, name: str) -> Region:
     """Regions ahead of the needle."""
     center = draw(st.tuples(lengths(-30.0, 30.0), lengths(-90.0, -5.0), lengths(-30.0, 30.0)))
     radius = draw(lengths(1.0, 12.0))
-    return Region(name, kind, center, radius)  # type: ignore[arg-type]
+    return Region.ball(name, kind, center, radius)  # type: ignore[arg-type]
 
 
 @st.composite

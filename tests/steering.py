@@ -12,12 +12,12 @@ ENTRY = Pose(position_mm=(0.0, 0.0, 0.0), heading=(0.0, -1.0, 0.0), bevel=(0.0, 
 
 
 def sphere(name: str, kind: str, center_mm: tuple[float, float, float], radius_mm: float) -> Region:
-    return Region(name, kind, center_mm, radius_mm)  # type: ignore[arg-type]
+    return Region.ball(name, kind, center_mm, radius_mm)  # type: ignore[arg-type]
 
 
 TARGET = sphere("T1", "target", (0.0, -50.0, 0.0), 10.0)
 CRITICAL = sphere("C1", "critical", (0.0, -25.0, 0.0), 2.0)
-DETECTION = Region("D1", "detection", (0.0, -25.0, 0.0), 5.0, around="C1")
+DETECTION = Region.ball("D1", "detection", (0.0, -25.0, 0.0), 5.0, around="C1")
 
 
 def scene(*regions: Region, targets: Sequence[Region] = (TARGET,), name: str = "test") -> Scene:

@@ -321,7 +321,7 @@ class Controller:
         last = targets[-1]
         if self._learner.knowledge.visited < len(targets) - 1:
             return False
-        if distance(measurement.position_mm, last.center_mm) > last.radius_mm:
+        if last.distance_mm(measurement.position_mm) > 0.0:
             return False
         return is_surely_in(last, self._needle.glance(), self._settings.margins.depth_mm)
 

@@ -27,6 +27,7 @@ from ntagen.needle.path import sample_poses
 from ntagen.needle.vectors import add, combine, distance, scale
 from ntagen.needle.virtual import Obstacle
 from ntagen.scene import Pose, Region, Scene, Vector
+from ntagen.shapes import Sphere, thickness_mm
 
 _EXPLAINED_MM = 1.0
 """A contact farther than this from a known detection region is never explained by that region."""
@@ -55,18 +56,14 @@ def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, .
     return tuple(
         shell
         for shell in detections
-        if shell.around == critical.name
-        or distance(shell.center_mm, critical.center_mm) + critical.radius_mm <= shell.radius_mm
+        if shell.around == critical.name or thickness_mm(shell.shape, critical.shape) >= 0.0
     )
 
 
 def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_mm: float) -> float:
     """The distance at which a critical region is felt: the depth of its thinnest shell."""
     return min(
-        (
-            shell.radius_mm - distance(shell.center_mm, critical.center_mm) - critical.radius_mm
-            for shell in shells_of(critical, detections)
-        ),
+        (thickness_mm(shell.shape, critical.shape) for shell in shells_of(critical, detections)),
         default=otherwise_mm,
     )
 
@@ -160,16 +157,15 @@ class Knowledge:
             (
                 gain * max(0.0, self._reach_mm(region, settings) + unsure_mm - away_mm)
                 for region in self.a_priori.criticals
-                if (away_mm := distance(tip_mm, region.center_mm)) > region.radius_mm
+                if (away_mm := region.distance_mm(tip_mm)) > 0.0
             ),
             default=0.0,
         )
 
     def _reach_mm(self, region: Region, settings: Settings) -> float:
-        """The distance from the centre of a known region at which it is felt."""
+        """The distance from the surface of a known region at which it is felt."""
         shells = shells_of(region, self.a_priori.detections)
-        alone_mm = region.radius_mm + settings.sensing_margin_mm
-        return max((shell.radius_mm for shell in shells), default=alone_mm)
+        return _felt_at_mm(region, shells, settings.sensing_margin_mm)
 
     def visiting(self) -> Knowledge:
         """The knowledge after one more target was reached."""
@@ -200,7 +196,7 @@ class Knowledge:
         else:
             contact = Contact(tip.position_mm, tip.heading)
             center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
-            ball = Region(f"learned {contacts}", "critical", center, radius_mm)
+            ball = Region.ball(f"learned {contacts}", "critical", center, radius_mm)
             return replace(
                 self._with_ball(_Felt(ball, (contact,)), margin_mm, radius_mm, channels),
                 contacts=contacts,
@@ -211,18 +207,19 @@ class Knowledge:
         """The a-priori critical region that explains a contact, if there is one."""
         for region in self.a_priori.criticals:
             shells = shells_of(region, self.a_priori.detections + self.learned)
-            reach_mm = max((s.radius_mm for s in shells), default=region.radius_mm + margin_mm)
-            if distance(tip.position_mm, region.center_mm) <= reach_mm + unsure_mm:
+            if region.distance_mm(tip.position_mm) <= (
+                _felt_at_mm(region, shells, margin_mm) + unsure_mm
+            ):
                 return region
         return None
 
     def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> tuple[Region, ...]:
         """Makes the shell of a known region wider: it was felt farther away than expected."""
         shells = shells_of(felt, self.a_priori.detections + self.learned)
-        reach_mm = max((s.radius_mm for s in shells), default=felt.radius_mm + margin_mm)
-        reach_mm = max(reach_mm, distance(tip.position_mm, felt.center_mm)) + _GROWTH_MM
+        reach_mm = _felt_at_mm(felt, shells, margin_mm)
+        reach_mm = max(reach_mm, felt.distance_mm(tip.position_mm)) + _GROWTH_MM
         name = f"{felt.name} felt"
-        shell = Region(name, "detection", felt.center_mm, reach_mm, around=felt.name)
+        shell = Region(name, "detection", felt.shape.grown(reach_mm), felt.name)
         return (*(region for region in self.learned if region.name != name), shell)
 
     def _with_ball(
@@ -255,7 +252,7 @@ class Knowledge:
         kept = [one.clear_of(self.a_priori.safe) for one in (*balls, *apart)]
         regions = [one.region for one in kept]
         shells = [
-            Region(
+            Region.ball(
                 f"{one.region.name} shell",
                 "detection",
                 one.region.center_mm,
@@ -284,10 +281,11 @@ class _Felt:
         radius_mm = min(
             [
                 self.region.radius_mm,
-                *(distance(self.region.center_mm, one.center_mm) - one.radius_mm for one in safe),
+                *(one.distance_mm(self.region.center_mm) for one in safe),
             ]
         )
-        region = replace(self.region, radius_mm=max(_LEAST_RADIUS_MM, radius_mm))
+        shape = Sphere(self.region.center_mm, max(_LEAST_RADIUS_MM, radius_mm))
+        region = replace(self.region, shape=shape)
         return replace(self, region=region)
 
     def reach_mm(self, margin_mm: float) -> float:
@@ -310,15 +308,28 @@ def _joined(
     ]
     found = ball_of(contacts, quiet, margin_mm, radius_mm)
     if found is not None:
-        region = replace(around, center_mm=found.center_mm, radius_mm=found.radius_mm)
+        region = replace(around, shape=Sphere(found.center_mm, found.radius_mm))
         return _Felt(region, contacts, found.center_std_mm)
     return None if _covers(around, channels) else _Felt(around, contacts)
 
 
 def _without(shell: Region, point_mm: Vector) -> Region | None:
-    """The part of a shell that does not contain a point, as a ball; None if that is nothing."""
-    radius_mm = min(shell.radius_mm, distance(point_mm, shell.center_mm) - _OUTSIDE_MM)
-    return replace(shell, radius_mm=radius_mm) if radius_mm > 0.0 else None
+    """A shell without a point: smaller on all sides if it contains it; None if nothing is left."""
+    by_mm = shell.distance_mm(point_mm) - _OUTSIDE_MM
+    if by_mm >= 0.0:
+        return shell
+    shape = shell.shape.grown(by_mm)
+    return replace(shell, shape=shape) if shape.depth_mm > 0.0 else None
+
+
+def _felt_at_mm(region: Region, shells: Sequence[Region], otherwise_mm: float) -> float:
+    """The greatest distance from the surface of a region at which its shells let it be felt."""
+    if isinstance(region.shape, Sphere) and all(isinstance(s.shape, Sphere) for s in shells):
+        # Shells about another centre count as if they lay about this one.
+        widths = [shell.radius_mm - region.radius_mm for shell in shells]
+    else:
+        widths = [thickness_mm(shell.shape, region.shape) for shell in shells]
+    return max(widths, default=otherwise_mm)
 
 
 _QUIET_SPACING_MM = 2.0
@@ -366,4 +377,4 @@ def _around_two(one: Region, other: Region) -> Region:
     radius_mm = 0.5 * (apart_mm + one.radius_mm + other.radius_mm)
     share = (radius_mm - one.radius_mm) / apart_mm
     center = add(scale(1.0 - share, one.center_mm), scale(share, other.center_mm))
-    return replace(one, center_mm=center, radius_mm=radius_mm)
+    return replace(one, shape=Sphere(center, radius_mm))

@@ -9,7 +9,6 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.steering import Steering
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.vectors import distance
 from ntagen.scene import Scene, Vector
 
 
@@ -100,7 +99,7 @@ class Learner:
             is_last = self.knowledge.visited == len(targets) - 1
             if is_last and not last_too:
                 return
-            if distance(position_mm, target.center_mm) > target.radius_mm:
+            if target.distance_mm(position_mm) > 0.0:
                 return
             self.knowledge = self.knowledge.visiting()
             self._journal.record(Visited(self._needle.now_s(), target.name))

@@ -8,7 +8,7 @@ decisions alone; a replay compares those. Times are seconds on the device's cloc
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Final, Protocol
 
 from ntagen.errors import DeviceError
 from ntagen.plan.synthesise import Synthesis
@@ -137,9 +137,13 @@ class Timed(Record):
     loop_seconds: float
 
 
+_FARTHEST_MM: Final = 1000.0
+"""A region is not written as a larger ball: JSON has no infinity, for a half-space."""
+
+
 @dataclass(frozen=True, slots=True)
 class Learned(Record):
-    """A region was learned or grew."""
+    """A region was learned or grew; of one that is no sphere, a ball about its middle."""
 
     name: str
     kind: str
@@ -149,7 +153,8 @@ class Learned(Record):
     @staticmethod
     def of(time_s: float, region: Region) -> Learned:
         """The record of a region."""
-        return Learned(time_s, region.name, region.kind, region.center_mm, region.radius_mm)
+        reach_mm = min(region.shape.reach_mm(), _FARTHEST_MM)
+        return Learned(time_s, region.name, region.kind, region.center_mm, reach_mm)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,6 @@ import math
 from typing import Final
 
 from ntagen.needle.estimate import Estimate
-from ntagen.needle.vectors import distance
 from ntagen.plan.certify import Certificate
 from ntagen.scene import Region
 
@@ -48,5 +47,5 @@ def is_enough(certificate: Certificate, estimate: Estimate, most_mm: float = mat
 
 def is_surely_in(target: Region, estimate: Estimate, depth_mm: float) -> bool:
     """Whether the tip is surely in a target, and at least this deep."""
-    inside_mm = target.radius_mm - distance(estimate.tip.position_mm, target.center_mm)
+    inside_mm = -target.distance_mm(estimate.tip.position_mm)
     return inside_mm >= max(depth_mm, _SURE_SIGMAS * estimate.position_std_mm(0.0))

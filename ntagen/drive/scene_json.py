@@ -4,21 +4,36 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from typing import Final
+from typing import Any, Final, cast
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
-from ntagen.scene import Scene
+from ntagen.scene import Region, Scene
+from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere
 
 VERSION: Final = 1
 
+_KINDS: Final = ("targets", "criticals", "detections", "unexplored", "safe")
+
 _LATER_KINDS: Final = ("unexplored", "safe")
 """Entries that earlier logs do not have; they are written only where there are such regions."""
+
+_SHAPES: Final[dict[str, type[Shape]]] = {
+    "box": Box,
+    "capsule": Capsule,
+    "cylinder": Cylinder,
+    "ellipsoid": Ellipsoid,
+    "halfspace": HalfSpace,
+}
+"""The shapes besides the sphere, which is written as centre and radius, as in earlier logs."""
 
 
 def scene_to_json(scene: Scene) -> str:
     """The scene as a JSON text; floats keep all their digits."""
     entries = dataclasses.asdict(scene)
+    for kind in _KINDS:
+        regions: tuple[Region, ...] = getattr(scene, kind)
+        entries[kind] = [_from_region(region) for region in regions]
     for kind in _LATER_KINDS:
         if not entries[kind]:
             del entries[kind]
@@ -38,6 +53,51 @@ def scene_from_json(text: str | bytes) -> Scene:
                 f"the scene of the run has version {document['version']!r}, but this ntagen reads "
                 f"only version {VERSION}"
             )
-        return value_from_json({kind: [] for kind in _LATER_KINDS} | document["scene"], Scene)
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        entries = {kind: [] for kind in _LATER_KINDS} | document["scene"]
+        regions = {kind: tuple(map(_to_region, entries[kind])) for kind in _KINDS}
+        rest = value_from_json(entries | {kind: [] for kind in _KINDS}, Scene)
+        return dataclasses.replace(rest, **cast("Any", regions))
+    except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the scene of the run cannot be read: {error!r}") from error
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Ball:
+    """A sphere as a log has it."""
+
+    name: str
+    kind: str
+    center_mm: tuple[float, float, float]
+    radius_mm: float
+    around: str | None = None
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Solid:
+    """A region of another shape as a log has it; the measures of the shape are read by its name."""
+
+    name: str
+    kind: str
+    form: str
+    shape: dict[str, object]
+    around: str | None = None
+
+
+def _from_region(region: Region) -> dict[str, object]:
+    shape, around = region.shape, region.around
+    if isinstance(shape, Sphere):
+        ball = _Ball(region.name, region.kind, shape.middle_mm, shape.radius_mm, around)
+        return dataclasses.asdict(ball)
+    form = next(form for form, kind in _SHAPES.items() if type(shape) is kind)
+    measures = dataclasses.asdict(cast("Any", shape))
+    return dataclasses.asdict(_Solid(region.name, region.kind, form, measures, around))
+
+
+def _to_region(entry: dict[str, object]) -> Region:
+    if "form" not in entry:
+        ball = value_from_json(entry, _Ball)
+        sphere = Sphere(ball.center_mm, ball.radius_mm)
+        return Region(ball.name, cast("Any", ball.kind), sphere, ball.around)
+    solid = value_from_json(entry, _Solid)
+    shape = value_from_json(solid.shape, _SHAPES[solid.form])
+    return Region(solid.name, cast("Any", solid.kind), shape, solid.around)

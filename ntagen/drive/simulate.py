@@ -22,7 +22,6 @@ from ntagen.drive.torsion import Compensated, Lag
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
-from ntagen.needle.vectors import distance
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.plan.best_plan import BestPlanSynthesiser
 from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
@@ -146,7 +145,7 @@ def simulate(
     return Result(
         ended=ended,
         clearance_mm=needle.true_clearance_mm(),
-        target_distance_mm=distance(tip_mm, last.center_mm) - last.radius_mm,
+        target_distance_mm=last.distance_mm(tip_mm),
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
     )

@@ -87,8 +87,7 @@ class Guard:
         if found.force_n > self.force_n:
             return f"the force is {found.force_n:.2f} N, and {self.force_n:.2f} N is allowed"
         for region in self.regions:
-            depth_mm = region.radius_mm - distance(found.position_mm, region.center_mm)
-            if depth_mm > self.unsure_mm:
+            if -region.distance_mm(found.position_mm) > self.unsure_mm:
                 return f"the tip is measured in the critical region '{region.name}'"
         off_mm = _from_way_mm(found.position_mm, self.start_mm, self.end_mm)
         if not off_mm <= self.tube_mm:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, cast
 
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -41,7 +41,8 @@ from ntagen.drive.states import Event
 from ntagen.needle.kinematics import bending_axis
 from ntagen.needle.path import sample_poses
 from ntagen.plan.synthesise import Synthesis
-from ntagen.scene import Pose, Scene, Vector
+from ntagen.scene import Pose, Region, RegionKind, Scene, Vector
+from ntagen.shapes import Sphere, triangles
 
 TOPICS: Final[dict[str, type[Message]]] = {
     "/tf": FrameTransforms,
@@ -79,7 +80,7 @@ def show_scene(scene: Scene) -> Shown:
     """The regions of a scene."""
     update = SceneUpdate()
     for region in scene.regions:
-        _add_ball(update, region.name, region.kind, region.center_mm, region.radius_mm, 0.0)
+        _add_region(update, region, 0.0)
     yield "/scene", update
 
 
@@ -107,15 +108,7 @@ def show_hidden(actual: Scene, told: Scene) -> Shown:
     update = SceneUpdate()
     for region in actual.avoided:
         if region not in told.regions:
-            _add_ball(
-                update,
-                region.name,
-                region.kind,
-                region.center_mm,
-                region.radius_mm,
-                0.0,
-                prefix="hidden ",
-            )
+            _add_region(update, region, 0.0, prefix="hidden ")
     if update.entities:
         yield "/scene", update
 
@@ -177,9 +170,9 @@ def show_record(record: Record) -> Shown:
             yield "/tf", _transform(pose, record.time_s)
         case Learned():
             update = SceneUpdate()
-            _add_ball(
-                update, record.name, record.kind, record.center_mm, record.radius_mm, record.time_s
-            )
+            ball = Sphere(record.center_mm, record.radius_mm)
+            kind = cast(RegionKind, record.kind)
+            _add_region(update, Region(record.name, kind, ball), record.time_s)
             yield "/scene", update
         case Forgotten():
             yield "/scene", _without(_id(record.kind, record.name), record.time_s)
@@ -206,25 +199,31 @@ def _text(record: Record) -> str:
     return ""
 
 
-def _add_ball(
+def _add_region(
     update: Any,  # noqa: ANN401  the generated class has no fields for a type checker
-    name: str,
-    kind: str,
-    center_mm: Vector,
-    radius_mm: float,
+    region: Region,
     time_s: float,
     prefix: str = "",
 ) -> None:
+    """Adds a region: a sphere as such, any other shape as triangles."""
     entity = update.entities.add(
-        id=prefix + _id(kind, name), frame_id=_FRAME, timestamp=_stamp(time_s)
+        id=prefix + _id(region.kind, region.name), frame_id=_FRAME, timestamp=_stamp(time_s)
     )
-    colour = (*_COLOURS[kind][:3], _HIDDEN_ALPHA) if prefix else _COLOURS[kind]
-    sphere = entity.spheres.add(color=_colour(colour))
-    x, y, z = (c * _M_PER_MM for c in center_mm)
-    sphere.pose.position.x, sphere.pose.position.y, sphere.pose.position.z = x, y, z
-    sphere.pose.orientation.w = 1.0
-    diameter = 2.0 * radius_mm * _M_PER_MM
-    sphere.size.x = sphere.size.y = sphere.size.z = diameter
+    colour = _COLOURS[region.kind]
+    colour = (*colour[:3], _HIDDEN_ALPHA) if prefix else colour
+    if isinstance(region.shape, Sphere):
+        sphere = entity.spheres.add(color=_colour(colour))
+        x, y, z = (c * _M_PER_MM for c in region.center_mm)
+        sphere.pose.position.x, sphere.pose.position.y, sphere.pose.position.z = x, y, z
+        sphere.pose.orientation.w = 1.0
+        diameter = 2.0 * region.radius_mm * _M_PER_MM
+        sphere.size.x = sphere.size.y = sphere.size.z = diameter
+        return
+    points, indices = triangles(region.shape)
+    drawn = entity.triangles.add(color=_colour(colour), indices=indices)
+    drawn.pose.orientation.w = 1.0
+    for point in points * _M_PER_MM:
+        drawn.points.add(x=float(point[0]), y=float(point[1]), z=float(point[2]))
 
 
 def _without(entity: str, time_s: float) -> SceneUpdate:

@@ -15,7 +15,6 @@ from ntagen.grbl.pseudo import PseudoTerminal
 from ntagen.lab.needles import Placed
 from ntagen.lab.publisher import Publisher, TrackerFaults
 from ntagen.needle.phantom_sensor import Frame
-from ntagen.needle.vectors import distance
 from ntagen.openigtlink.server import Server
 from ntagen.scene import Pose, Scene
 from ntagen.tracking.simulated import FORCE, NEEDLE
@@ -139,7 +138,7 @@ class Lab:
             return Truth(
                 tip=tip,
                 target=target.name,
-                target_distance_mm=distance(tip.position_mm, target.center_mm) - target.radius_mm,
+                target_distance_mm=target.distance_mm(tip.position_mm),
                 clearance_mm=self._placed.needle.true_clearance_mm(),
                 time_s=self.emulator.now_s,
                 has_moved=self._moved_s is not None,

@@ -1,7 +1,8 @@
-"""The smallest distance of a path to spheres, by dense sampling.
+"""The smallest distance of a path to regions, by dense sampling.
 
-The driver's own distances are closed forms (`ntagen.needle.kinematics`). The truth about a
-simulated run must not share their mistakes, so this module shares no code with them.
+The driver's own distances are closed forms (`ntagen.needle.kinematics`) or found by subdivision
+(`ntagen.needle.nearest`). The truth about a simulated run must not share their mistakes, so this
+module shares no code with them; of a shape that is no sphere it takes the distance of a point.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.scene import Pose, Region, Vector
+from ntagen.shapes import Sphere
 
 _Array = NDArray[np.float64]
 
@@ -24,22 +26,24 @@ BOUND_MM = 0.5 * SPACING_MM
 
 
 class Sweep:
-    """Follows a path and keeps its smallest distance to the surfaces of spheres.
+    """Follows a path and keeps its smallest distance to the surfaces of regions.
 
     Args:
-        regions: The spheres.
+        regions: The regions.
         start_mm: Where the path begins.
     """
 
     def __init__(self, regions: Sequence[Region], start_mm: Vector) -> None:
-        self._centers = np.array([region.center_mm for region in regions]).reshape(-1, 3)
-        self._radii = np.array([region.radius_mm for region in regions])
+        balls = [one.shape for one in regions if isinstance(one.shape, Sphere)]
+        self._shapes = [one.shape for one in regions if not isinstance(one.shape, Sphere)]
+        self._centers = np.array([ball.middle_mm for ball in balls]).reshape(-1, 3)
+        self._radii = np.array([ball.radius_mm for ball in balls])
         self._least_mm = math.inf
         self._look(np.array([start_mm]))
 
     def follow(self, start: Pose, curvature_per_mm: float, from_mm: float, to_mm: float) -> None:
         """Adds the part of an arc between two lengths from its start."""
-        if not len(self._radii):
+        if not len(self._radii) and not self._shapes:
             return
         count = max(1, math.ceil((to_mm - from_mm) / SPACING_MM))
         along = np.linspace(from_mm, to_mm, count + 1)
@@ -56,7 +60,7 @@ class Sweep:
     def clearance_mm(self) -> float:
         """The smallest distance to a surface: never too great, at most `2 BOUND_MM` too small.
 
-        It is negative if a sphere was entered, and infinite without spheres.
+        It is negative if a region was entered, and infinite without regions.
         """
         return self._least_mm - BOUND_MM
 
@@ -65,3 +69,6 @@ class Sweep:
             between = points[:, None, :] - self._centers[None, :, :]
             distances = np.sqrt((between**2).sum(axis=2)) - self._radii
             self._least_mm = min(self._least_mm, float(distances.min()))
+        for shape in self._shapes:
+            least_mm = float(shape.distance_mm(points).min()) - shape.error_mm
+            self._least_mm = min(self._least_mm, least_mm)

@@ -20,8 +20,8 @@ import numpy as np
 from ntagen.errors import DeviceError
 from ntagen.needle.kinematics import Arc, orthonormal, roll
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.path import Path, nearest_on
-from ntagen.needle.vectors import distance
+from ntagen.needle.nearest import nearest_to
+from ntagen.needle.path import Path
 from ntagen.scene import Needle, Pose, Region, Vector
 
 FORCE_N_PER_MM: Final = 1.0
@@ -62,8 +62,7 @@ class Obstacle:
 
     def depth_in_margin_mm(self, point_mm: Vector) -> float:
         """How deep a point lies in the margin; 0 outside."""
-        surface_mm = distance(point_mm, self.region.center_mm) - self.region.radius_mm
-        return max(0.0, self.margin_mm - surface_mm)
+        return max(0.0, self.margin_mm - self.region.distance_mm(point_mm))
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +201,7 @@ class VirtualNeedle:
         entry_mm = self._needle.tip.position_mm
         return min(
             (
-                nearest_on(self.pierced, entry_mm, o.region.center_mm).distance_mm
-                - o.region.radius_mm
+                nearest_to(self.pierced, entry_mm, o.region.shape).distance_mm
                 for o in self._obstacles
             ),
             default=math.inf,

@@ -16,7 +16,7 @@ from typing import Final, Literal, cast
 from ntagen import rules
 from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
 from ntagen.nsl import build_devices
-from ntagen.nsl.build_regions import Regions, Sphere
+from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, Placed
 from ntagen.nsl.source import Span
@@ -33,6 +33,7 @@ from ntagen.scene import (
     Scene,
     Vector,
 )
+from ntagen.shapes import HalfSpace
 from ntagen.units import deg_from_rad, rad_from_deg
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
@@ -292,7 +293,7 @@ class _Builder:
     # -------------------------------------------------------------------------------------- rules
 
     def _check_step(
-        self, needle: Needle, limits: Limits, resolution: int, spheres: list[Sphere]
+        self, needle: Needle, limits: Limits, resolution: int, spheres: list[PlacedRegion]
     ) -> None:
         """Lengths must fit the model; a push must bend the needle and not jump over a region."""
         placed = self._draft.numbers.get("step")
@@ -307,13 +308,13 @@ class _Builder:
             )
         seen = [sphere for sphere in spheres if self._regions.is_visible(sphere, resolution)]
         checked = (sphere for sphere in seen if sphere.region.kind != "safe")
-        smallest = min(checked, key=lambda s: s.region.radius_mm, default=None)
-        if smallest is not None and advance > 2.0 * smallest.region.radius_mm:
+        smallest = min(checked, key=lambda s: s.region.shape.depth_mm, default=None)
+        if smallest is not None and advance > 2.0 * smallest.region.shape.depth_mm:
             self._report(
                 "step-too-long",
                 span,
                 f"a push of {advance:g} mm can jump over `{smallest.region.name}`,"
-                f" which is {2.0 * smallest.region.radius_mm:g} mm wide",
+                f" which is {2.0 * smallest.region.shape.depth_mm:g} mm wide",
                 hint="make the step shorter",
                 notes=("regions are checked at the ends of pushes only",),
             )
@@ -324,7 +325,7 @@ class _Builder:
         tip: Pose | None,
         needle: Needle | None,
         limits: Limits | None,
-        spheres: list[Sphere],
+        spheres: list[PlacedRegion],
     ) -> bool:
         """Reports every length that does not fit into the model's numbers.
 
@@ -342,7 +343,7 @@ class _Builder:
         tip: Pose | None,
         needle: Needle | None,
         limits: Limits | None,
-        spheres: list[Sphere],
+        spheres: list[PlacedRegion],
     ) -> Iterator[tuple[str, float, Span]]:
         """The lengths in the model, with their names and their places in the file."""
         draft = self._draft
@@ -372,10 +373,12 @@ class _Builder:
             region = sphere.region
             # The model also contains the distance from the tip to the centre.
             reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
-            yield f"`{region.name}`", reach + region.radius_mm, sphere.place
+            # A half-space has no end; only its point is in the model.
+            extent = 0.0 if isinstance(region.shape, HalfSpace) else region.shape.reach_mm()
+            yield f"`{region.name}`", reach + extent, sphere.place
 
 
-def _of_kind(spheres: list[Sphere], kind: RegionKind) -> tuple[Region, ...]:
+def _of_kind(spheres: list[PlacedRegion], kind: RegionKind) -> tuple[Region, ...]:
     """The regions of one kind, in their order."""
     return tuple(sphere.region for sphere in spheres if sphere.region.kind == kind)
 

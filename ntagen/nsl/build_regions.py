@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from ntagen import rules
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.draft import Draft, DraftRegion
+from ntagen.nsl.solids import SolidBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus
 from ntagen.nsl.wording import article
 from ntagen.scene import Pose, Region
+from ntagen.shapes import Sphere, is_in, overlap, thickness_mm
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere:
+class PlacedRegion:
     """A region without mistakes, with its places in the file."""
 
     region: Region
@@ -38,18 +40,29 @@ class Regions:
         self._draft = draft
         self._reporter = reporter
         self._report = reporter.report
+        self._solids = SolidBuilder(reporter)
+        self._made: dict[str, Region | None] = {}
 
-    def spheres(self) -> list[Sphere]:
+    def spheres(self) -> list[PlacedRegion]:
         """All regions without mistakes, in the order written."""
         spheres = []
         for draft in self._draft.regions.values():
-            region = self._around(draft) if draft.around is not None else self._sphere(draft)
+            region = self._around(draft) if draft.around is not None else self._own(draft)
             if region is not None:
-                spheres.append(Sphere(region, draft))
+                spheres.append(PlacedRegion(region, draft))
         return spheres
 
+    def _own(self, draft: DraftRegion) -> Region | None:
+        """A region with its own geometry; it is made once, since others may lie around it."""
+        if draft.name not in self._made:
+            self._made[draft.name] = self._sphere(draft)
+        return self._made[draft.name]
+
     def _sphere(self, draft: DraftRegion) -> Region | None:
-        """A region with its own geometry."""
+        """A region that is a sphere or another shape."""
+        if draft.solid is not None:
+            shape = self._solids.shape(draft, draft.solid)
+            return None if shape is None else Region(draft.name, draft.kind, shape)
         radius = draft.radius.value
         if radius is not None and not self._reporter.obeys(
             rules.positive(radius, f"the radius of `{draft.name}`"), draft.radius.span
@@ -57,7 +70,7 @@ class Regions:
             return None
         if radius is None or draft.center is None or draft.center.value is None:
             return None
-        return Region(draft.name, draft.kind, draft.center.value, radius)
+        return Region.ball(draft.name, draft.kind, draft.center.value, radius)
 
     def _around(self, draft: DraftRegion) -> Region | None:
         """A detection region around a critical one."""
@@ -75,17 +88,19 @@ class Regions:
                 hint="write for example `margin 3 mm`",
             )
         inner = self._critical_inside(draft)
-        if inner is None or inner.center is None or inner.center.value is None or margin is None:
+        region = None if inner is None else self._own(inner)
+        if region is None or margin is None:
             return None
-        radius = inner.radius.value
-        if radius is None or radius <= 0.0:
-            return None
-        radius += margin
+        shape = region.shape.grown(margin)
         if not self._reporter.obeys(
-            rules.finite([radius], f"the radius of `{draft.name}`"), draft.margin.span
+            rules.finite(
+                [number for _, numbers, _ in shape.parts() for number in numbers],
+                f"the radius of `{draft.name}`",
+            ),
+            draft.margin.span,
         ):
             return None
-        return Region(draft.name, draft.kind, inner.center.value, radius, inner.name)
+        return Region(draft.name, draft.kind, shape, region.name)
 
     def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
         """The critical region that a detection region is written around."""
@@ -115,17 +130,19 @@ class Regions:
             return None
         return inner
 
-    def is_visible(self, sphere: Sphere, resolution: int) -> bool:
+    def is_visible(self, sphere: PlacedRegion, resolution: int) -> bool:
         """Whether the model can represent a region; if not, reports it."""
-        breach = rules.visible(
-            sphere.region.radius_mm, resolution, f"the radius of `{sphere.region.name}`"
-        )
+        name = sphere.region.name
+        is_ball = isinstance(sphere.region.shape, Sphere)
+        what = f"the radius of `{name}`" if is_ball else f"half of the least width of `{name}`"
+        depth_mm = sphere.region.shape.depth_mm
+        breach = rules.visible(depth_mm, resolution, what) if math.isfinite(depth_mm) else None
         # The critical region inside is even smaller.
         if sphere.draft.around is not None:
             return breach is None
         return self._reporter.obeys(breach, sphere.draft.radius.span)
 
-    def check(self, tip: Pose, spheres: list[Sphere]) -> None:
+    def check(self, tip: Pose, spheres: list[PlacedRegion]) -> None:
         """Checks the positions of regions relative to the tip and to each other."""
         targets = [sphere for sphere in spheres if sphere.region.kind == "target"]
         others = [s for s in spheres if s.region.kind not in ("target", "safe")]
@@ -139,11 +156,10 @@ class Regions:
             for other in others:
                 self._check_safe(safe, other)
 
-    def _check_safe(self, safe: Sphere, other: Sphere) -> None:
+    def _check_safe(self, safe: PlacedRegion, other: PlacedRegion) -> None:
         """A safe region should not reach into what plans avoid; a shell around it is no matter."""
         one, two = safe.region, other.region
-        distance = math.dist(one.center_mm, two.center_mm)
-        if two.kind == "detection" or distance >= one.radius_mm + two.radius_mm:
+        if two.kind == "detection" or not overlap(one.shape, two.shape):
             return
         self._report(
             "safe-overlaps",
@@ -153,36 +169,36 @@ class Regions:
             notes=(f"the {two.kind} region is at {other.place.place}",),
         )
 
-    def _check_reachable(self, tip: Pose, target: Sphere) -> None:
+    def _check_reachable(self, tip: Pose, target: PlacedRegion) -> None:
         """A target must not lie behind the tip, and should not contain it."""
         region, span = target.region, target.place
         offset = minus(region.center_mm, tip.position_mm)
         ahead = dot(offset, tip.heading)
-        if ahead + region.radius_mm < 0.0:
+        reach_mm = region.shape.reach_mm()
+        if ahead + reach_mm < 0.0:
             self._report(
                 "target-behind-needle",
                 span,
-                f"`{region.name}` lies {-ahead - region.radius_mm:.3g} mm behind the needle's tip",
+                f"`{region.name}` lies {-ahead - reach_mm:.3g} mm behind the needle's tip",
                 hint="move it along the heading, or turn the heading round",
             )
-        elif math.hypot(*offset) <= region.radius_mm:
+        elif is_in(region.shape, tip.position_mm):
             self._report(
                 "tip-in-target",
                 span,
                 f"the tip lies in `{region.name}` already: there is nothing to steer",
             )
 
-    def _check_overlap(self, target: Sphere, other: Sphere) -> None:
+    def _check_overlap(self, target: PlacedRegion, other: PlacedRegion) -> None:
         """A target must not lie in a critical region, and its centre should not.
 
         A region may reach into a target, as a vessel at the surface of a tumour does.
         """
         inner, outer = target.region, other.region
-        distance = math.dist(inner.center_mm, outer.center_mm)
-        if distance >= inner.radius_mm + outer.radius_mm:
+        if not overlap(inner.shape, outer.shape):
             return
         notes = (f"the {outer.kind} region is at {other.place.place}",)
-        if distance + inner.radius_mm <= outer.radius_mm:
+        if thickness_mm(outer.shape, inner.shape) >= 0.0:
             self._report(
                 "target-in-critical",
                 target.place,
@@ -190,7 +206,7 @@ class Regions:
                 hint="move one of the two, or make the target larger",
                 notes=notes,
             )
-        elif distance <= outer.radius_mm:
+        elif is_in(outer.shape, inner.center_mm):
             self._report(
                 "target-overlaps",
                 target.place,
@@ -199,10 +215,10 @@ class Regions:
                 notes=notes,
             )
 
-    def _check_start(self, tip: Pose, other: Sphere) -> None:
+    def _check_start(self, tip: Pose, other: PlacedRegion) -> None:
         """The tip must not start in a critical region, and should not in a detection region."""
         region = other.region
-        if math.dist(tip.position_mm, region.center_mm) > region.radius_mm:
+        if not is_in(region.shape, tip.position_mm):
             return
         self._report(
             "tip-in-critical" if region.kind == "critical" else "tip-in-detection",

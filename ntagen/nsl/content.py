@@ -15,6 +15,7 @@ from ntagen.nsl.draft import Draft, DraftRegion, Placed
 from ntagen.nsl.driving import DriverResolver, is_choice
 from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, SPEED, TIME
+from ntagen.nsl.solids import EXTENTS, SolidResolver
 from ntagen.nsl.wording import article
 
 MAX_REGIONS: Final = 10_000
@@ -44,6 +45,7 @@ class ContentResolver:
         self._reporter = reporter
         self._evaluator = evaluator
         self._driver = driver
+        self._solids = SolidResolver(evaluator)
 
     def add(
         self, statement: tree.Statement, scope: Scope, draft: Draft, *, is_in_loop: bool
@@ -130,6 +132,10 @@ class ContentResolver:
                 Placed(center, shape.center.span),
                 Placed(radius, shape.radius.span),
             )
+        if isinstance(shape, tree.Solid):
+            solid = self._solids.solid(shape, name, scope)
+            extent: Placed[float] = Placed(None, shape.measures[EXTENTS[shape.form]].span)
+            return DraftRegion(keyword, name, span, solid.vectors[0], extent, solid=solid)
         around = self._region_name(shape.region, scope)
         margin = self._evaluator.number(shape.margin, scope, LENGTH, f"the margin of `{name}`")
         if keyword != "detection":

@@ -73,16 +73,24 @@ class TreeBuilder:
         kind, name, shape = node.children
         keyword = cast("RegionKind", str(kind))
         shape = cast("lark.Tree[lark.Token]", shape)
-        first, second = shape.children
-        shape_span = self._span(shape)
-        return tree.Region(
-            span,
-            keyword,
-            self._region_name(name),
-            tree.Sphere(shape_span, self.expression(first), self.expression(second))
-            if shape.data == "sphere"
-            else tree.Around(shape_span, self._region_name(first), self.expression(second)),
-        )
+        return tree.Region(span, keyword, self._region_name(name), self._shape(shape))
+
+    def _shape(self, node: lark.Tree[lark.Token]) -> tree.Sphere | tree.Solid | tree.Around:
+        """A shape of any kind."""
+        span = self._span(node)
+        if node.data not in ("sphere", "around"):
+            nodes = [cast("lark.Tree[lark.Token]", child) for child in node.children]
+            turns = [one for one in nodes if one.data == "turned"]
+            measures = tuple(self.expression(one) for one in nodes if one not in turns)
+            form = cast(tree.SolidForm, node.data)
+            if not turns:
+                return tree.Solid(span, form, measures)
+            angle, axis = map(self.expression, turns[0].children)
+            return tree.Solid(span, form, measures, (angle, axis))
+        first, second = node.children
+        if node.data == "sphere":
+            return tree.Sphere(span, self.expression(first), self.expression(second))
+        return tree.Around(span, self._region_name(first), self.expression(second))
 
     def _region_name(self, node: object) -> tree.RegionName:
         """A name with its indices."""

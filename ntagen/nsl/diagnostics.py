@@ -109,7 +109,7 @@ KINDS: Final = _kinds(
     ("N055", "statement-repeated", "error", "The statement can be written only once."),
     ("N056", "too-many-regions", "error", "There can be 10,000 regions, 100 of them targets."),
     # Rules on the values.
-    ("N060", "radius-not-positive", "error", "A radius must be greater than 0."),
+    ("N060", "radius-not-positive", "error", "A radius, or another size, must be greater than 0."),
     ("N061", "speed-not-positive", "error", "The insertion speed must be greater than 0."),
     ("N062", "step-not-positive", "error", "A step of the model must take some time."),
     ("N063", "margin-negative", "error", "A detection region must contain its critical region."),
@@ -161,6 +161,7 @@ KINDS: Final = _kinds(
     ("N088", "axis-missing", "error", "A device has an axis to insert and one to roll."),
     ("N089", "address-malformed", "error", "An address is a host and a port."),
     ("N090", "safe-overlaps", "warning", "A safe region has nothing critical or unexplored in it."),
+    ("N091", "target-without-end", "error", "A target must end somewhere: plans lead into it."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

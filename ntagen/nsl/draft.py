@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from ntagen.nsl.source import Span
+from ntagen.nsl.tree import SolidForm
 from ntagen.parameters import Given
 from ntagen.scene import RegionKind, Vector
 
@@ -24,8 +25,21 @@ class Placed(Generic[T]):
 
 
 @dataclass(frozen=True, slots=True)
+class DraftSolid:
+    """A shape besides the sphere: its vectors and numbers in the order written, and its turn."""
+
+    form: SolidForm
+    vectors: tuple[Placed[Vector], ...]
+    numbers: tuple[Placed[float], ...]
+    turn: tuple[Placed[float], Placed[Vector]] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class DraftRegion:
-    """A region: a sphere, or a margin around another region."""
+    """A region: a sphere, another shape, or a margin around another region.
+
+    A solid has its first place as the centre, and what makes it wide as the radius.
+    """
 
     kind: RegionKind
     name: str
@@ -33,6 +47,7 @@ class DraftRegion:
     center: Placed[Vector] | None
     radius: Placed[float]
     around: Placed[str] | None = None
+    solid: DraftSolid | None = None
 
     @property
     def margin(self) -> Placed[float]:

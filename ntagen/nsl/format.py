@@ -37,7 +37,9 @@ _COMMENT_GAP: Final = 3
 _NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
 _NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
 _OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "RPAR", "RSQB"})
-_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"})
+_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"}) | {
+    *("BOX", "SIZE", "TURNED", "CAPSULE", "CYLINDER", "ELLIPSOID", "RADII", "HALFSPACE", "TOWARDS")
+}
 
 
 def format_source(source: Source) -> str:

@@ -44,7 +44,15 @@ from ntagen.nsl.tokens import (
     keyword_of,
     tokenise,
 )
-from ntagen.nsl.wording import STRAY_HINTS, TERMINAL_WORDS, describe, form_of, quoted, visible
+from ntagen.nsl.wording import (
+    STRAY_HINTS,
+    TERMINAL_WORDS,
+    describe,
+    form_of,
+    quoted,
+    solid_in,
+    visible,
+)
 
 if TYPE_CHECKING:
     import lark
@@ -458,7 +466,7 @@ class _Parser:
             "unexpected-word",
             found.span if found else words[-1].span.behind(),
             f"expected {expected}{', found' if found else ' before'} {what}",
-            hint=hint or form_of(words[0]),
+            hint=hint or form_of(solid_in(words)),
         )
 
 

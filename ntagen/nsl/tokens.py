@@ -59,6 +59,11 @@ KEYWORDS: Final = frozenset().union(*(ALLOWED[kind] for kind in ALLOWED if kind 
 _OTHER_WORDS: Final = frozenset(
     {"sphere", "around", "margin", "by", "at", "most", "least", "times", "apart", "per", "in"}
 )
+SOLIDS: Final = frozenset({"box", "capsule", "cylinder", "ellipsoid", "halfspace"})
+"""The shapes whose words are not reserved: they came later, and older files use them as names."""
+
+_SOLID_WORDS: Final = SOLIDS | {"size", "to", "radii", "turned", "about", "towards"}
+
 RESERVED: Final = KEYWORDS | _OTHER_WORDS
 """All words that cannot be names because of the grammar."""
 
@@ -147,7 +152,39 @@ def tokenise(source: Source) -> list[Token | Comment]:
             stray_count += token.type in STRAY
             if stray_count > MAX_STRAY:
                 break
-    return list(_joined(found))
+    return list(_joined(_named(found)))
+
+
+def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
+    """The items, with the words of later shapes as names wherever they are none of these shapes.
+
+    They are words only in a region, from the shape's word on, which is the first thing behind the
+    region's name; not in parentheses, and not where a value must begin.
+    """
+    named: list[Token | Comment] = []
+    awaited, depth, is_solid, expects_value = "", 0, False, False
+    for item in items:
+        if not isinstance(item, Token):
+            named.append(item)
+            continue
+        depth += {"LPAR": 1, "LSQB": 1, "RPAR": -1, "RSQB": -1}.get(item.type, 0)
+        if item.type == "REGION_KIND":
+            awaited, depth, is_solid = "name", 0, False
+        elif item.type == "BRACE" or (item.text in KEYWORDS and item.text != "radius"):
+            awaited, is_solid = "", False
+        elif awaited == "name":
+            awaited = "shape"
+        elif awaited == "shape" and depth == 0 and item.type != "RSQB":
+            awaited, is_solid = "", item.text in SOLIDS
+        is_word = is_solid and depth == 0 and not expects_value
+        if item.text in _SOLID_WORDS and not is_word:
+            item = Token("NAME", item.text, item.span, item.line)
+        expects_value = item.type in ("SIGN", "SCALE", "RADIUS") or item.type in _SOLID_TERMINALS
+        named.append(item)
+    return named
+
+
+_SOLID_TERMINALS: Final = frozenset(word.upper() for word in _SOLID_WORDS)
 
 
 def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:

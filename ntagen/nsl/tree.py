@@ -106,6 +106,26 @@ class Sphere:
     radius: Expression
 
 
+SolidForm = Literal["box", "capsule", "cylinder", "ellipsoid", "halfspace"]
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Any other shape: ``box (0, -20, 5) mm size (10, 4, 6) mm turned 30 deg about +z``.
+
+    Attributes:
+        span: Its words.
+        form: Which shape it is.
+        measures: Its values in the order written; the first is a place.
+        turned: The angle and the axis of its turn, if one is written.
+    """
+
+    span: Span
+    form: SolidForm
+    measures: tuple[Expression, ...]
+    turned: tuple[Expression, Expression] | None = None
+
+
 @dataclass(frozen=True, slots=True)
 class Around:
     """``around C1 margin 3 mm``."""
@@ -122,7 +142,7 @@ class Region:
     span: Span
     keyword: RegionKind
     name: RegionName
-    shape: Sphere | Around
+    shape: Sphere | Solid | Around
 
 
 @dataclass(frozen=True, slots=True)

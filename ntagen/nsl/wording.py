@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
-from ntagen.nsl.tokens import Token
+from ntagen.nsl.tokens import SOLIDS, Token
 from ntagen.parameters import BY_WORDS
 
 STRAY_HINTS: Final = {
@@ -37,6 +37,11 @@ FORMS: Final = {
     "for": "write for example `for i in 0..7 { … }`",
     "let": "write for example `let depth = 50 mm`",
     "include": 'write for example `include "needle.nsl"`',
+    "box": "write for example `box (0, -20, 5) mm size (10, 4, 6) mm turned 30 deg about +z`",
+    "capsule": "write for example `capsule (0, -10, 0) mm to (5, -30, 2) mm radius 2 mm to 1 mm`",
+    "cylinder": "write for example `cylinder (0, -10, 0) mm to (0, -30, 0) mm radius 3 mm`",
+    "ellipsoid": "write for example `ellipsoid (0, -25, 0) mm radii (3, 5, 2) mm`",
+    "halfspace": "write for example `halfspace (0, -60, 0) mm towards -y`",
     "target": "write for example `target T1 sphere (0, -50, 0) mm radius 10 mm`",
     "critical": "write for example `critical C1 sphere (0, -25, 0) mm radius 2 mm`",
     "detection": "write for example `detection D1 around C1 margin 3 mm`",
@@ -78,6 +83,12 @@ def form_of(first: Token) -> str | None:
     if first.type == "AXIS" and first.text == "roll":
         return "write for example `roll A 8.89 steps/deg`"
     return FORMS.get(first.text)
+
+
+def solid_in(words: Sequence[Token]) -> Token:
+    """The word of a shape besides the sphere in a statement; without one the first word."""
+    solids = (word for word in words if word.text in SOLIDS and word.type != "NAME")
+    return next(solids, words[0])
 
 
 def describe(terminals: set[str]) -> str:

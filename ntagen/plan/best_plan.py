@@ -24,16 +24,19 @@ Cost: about 15 ms for a question about the paper's needle.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ntagen.needle.vectors import combine, distance, dot, subtract
+from ntagen.needle.kinematics import Arc
+from ntagen.needle.nearest import nearest_to
+from ntagen.needle.vectors import combine, distance, scale, subtract
 from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.neighbours import improved
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
-from ntagen.scene import Region, Scene
+from ntagen.scene import Pose, Region, Scene
 
 _MOST_LISTED: Final = 600
 """All plans are listed if so few sequences of rolls can begin at so few places."""
@@ -255,7 +258,7 @@ def sequences(scene: Scene) -> float:
     It counts the steps that lead straight through the last target.
     """
     target, tip = scene.targets[-1], scene.needle.tip
-    reach_mm = target.radius_mm + sum(
+    reach_mm = min(target.shape.reach_mm(), scene.needle.length_mm) + sum(
         (a - b) * c for a, b, c in zip(target.center_mm, tip.position_mm, scene.axis, strict=True)
     )
     steps = max(1.0, reach_mm / step_length_mm(scene))
@@ -272,23 +275,22 @@ def _gates(scene: Scene) -> list[Region]:
     """Places to visit on the straight way to the only target; none if it is blocked or short."""
     target, tip_mm = scene.targets[-1], scene.needle.tip.position_mm
     away_mm = distance(tip_mm, target.center_mm)
-    if len(scene.targets) > 1 or away_mm < _GATE_FROM_RATIO * target.radius_mm:
+    reach_mm = target.shape.reach_mm()
+    if len(scene.targets) > 1 or away_mm < _GATE_FROM_RATIO * reach_mm:
         return []
-    way = subtract(target.center_mm, tip_mm)
-    for region in scene.avoided:
-        along = min(1.0, max(0.0, dot(subtract(region.center_mm, tip_mm), way) / away_mm**2))
-        nearest_mm = combine(1.0 - along, tip_mm, along, target.center_mm)
-        if distance(nearest_mm, region.center_mm) <= region.radius_mm:
-            return []
-    shares = [target.radius_mm / away_mm]
-    if away_mm > 2.0 * _GATE_FROM_RATIO * target.radius_mm:
+    heading = scale(1.0 / away_mm, subtract(target.center_mm, tip_mm))
+    way = (Arc(Pose(tip_mm, heading, scene.needle.tip.bevel), math.inf, away_mm),)
+    if any(nearest_to(way, tip_mm, one.shape).distance_mm <= 0.0 for one in scene.avoided):
+        return []
+    shares = [reach_mm / away_mm]
+    if away_mm > 2.0 * _GATE_FROM_RATIO * reach_mm:
         shares.insert(0, 0.5)
     return [
-        Region(
+        Region.ball(
             f"gate {number}",
             "target",
             combine(1.0 - share, target.center_mm, share, tip_mm),
-            _GATE_RATIO * target.radius_mm,
+            _GATE_RATIO * target.shape.depth_mm,
         )
         for number, share in enumerate(shares)
     ]
@@ -304,17 +306,12 @@ def _stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> 
         depth_mm: How deep a plan must lead into the last target.
     """
     *before, last = scene.targets
-    shallow_mm = max(0.5 * last.radius_mm, last.radius_mm - depth_mm - _BETWEEN_STEPS_MM)
-    scene = scene.with_targets([*before, replace(last, radius_mm=shallow_mm)])
+    most_mm = last.shape.depth_mm
+    shallow_mm = max(0.5 * most_mm, most_mm - depth_mm - _BETWEEN_STEPS_MM)
+    scene = scene.with_targets([*before, last.grown(shallow_mm - most_mm)])
     return replace(
         scene,
-        criticals=tuple(
-            replace(region, radius_mm=region.radius_mm + by_mm) for region in scene.criticals
-        ),
-        detections=tuple(
-            replace(region, radius_mm=region.radius_mm + shells_mm) for region in scene.detections
-        ),
-        unexplored=tuple(
-            replace(region, radius_mm=region.radius_mm + shells_mm) for region in scene.unexplored
-        ),
+        criticals=tuple(region.grown(by_mm) for region in scene.criticals),
+        detections=tuple(region.grown(shells_mm) for region in scene.detections),
+        unexplored=tuple(region.grown(shells_mm) for region in scene.unexplored),
     )

@@ -1,12 +1,13 @@
 """The certificate of a plan: its distances to every region along the whole continuous path.
 
 The model checks regions at the ends of its steps, in integers that lose about 1 % of the arc. A
-certificate uses the exact kinematics in double precision and closed forms over whole arcs. So it
-describes a needle on exact circles, also between the ends of steps. It shares no code with the
-engine.
+certificate uses the exact kinematics in double precision over whole arcs: closed forms for spheres,
+and subdivision to a micrometre for other shapes (`ntagen.needle.nearest`). So it describes a needle
+on exact circles, also between the ends of steps. It shares no code with the engine.
 
-Cost: one closed form for each arc and region, about 20 microseconds each. Those of many regions are
-computed together, in a tenth of that.
+Cost: one closed form for each arc and sphere, about 20 microseconds each; those of many spheres are
+computed together, in a tenth of that. Less than a millisecond for each other shape, but for an
+ellipsoid, which takes a few.
 """
 
 from __future__ import annotations
@@ -15,10 +16,12 @@ import math
 from dataclasses import dataclass
 
 from ntagen.needle.kinematics import Arc
-from ntagen.needle.path import nearest_on, nearest_on_all
+from ntagen.needle.nearest import enters_at, nearest_to
+from ntagen.needle.path import nearest_on_all
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Plan
 from ntagen.scene import Region, RegionKind, Scene, Vector
+from ntagen.shapes import Sphere
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,19 +142,30 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
 def _clearances(
     arcs: tuple[Arc, ...], entry_mm: Vector, regions: tuple[Region, ...]
 ) -> tuple[Clearance, ...]:
-    places = nearest_on_all(arcs, entry_mm, [region.center_mm for region in regions])
+    balls = {
+        index: shape
+        for index, region in enumerate(regions)
+        if isinstance(shape := region.shape, Sphere)
+    }
+    places = nearest_on_all(arcs, entry_mm, [ball.middle_mm for ball in balls.values()])
+    near = dict(zip(balls, places, strict=True))
     return tuple(
-        Clearance(region.name, region.kind, place.distance_mm - region.radius_mm, place.at_mm)
-        for region, place in zip(regions, places, strict=True)
+        Clearance(
+            region.name,
+            region.kind,
+            near[index].distance_mm - balls[index].radius_mm,
+            near[index].at_mm,
+        )
+        if index in near
+        else clearance(arcs, entry_mm, region)
+        for index, region in enumerate(regions)
     )
 
 
 def clearance(arcs: tuple[Arc, ...], entry_mm: Vector, region: Region) -> Clearance:
     """The smallest distance of a chain of arcs to a region; it begins at `entry_mm`."""
-    nearest = nearest_on(arcs, entry_mm, region.center_mm)
-    return Clearance(
-        region.name, region.kind, nearest.distance_mm - region.radius_mm, nearest.at_mm
-    )
+    nearest = nearest_to(arcs, entry_mm, region.shape)
+    return Clearance(region.name, region.kind, nearest.distance_mm, nearest.at_mm)
 
 
 def _arrivals(
@@ -163,10 +177,10 @@ def _arrivals(
         if since_mm is not None:
             since_mm = _entered_at(arcs, entry_mm, target, since_mm)
         if target is targets[-1]:
-            nearest_mm = distance(end_mm, target.center_mm)
+            away_mm = target.distance_mm(end_mm)
         else:
-            nearest_mm = nearest_on(arcs, entry_mm, target.center_mm).distance_mm
-        arrivals.append(Arrival(target.name, since_mm, target.radius_mm - nearest_mm))
+            away_mm = nearest_to(arcs, entry_mm, target.shape).distance_mm
+        arrivals.append(Arrival(target.name, since_mm, -away_mm))
     return tuple(arrivals)
 
 
@@ -175,13 +189,13 @@ def _entered_at(
 ) -> float | None:
     """The first insertion, not before `since_mm`, at which the tip is in the target."""
     if not arcs:
-        return 0.0 if distance(entry_mm, target.center_mm) <= target.radius_mm else None
+        return 0.0 if target.distance_mm(entry_mm) <= 0.0 else None
     start_mm = 0.0
     for arc in arcs:
         skipped_mm = max(0.0, since_mm - start_mm)
         if skipped_mm <= arc.length_mm:
             rest = Arc(arc.pose_at(skipped_mm), arc.radius_mm, arc.length_mm - skipped_mm)
-            entered_mm = rest.enters_at(target.center_mm, target.radius_mm)
+            entered_mm = enters_at(rest, target.shape)
             if entered_mm is not None:
                 return start_mm + skipped_mm + entered_mm
         start_mm += arc.length_mm

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.scene import Region, Scene, Vector
+from ntagen.shapes import Sphere, directions, surface_mm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -115,8 +116,9 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
         low = min(point[axis] for point in points)
         high = max(point[axis] for point in points)
         for region in picture.scene.regions:
-            low = min(low, region.center_mm[axis] - region.radius_mm)
-            high = max(high, region.center_mm[axis] + region.radius_mm)
+            least, most = (bound[axis] for bound in region.shape.bounds_mm())
+            low = min(low, least) if math.isfinite(least) else low
+            high = max(high, most) if math.isfinite(most) else high
         bounds.append((low - room_mm, high + room_mm))
     across = [i for i in range(3) if i != _depth_axis(picture.scene)]
     # Both projections have the same width, so that they fit side by side on one scale.
@@ -133,12 +135,9 @@ def _draw_projection(
     shown: tuple[int, int],
     bounds: list[tuple[float, float]],
 ) -> Any:  # noqa: ANN401
-    from matplotlib.patches import Circle
-
     across, depth = shown
     for region in _back_to_front(picture.scene.regions):
-        center = (region.center_mm[across], region.center_mm[depth])
-        axes.add_patch(Circle(center, region.radius_mm, **_face(region, picture)))
+        axes.add_patch(_outline(region, shown, _face(region, picture)))
     for style, curves in _curves(picture):
         for curve in curves:
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
@@ -157,6 +156,20 @@ def _draw_projection(
     return axes
 
 
+def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
+    """What a region looks like along an axis: a circle, or the hull of points of its surface."""
+    import numpy as np
+    from matplotlib.patches import Circle, Polygon
+
+    if isinstance(region.shape, Sphere):
+        center = [region.center_mm[axis] for axis in shown]
+        return Circle((center[0], center[1]), region.radius_mm, **style)
+    points = surface_mm(region.shape, directions().reshape(-1, 3))[:, list(shown)]
+    angles = np.linspace(0.0, 2.0 * math.pi, 240, endpoint=False)
+    farthest = np.argmax(points @ np.array([np.cos(angles), np.sin(angles)]), axis=0)
+    return Polygon(points[farthest], **style)
+
+
 _TIP_STYLE: Final[dict[str, Any]] = {
     "marker": "o",
     "markersize": 5,
@@ -170,7 +183,7 @@ _TIP_STYLE: Final[dict[str, Any]] = {
 
 def _back_to_front(regions: Sequence[Region]) -> list[Region]:
     """The regions in the order of drawing: targets first, large ones first, to hide nothing."""
-    return sorted(regions, key=lambda r: (r.kind != "target", -r.radius_mm))
+    return sorted(regions, key=lambda r: (r.kind != "target", -r.shape.reach_mm()))
 
 
 def _face(region: Region, picture: Picture) -> dict[str, Any]:
@@ -227,7 +240,7 @@ def _draw_space(
     """The view in space; its vertical axis is the direction of insertion."""
     order = [*(i for i in range(3) if i != depth), depth]
     for region in picture.scene.regions:
-        _draw_sphere(axes, region, order)
+        _draw_solid(axes, region, order)
     for style, curves in _curves(picture):
         for curve in curves:
             axes.plot(*([p[i] for p in curve] for i in order), **style)
@@ -253,13 +266,10 @@ def _ticks() -> Any:  # noqa: ANN401
     return MultipleLocator(10.0)
 
 
-def _draw_sphere(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
-    import numpy as np
-
-    around, over = np.mgrid[0.0 : 2.0 * math.pi : 25j, 0.0 : math.pi : 13j]
-    unit = (np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over))
-    center = [region.center_mm[i] for i in order]
-    surface = [c + region.radius_mm * u for c, u in zip(center, unit, strict=True)]
+def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
+    grid = directions()
+    points = surface_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
+    surface = [points[..., i] for i in order]
     colour = _COLOURS[region.kind]
     if region.kind in _OUTLINES:
         axes.plot_wireframe(*surface, color=colour, linewidth=0.35, alpha=0.45, linestyle="--")

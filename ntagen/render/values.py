@@ -19,7 +19,9 @@ from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
+from ntagen.render.solids import Solids, solids
 from ntagen.scene import Region, Scene, Vector
+from ntagen.shapes import Sphere
 from ntagen.units import deg_from_rad
 
 MIN_ACTIONS = 10
@@ -37,7 +39,10 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Spheres:
-    """The regions of one kind. If there are none, `centers` and `radii` have one row of zeros."""
+    """The spheres of one kind of region; a target that is no sphere has a ball around it.
+
+    If there are none, `centers` and `radii` have one row of zeros.
+    """
 
     count: int
     centers: tuple[Row, ...]
@@ -70,6 +75,7 @@ class ModelValues:
     swept: bool
     sweep_margin: int
     only_plans: bool
+    solids: Solids
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +108,7 @@ class _Writer:
             for r in regions
         )
         radii = tuple(
-            Row(self.number(r.radius_mm, f"the radius of {r.name}"), _one_line(r.name))
+            Row(self.number(r.shape.reach_mm(), f"the radius of {r.name}"), _one_line(r.name))
             for r in regions
         )
         return Spheres(len(regions), centers, radii)
@@ -147,14 +153,20 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
         ),
         circle_radius=writer.number(needle.radius_mm, "the radius of the motion circle"),
         targets=writer.spheres(scene.targets),
-        criticals=writer.spheres(scene.criticals),
-        detections=writer.spheres(scene.detections),
-        unexplored=writer.spheres(scene.unexplored),
-        safe=writer.spheres(scene.safe),
+        criticals=writer.spheres(_balls(scene.criticals)),
+        detections=writer.spheres(_balls(scene.detections)),
+        unexplored=writer.spheres(_balls(scene.unexplored)),
+        safe=writer.spheres(_balls(scene.safe)),
         swept=scene.safety == "swept",
         sweep_margin=_sweep_margin(scale, needle.radius_mm),
         only_plans=only_plans,
+        solids=solids(scene.avoided, scene.targets, scale, frame),
     )
+
+
+def _balls(regions: Sequence[Region]) -> list[Region]:
+    """The spheres among some regions; other shapes have tables of their own."""
+    return [region for region in regions if isinstance(region.shape, Sphere)]
 
 
 def _check_motion(scene: Scene) -> None:

@@ -4,6 +4,14 @@ from ntagen.shapes.ellipsoid import Ellipsoid
 from ntagen.shapes.round import Capsule, HalfSpace, Sphere
 from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning
 from ntagen.shapes.straight import Box, Cylinder
+from ntagen.shapes.surface import (
+    directions,
+    is_in,
+    overlap,
+    surface_mm,
+    thickness_mm,
+    triangles,
+)
 
 __all__ = [
     "UPRIGHT",
@@ -18,5 +26,11 @@ __all__ = [
     "Shape",
     "Sphere",
     "Vector",
+    "directions",
+    "is_in",
+    "overlap",
+    "surface_mm",
+    "thickness_mm",
+    "triangles",
     "turning",
 ]

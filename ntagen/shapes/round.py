@@ -86,9 +86,11 @@ class Capsule(Shape):
 
     @property
     def center_mm(self) -> Vector:
-        """The middle between its ends."""
-        low, high = self.bounds_mm()
-        x, y, z = (0.5 * (a + b) for a, b in zip(low, high, strict=True))
+        """The point of its axis in the middle between its ends."""
+        length = self.length_mm
+        ahead = 0.5 * (length + self.end_radius_mm - self.start_radius_mm)
+        share = min(1.0, max(0.0, ahead / length)) if length > 0.0 else 0.0
+        x, y, z = (a + share * (b - a) for a, b in zip(self.start_mm, self.end_mm, strict=True))
         return (x, y, z)
 
     @property
@@ -169,6 +171,13 @@ class Capsule(Shape):
         yield "end", self.end_mm, False
         yield "radius", (self.depth_mm,), True
         yield "smaller radius", (min(self.start_radius_mm, self.end_radius_mm),), False
+
+    def reach_mm(self) -> float:
+        """From the middle to the farther end."""
+        return max(
+            math.dist(self.center_mm, self.start_mm) + self.start_radius_mm,
+            math.dist(self.center_mm, self.end_mm) + self.end_radius_mm,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,10 +90,9 @@ class Shape(ABC):
     def parts(self) -> Iterator[tuple[str, tuple[float, ...], bool]]:
         """Its measures: their names, their numbers, and whether these must be greater than 0."""
 
+    @abstractmethod
     def reach_mm(self) -> float:
         """The radius of a ball about `center_mm` that contains the shape."""
-        low, high = self.bounds_mm()
-        return 0.5 * math.dist(low, high)
 
 
 def along(axes: Axes, own: Vector) -> Vector:

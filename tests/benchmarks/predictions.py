@@ -36,7 +36,7 @@ AHEAD_MM = (0.0, 10.0, 20.0)
 
 def priors_for_phantom(needle: Needle) -> Priors:
     """The priors with which the driver steers a phantom needle."""
-    target = Region("T1", "target", (0.0, -50.0, 0.0), 5.0)
+    target = Region.ball("T1", "target", (0.0, -50.0, 0.0), 5.0)
     scene = Scene("open", needle, (0.0, -1.0, 0.0), Limits(2.0, (math.pi,), 2, 2.0), (target,))
     return configure([], scene, needle="phantom").settings.priors
 

@@ -179,7 +179,7 @@ def test_without_a_plan_a_push_near_a_known_region_is_not_made() -> None:
 
 def test_a_shell_around_the_entry_may_be_left() -> None:
     beside = sphere("K", "critical", (3.0, 1.0, 0.0), 1.5)
-    shell = Region("D", "detection", (3.0, 1.0, 0.0), 4.5, around="K")
+    shell = Region.ball("D", "detection", (3.0, 1.0, 0.0), 4.5, around="K")
     for seed in range(1, 4):
         result, _ = drive(scene(beside, shell), noise_mm=0.1, seed=seed)
         assert result.ended.outcome == State.TARGET_REACHED.value

@@ -29,7 +29,12 @@ def check_plans(scene: Scene, plans: int) -> None:
         (paper(detections=()), 204),
         (paper(criticals=(), detections=()), 215),
         # One sphere that nothing gets past.
-        (paper(criticals=(Region("C1", "critical", (0.0, -25.0, 0.0), 20.0),), detections=()), 0),
+        (
+            paper(
+                criticals=(Region.ball("C1", "critical", (0.0, -25.0, 0.0), 20.0),), detections=()
+            ),
+            0,
+        ),
     ],
     ids=["all regions", "no detection", "no region", "blocked"],
 )
@@ -38,7 +43,7 @@ def test_plans_of_the_paper_scene(scene: Scene, plans: int) -> None:
 
 
 def test_an_earlier_target_that_all_paths_pass_changes_nothing() -> None:
-    first = Region("T0", "target", (0.0, -30.0, 0.0), 12.0)
+    first = Region.ball("T0", "target", (0.0, -30.0, 0.0), 12.0)
     check_plans(paper(targets=(first, *PAPER.targets), detections=()), 204)
 
 
@@ -46,8 +51,10 @@ def test_an_earlier_target_that_all_paths_pass_changes_nothing() -> None:
 def test_no_plan_enters_an_unexplored_region_and_safe_regions_change_nothing(safety: str) -> None:
     sphere = ((0.0, -25.0, 0.0), 5.0)
     shell = paper(safety=safety)
-    unknown = paper(safety=safety, detections=(), unexplored=(Region("U1", "unexplored", *sphere),))
-    safe = replace(shell, safe=(Region("S1", "safe", (0.0, -9.0, 0.0), 9.0),))
+    unknown = paper(
+        safety=safety, detections=(), unexplored=(Region.ball("U1", "unexplored", *sphere),)
+    )
+    safe = replace(shell, safe=(Region.ball("S1", "safe", (0.0, -9.0, 0.0), 9.0),))
     counts = []
     for scene in (shell, unknown, safe):
         model = checker.load(render(scene))
@@ -57,8 +64,8 @@ def test_no_plan_enters_an_unexplored_region_and_safe_regions_change_nothing(saf
 
 def test_a_path_is_given_up_in_a_region_at_its_start_and_at_its_end_only_if_swept() -> None:
     # As templates/README.md says: after the last target, `sampled` does not ask any more.
-    around_target = Region("D1", "detection", (0.0, -50.0, 0.0), 11.0)
-    around_start = Region("D1", "detection", (0.0, 0.0, 0.0), 1.0)
+    around_target = Region.ball("D1", "detection", (0.0, -50.0, 0.0), 11.0)
+    around_start = Region.ball("D1", "detection", (0.0, 0.0, 0.0), 1.0)
     for region, safety, verdict in (
         (around_target, "sampled", "satisfied"),
         (around_target, "swept", "not satisfied"),
@@ -66,7 +73,7 @@ def test_a_path_is_given_up_in_a_region_at_its_start_and_at_its_end_only_if_swep
         (around_start, "swept", "not satisfied"),
     ):
         # The paths enter shell and target in the same push, and end there.
-        target = Region("T1", "target", (0.0, -50.0, 0.0), 10.9)
+        target = Region.ball("T1", "target", (0.0, -50.0, 0.0), 10.9)
         scene = paper(targets=(target,), criticals=(), detections=(region,), safety=safety)
         answer = checker.load(render(scene)).check("E<> Checker.Final_TR_Reached")
         assert answer.verdict == verdict, (region, safety)
@@ -74,7 +81,7 @@ def test_a_path_is_given_up_in_a_region_at_its_start_and_at_its_end_only_if_swep
 
 def test_only_the_swept_check_sees_a_small_region_between_two_pushes() -> None:
     # The first push goes from (0, 0, 0) to (0, -1.95, -0.09); the region lies half way.
-    grain = Region("C1", "critical", (0.0, -1.0, 0.0), 0.1)
+    grain = Region.ball("C1", "critical", (0.0, -1.0, 0.0), 0.1)
     scene = paper(criticals=(grain,), detections=())
     answer = checker.load(render(scene)).check("E<> Checker.Final_TR_Reached")
     assert answer.verdict == "satisfied"

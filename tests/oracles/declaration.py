@@ -14,7 +14,7 @@ import copy
 import enum
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -45,9 +45,17 @@ class Sphere:
     radius: int
 
 
+Contains = Callable[[tuple[float, float, float]], bool]
+"""Whether a solid that is no sphere contains a point in mm."""
+
+
 @dataclass(frozen=True)
 class Instance:
-    """The constants of a model, all in its units."""
+    """The constants of a model, all in its units.
+
+    `solids` are to be avoided; `goals` are the targets if they are no spheres: the solid, and where
+    it ends below in mm.
+    """
 
     scale: int = 1000
     dt: int = 2
@@ -63,6 +71,8 @@ class Instance:
     criticals: tuple[Sphere, ...] = (Sphere((0, -25_000, 0), 2_000),)
     detections: tuple[Sphere, ...] = (Sphere((0, -25_000, 0), 5_000),)
     unexplored: tuple[Sphere, ...] = ()
+    solids: tuple[Contains, ...] = ()
+    goals: tuple[tuple[Contains, float], ...] = ()
 
     @property
     def max_actions(self) -> int:
@@ -208,17 +218,24 @@ class Needle:
         target = self.instance.targets[self.curr_TR_index]
         squares = (math.pow(c - p, 2) for c, p in zip(target.center, self.tip_pos, strict=True))
         self.TR_reached = math.sqrt(_sum(squares)) - target.radius <= 0
+        x, y, z = (part / self.instance.scale for part in self.tip_pos)
+        goals = self.instance.goals
+        if goals:
+            self.TR_reached = goals[self.curr_TR_index][0]((x, y, z))
         if self.TR_reached:
             self.curr_TR_index += 1
             if self.curr_TR_index == len(self.instance.targets):
                 return End.FINAL_TR_REACHED
             target = self.instance.targets[self.curr_TR_index]
         self.TR_reachable = self.tip_pos[1] >= target.center[1] - target.radius
+        if goals:
+            self.TR_reachable = y >= goals[self.curr_TR_index][1]
         if not self.TR_reachable:
             return End.TR_UNREACHABLE
         instance = self.instance
         harmful = (*instance.criticals, *instance.unexplored, *instance.detections)
         self.CR_reached = any(self._touches(sphere) for sphere in harmful)
+        self.CR_reached |= any(contains((x, y, z)) for contains in instance.solids)
         return End.UR_REACHED if self.CR_reached else None
 
     def _touches(self, sphere: Sphere) -> bool:

@@ -155,10 +155,12 @@ def capsule(start: Array, end: Array, first: float, second: float) -> Solid:
 
     def contains(points: Array) -> NDArray[np.bool_]:
         # Many balls in place of all.
+        shares = np.linspace(0.0, 1.0, 2001)
+        middles, radii = start + np.outer(shares, end - start), first + shares * (second - first)
         inside = np.zeros(len(points), dtype=bool)
-        for share in np.linspace(0.0, 1.0, 2001):
-            middle, radius = start + share * (end - start), first + share * (second - first)
-            inside |= ((points - middle) ** 2).sum(axis=1) <= radius**2
+        for part in np.array_split(np.arange(len(points)), max(1, len(points) // 1000)):
+            squares = ((points[part, None, :] - middles) ** 2).sum(axis=2)
+            inside[part] = (squares <= radii**2).any(axis=1)
         return inside
 
     profiles = [arc(length, second, 0.0, tilt), cone, arc(0.0, first, tilt, math.pi)]

@@ -11,6 +11,7 @@ import pytest
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.errors import InputError
 from ntagen.scene import Needle, Pose, Region
+from ntagen.shapes import Sphere
 from tests.scenes import PAPER, paper, with_limits
 
 NAN, INF = math.nan, math.inf
@@ -38,9 +39,12 @@ BREACHES: list[tuple[Callable[[], object], str]] = [
     (needle(radius_mm=INF), "the radius of the motion circle is inf"),
     (needle(speed_mm_per_s=0.0), "the insertion speed must be greater than 0"),
     (needle(length_mm=-1.0), "the needle's length cannot be negative"),
-    (lambda: replace(C1, radius_mm=-2.0), "the radius of `C1` must be greater than 0"),
-    (lambda: replace(C1, radius_mm=NAN), "the radius of `C1` is nan"),
-    (lambda: replace(C1, center_mm=(0.0, INF, 0.0)), "the centre of `C1` is inf"),
+    (
+        lambda: replace(C1, shape=Sphere(C1.center_mm, -2.0)),
+        "the radius of `C1` must be greater than 0",
+    ),
+    (lambda: replace(C1, shape=Sphere(C1.center_mm, NAN)), "the radius of `C1` is nan"),
+    (lambda: replace(C1, shape=Sphere((0.0, INF, 0.0), 2.0)), "the centre of `C1` is inf"),
     (lambda: replace(C1, kind="soft"), "`C1` is a soft region"),
     (lambda: replace(C1, around="C2"), "only a detection region has `around`"),
     (lambda: with_limits(PAPER, step_s=0.0), "the step must be greater than 0"),
@@ -70,7 +74,7 @@ def test_all_that_is_wrong_with_a_value_is_said() -> None:
 def test_what_a_driver_makes_is_accepted() -> None:
     scene = paper().with_needle(Pose((0.0, -9.0, 0.0), TIP.heading, TIP.bevel), 31.0, 1000.0)
     assert scene.needle.length_mm == 0.0
-    inside = Region("learned 1", "critical", (0.0, -9.0, 0.0), 2.0)
+    inside = Region.ball("learned 1", "critical", (0.0, -9.0, 0.0), 2.0)
     assert scene.with_regions(inside).with_targets(()).criticals[-1] == inside
 
 

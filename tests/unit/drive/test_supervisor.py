@@ -31,7 +31,7 @@ from tests.drive.runs import Diary
 
 SCENE = load(Path(__file__).parents[3] / "examples" / "paper.nsl")
 SETTINGS = configure((), SCENE, "all", "grbl").settings
-BALL = Region("C", "critical", (0.0, 0.0, 20.0), 2.0)
+BALL = Region.ball("C", "critical", (0.0, 0.0, 20.0), 2.0)
 FAST = 0.1
 """The supervised needle's tip must stand this much after a violation, at 1 mm/s, in mm."""
 

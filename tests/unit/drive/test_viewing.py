@@ -60,7 +60,7 @@ def test_hidden_regions_are_drawn_apart_and_paler_than_known_ones() -> None:
 
 
 def test_a_region_that_is_forgotten_vanishes() -> None:
-    region = Region("learned 1", "critical", (0.0, -20.0, 0.0), 2.0)
+    region = Region.ball("learned 1", "critical", (0.0, -20.0, 0.0), 2.0)
     learned, forgotten = Learned.of(1.0, region), Forgotten(2.0, "learned 1", "critical")
     assert "critical learned 1" in drawn(show_record(learned))
     assert drawn([*show_record(learned), *show_record(forgotten)]) == {}

@@ -48,9 +48,9 @@ def test_published_instance() -> None:
         needle=Needle(Pose((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)), 30.0, 1.0),
         axis=(0.0, -1.0, 0.0),
         limits=Limits(2.0, QUARTER_TURNS_RAD, max_rolls=2, min_roll_distance_mm=2.0),
-        targets=(Region("T1", "target", (0.0, -50.0, 0.0), 10.0),),
-        criticals=(Region("C1", "critical", (0.0, -25.0, 0.0), 2.0),),
-        detections=(Region("D1", "detection", (0.0, -25.0, 0.0), 5.0),),
+        targets=(Region.ball("T1", "target", (0.0, -50.0, 0.0), 10.0),),
+        criticals=(Region.ball("C1", "critical", (0.0, -25.0, 0.0), 2.0),),
+        detections=(Region.ball("D1", "detection", (0.0, -25.0, 0.0), 5.0),),
         resolution_per_mm=1000,
         safety="sampled",
     )
@@ -172,7 +172,7 @@ def test_loop_ends_are_included_and_indices_are_numbers() -> None:
     assert [r.name for r in scene.criticals] == [
         *("C[-1][0]", "C[-1][2]", "C[0][0]", "C[0][2]", "C[1][0]", "C[1][2]")
     ]
-    assert scene.detections[-1] == Region("D[1][1]", "detection", (5, -25, 1), 3.0, "C[1][2]")
+    assert scene.detections[-1] == Region.ball("D[1][1]", "detection", (5, -25, 1), 3.0, "C[1][2]")
 
 
 def test_targets_keep_their_order() -> None:

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from ntagen.errors import InputError
 from ntagen.render import render, render_queries
 from ntagen.scene import NamedQuery, Pose, Region, Scene
+from ntagen.shapes import Sphere
 from tests.examples import examples
 from tests.oracles.declaration import Instance
 from tests.scenes import PAPER, paper, scenes, with_limits
@@ -136,7 +137,7 @@ def test_another_direction_of_insertion_gives_the_same_model() -> None:
         return (-y, x, z)
 
     def moved(region: Region) -> Region:
-        return replace(region, center_mm=swapped(*region.center_mm))
+        return replace(region, shape=Sphere(swapped(*region.center_mm), region.radius_mm))
 
     along_x = paper(
         axis=swapped(*PAPER.axis),
@@ -204,8 +205,8 @@ def test_two_different_queries_of_one_name_are_refused() -> None:
         render(scene)
 
 
-LEFT = Region("Left", "unexplored", (9.0, -25.0, 0.0), 3.0)
-ENTRY = Region("Entry", "safe", (0.0, -9.0, 0.0), 5.0)
+LEFT = Region.ball("Left", "unexplored", (9.0, -25.0, 0.0), 3.0)
+ENTRY = Region.ball("Entry", "safe", (0.0, -9.0, 0.0), 5.0)
 
 
 def test_unexplored_and_safe_regions_are_in_the_model_only_if_there_are_any() -> None:

@@ -1,0 +1,93 @@
+"""Points of the surfaces of shapes, for pictures, and for the question what lies in what."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from ntagen.shapes.round import Sphere
+from ntagen.shapes.shape import Points, Shape, Vector
+
+_HALVINGS: Final = 50
+_ROWS, _COLUMNS = 13, 24
+
+
+def surface_mm(shape: Shape, directions: Points, most_mm: float = 100.0) -> Points:
+    """Where rays from the middle of a shape leave it.
+
+    Args:
+        shape: A convex shape; its middle lies inside, or on its surface.
+        directions: Unit vectors, with the shape (n, 3).
+        most_mm: A ray that does not leave the shape, as in a half-space, ends here.
+    """
+    import numpy as np
+
+    middle = np.array(shape.center_mm)
+    low = np.zeros(len(directions))
+    high = np.full(len(directions), min(most_mm, shape.reach_mm()))
+    for _ in range(_HALVINGS):
+        half = 0.5 * (low + high)
+        is_inside = shape.distance_mm(middle + half[:, None] * directions) <= 0.0
+        low, high = np.where(is_inside, half, low), np.where(is_inside, high, half)
+    return np.asarray(middle + high[:, None] * directions)
+
+
+def directions() -> Points:
+    """Unit vectors all around, as a grid of rows from pole to pole: (rows, columns, 3)."""
+    import numpy as np
+
+    over = np.linspace(0.0, np.pi, _ROWS)[:, None]
+    around = np.linspace(0.0, 2.0 * np.pi, _COLUMNS + 1)[None, :]
+    grid = [np.cos(around) * np.sin(over), np.sin(around) * np.sin(over), np.cos(over)]
+    return np.stack([part + 0.0 * around for part in grid], axis=-1)
+
+
+def triangles(shape: Shape) -> tuple[Points, list[int]]:
+    """Points of the surface, and for each triangle between them three of their numbers."""
+    grid = directions()
+    rows, columns, _ = grid.shape
+    indices: list[int] = []
+    for row in range(rows - 1):
+        for column in range(columns - 1):
+            one = row * columns + column
+            two = one + columns
+            indices += [one, two, one + 1, one + 1, two, two + 1]
+    return surface_mm(shape, grid.reshape(-1, 3)), indices
+
+
+def is_in(shape: Shape, point_mm: Vector) -> bool:
+    """Whether a point lies in a shape; most that do not are seen by the bounds."""
+    low, high = shape.bounds_mm()
+    if any(not a <= p <= b for a, p, b in zip(low, point_mm, high, strict=True)):
+        return False
+    return shape.distance_at_mm(point_mm) <= 0.0
+
+
+def overlap(one: Shape, two: Shape) -> bool:
+    """Whether two shapes have more than their surfaces in common.
+
+    Exact for spheres; else some hundred points of the first surface are taken, and both middles.
+    """
+    if math.dist(one.center_mm, two.center_mm) >= one.reach_mm() + two.reach_mm():
+        return False
+    # The distance of the middle of a sphere says all.
+    if isinstance(one, Sphere):
+        return two.distance_at_mm(one.middle_mm) < one.radius_mm
+    if isinstance(two, Sphere):
+        return one.distance_at_mm(two.middle_mm) < two.radius_mm
+    if is_in(one, two.center_mm) or is_in(two, one.center_mm):
+        return True
+    points = surface_mm(one, directions().reshape(-1, 3))
+    return bool((two.distance_mm(points) < 0.0).any())
+
+
+def thickness_mm(outer: Shape, inner: Shape) -> float:
+    """The least depth in one shape of the surface of another; negative if it is not inside.
+
+    It is exact for a sphere inside, and for a grown shape around the one that it was made of. Else
+    the depth of some hundred points of the surface is taken.
+    """
+    if isinstance(inner, Sphere):
+        return -(outer.distance_at_mm(inner.middle_mm) + inner.radius_mm)
+    points = surface_mm(inner, directions().reshape(-1, 3))
+    return float(-outer.distance_mm(points).max())
