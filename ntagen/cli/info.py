@@ -52,7 +52,9 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
       ntagen info model.xml --json | jq .features
       ntagen info model.xta --svg pictures
 
-    For an environment, it also shows all settings of `ntagen drive` and where each comes from.
+    For an environment, it also shows each region (its volume, its bounds, and its distance from
+    the straight way between the tip and the middle of the last target; negative if it is in the
+    way), and all settings of `ntagen drive` and where each comes from.
 
     \b
     The JSON object has "format": "ntagen-model", "version": 1, and
@@ -70,6 +72,8 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
       queries    text, comment, expect (the verdict that the file states, or null)
       warnings, load_seconds
       settings   of an environment: by their words, field, value, shown and origin
+      regions    of an environment: name, kind, shape, volume_mm3, low_mm and high_mm (bounds),
+                 from_straight_way_mm; null is infinite
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(not as_json):
         loaded = load_model(path, include)
@@ -82,8 +86,14 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
         write_files(_pictures(model.templates, folder))
     if as_json:
         text = model.facts_json()
-        if configuration is not None:
-            text = json.dumps(json.loads(text) | {"settings": _settings(configuration)})
+        if loaded.task is not None and configuration is not None:
+            from ntagen.cli.region_rows import region_facts
+
+            more = {
+                "settings": _settings(configuration),
+                "regions": region_facts(loaded.task.scene),
+            }
+            text = json.dumps(json.loads(text) | more)
         echo(text)
         return
     _show(path, model)
@@ -110,11 +120,14 @@ def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
 
 def _show_task(task: Task, configuration: Configuration) -> None:
     """Prints regions, devices and settings of an environment."""
+    from ntagen.cli.region_rows import region_rows
     from ntagen.cli.steering import show_settings
 
     kinds = [region.kind for region in task.scene.regions]
     counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
     echo(f"\nregions: {', '.join(counts)}")
+    for row in region_rows(task.scene, ROWS_SHOWN):
+        echo(f"  {row}")
     for device in (task.device, task.tracker):
         if device is not None:
             echo(str(device))

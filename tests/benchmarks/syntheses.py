@@ -25,6 +25,7 @@ from ntagen import checker
 from ntagen.nsl import load
 from ntagen.render import render
 from ntagen.scene import Pose, Region, Scene, Vector
+from ntagen.shapes import Sphere
 
 ROOT = Path(__file__).resolve().parents[2]
 QUERY = "control: A<> Checker.Final_TR_Reached"
@@ -36,9 +37,8 @@ LEAST_RADIUS_MM, MOST_RADIUS_MM = 28.0, 36.0
 def _moved(region: Region, numbers: random.Random) -> Region:
     """The region with its centre a little elsewhere and another radius."""
     x, y, z = (part + numbers.uniform(-MOST_SHIFT_MM, MOST_SHIFT_MM) for part in region.center_mm)
-    return replace(
-        region, center_mm=(x, y, z), radius_mm=region.radius_mm * numbers.uniform(0.9, 1.1)
-    )
+    ball = Sphere((x, y, z), region.radius_mm * numbers.uniform(0.9, 1.1))
+    return replace(region, shape=ball)
 
 
 def _tilted(pose: Pose, numbers: random.Random) -> Pose:

@@ -143,3 +143,23 @@ def test_scalar_sets_say_whether_they_are_reduced(
     )
     out, _ = info_run(capsys, 0, path)
     assert f"scalar set of 3 members: {reduction}" in out
+
+
+def test_regions_of_an_environment(capsys: pytest.CaptureFixture[str]) -> None:
+    path = Path(__file__).parents[2] / "corpus" / "nsl" / "ok" / "shapes.nsl"
+    out, _ = info_run(capsys, 0, path)
+    lines = {line.split()[0]: " ".join(line.split()) for line in out.splitlines() if line.strip()}
+    # The straight way is the line from (0, 0, 0) to (0, -50, 0).
+    assert lines["K1"].startswith("K1 critical cylinder 565.5 mm^3 -3 to 3 -30 to -10 -12 to -6 ")
+    assert lines["K1"].endswith(" 6.00 mm")
+    half_space = "-infinity to infinity -infinity to -70 -infinity to infinity"
+    assert lines["H"].startswith(f"H unexplored halfspace infinite {half_space}")
+    assert lines["H"].endswith(" 20.00 mm")
+    out, _ = info_run(capsys, 0, path, "--json")
+    facts = {one["name"]: one for one in json.loads(out)["regions"]}
+    assert facts["B1"]["volume_mm3"] == pytest.approx(240.0)
+    assert facts["H"]["volume_mm3"] is None
+    assert facts["H"]["high_mm"] == [None, -70.0, None]
+    assert facts["T1"]["from_straight_way_mm"] == pytest.approx(-10.0)
+    # The ellipsoid stands on the way; its middle is the deepest place.
+    assert facts["E1"]["from_straight_way_mm"] == pytest.approx(-2.0, abs=2e-3)

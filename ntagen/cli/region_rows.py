@@ -1,0 +1,102 @@
+"""What `ntagen info` says of regions: shape, volume, bounds, distance to the straight way.
+
+The straight way leads from the tip to the middle of the last target. A needle bends, so a plan may
+come nearer or stay away; but what lies on the straight way is what plans must get around.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from ntagen.needle.kinematics import Arc
+from ntagen.needle.nearest import nearest_to
+from ntagen.scene import Pose, Region, Scene
+from ntagen.shapes import Vector
+
+_MM3_PER_CM3: Final = 1000.0
+
+
+def region_facts(scene: Scene) -> list[dict[str, object]]:
+    """The regions for JSON; what is infinite is null. Lengths are in mm, volumes in mm^3."""
+    way = _straight_way(scene)
+    return [
+        {
+            "name": region.name,
+            "kind": region.kind,
+            "shape": _word(region),
+            "volume_mm3": _finite(region.shape.volume_mm3()),
+            "low_mm": [_finite(part) for part in region.shape.bounds_mm()[0]],
+            "high_mm": [_finite(part) for part in region.shape.bounds_mm()[1]],
+            "from_straight_way_mm": _away_mm(region, way),
+        }
+        for region in scene.regions
+    ]
+
+
+def region_rows(scene: Scene, most: int) -> Iterator[str]:
+    """The regions as lines of a table with aligned columns, at most so many of them."""
+    regions = scene.regions[:most]
+    way = _straight_way(scene)
+    rows = [["region", "kind", "shape", "volume", "x mm", "y mm", "z mm", "from the straight way"]]
+    rows += [
+        [
+            " ".join(region.name.split()),
+            region.kind,
+            _word(region),
+            _volume(region.shape.volume_mm3()),
+            *_ranges(region),
+            f"{_away_mm(region, way):.2f} mm",
+        ]
+        for region in regions
+    ]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip()
+    if len(scene.regions) > most:
+        yield f"… {len(scene.regions) - most} more (all of them: --json)"
+
+
+def _straight_way(scene: Scene) -> Sequence[Arc]:
+    """From the tip to the middle of the last target; nothing if the tip is there already."""
+    start = scene.needle.tip.position_mm
+    end = scene.targets[-1].center_mm
+    length_mm = math.dist(start, end)
+    if length_mm <= 0.0:
+        return [Arc(scene.needle.tip, math.inf, 0.0)]
+    x, y, z = ((b - a) / length_mm for a, b in zip(start, end, strict=True))
+    # A straight way has no bevel.
+    return [Arc(Pose(start, (x, y, z), (0.0, 0.0, 0.0)), math.inf, length_mm)]
+
+
+def _away_mm(region: Region, way: Sequence[Arc]) -> float:
+    start: Vector = way[0].start.position_mm
+    return nearest_to(way, start, region.shape).distance_mm
+
+
+def _word(region: Region) -> str:
+    return type(region.shape).__name__.lower()
+
+
+def _volume(volume_mm3: float) -> str:
+    if math.isinf(volume_mm3):
+        return "infinite"
+    if volume_mm3 < _MM3_PER_CM3:
+        return f"{volume_mm3:.4g} mm^3"
+    return f"{volume_mm3 / _MM3_PER_CM3:.4g} cm^3"
+
+
+def _ranges(region: Region) -> list[str]:
+    low, high = region.shape.bounds_mm()
+    return [f"{_end(a)} to {_end(b)}" for a, b in zip(low, high, strict=True)]
+
+
+def _end(value_mm: float) -> str:
+    if math.isinf(value_mm):
+        return "infinity" if value_mm > 0.0 else "-infinity"
+    return f"{round(value_mm, 2) + 0.0:g}"
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
