@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Final, cast
 from ntagen.nsl import tree
 from ntagen.nsl.convert import TreeBuilder
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
+from ntagen.nsl.plain import PlainRegion, plain_regions
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import (
@@ -80,7 +81,8 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
             hint="`ntagen check` answers its queries, and `ntagen info` shows what is in it",
         )
         return tree.File(source, ())
-    tokens = [t for t in tokenise(source) if isinstance(t, Token)]
+    known = ((one.start, one.end, one) for one in plain_regions(source))
+    tokens = [t for t in tokenise(source, known) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
 
 
@@ -322,6 +324,8 @@ class _Parser:
 
     def _parse_words(self, words: Sequence[Token]) -> tree.Statement:
         """The tree of one statement without its braces."""
+        if isinstance(words[0], PlainRegion):
+            return words[0].node
         span = words[0].span.to(words[-1].span)
         broken = tree.Broken(span, keyword_of(words[0]), _declared_name(words))
         if words[0].type == "QUERY":
@@ -483,6 +487,8 @@ _SEPARATORS: Final = frozenset({";", ","})
 
 def _declared_name(words: Sequence[Token]) -> str | None:
     """The name that a statement declares, if that part of it is right."""
+    if isinstance(words[0], PlainRegion):
+        return words[0].node.name.identifier.text
     if len(words) > 1 and words[0].text in NAMING and words[1].type == "NAME":
         return words[1].text
     return None

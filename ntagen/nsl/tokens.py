@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, cast
@@ -135,24 +135,50 @@ def _cache_file() -> str | None:
     return None if folder is None else str(folder / f"nsl-grammar-{version}.tables")
 
 
-def tokenise(source: Source) -> list[Token | Comment]:
+def tokenise(source: Source, known: Iterable[tuple[int, int, Token]] = ()) -> list[Token | Comment]:
     """All tokens and comments of a source; with the white space they are the whole text.
 
     After `MAX_STRAY` tokens that are not part of the language, the rest of the text is left out.
+
+    Args:
+        source: The text.
+        known: Parts of the text in their order, by start and end, and the token for each.
     """
     found: list[Token | Comment] = []
     stray_count = 0
-    for token in grammar().lex(source.text, dont_ignore=True):
-        start = cast(int, token.start_pos)
+    begin = 0
+    for start, end, token in known:
+        stray_count += _lex(source, begin, start, found, MAX_STRAY - stray_count)
+        if stray_count > MAX_STRAY:
+            break
+        found.append(token)
+        begin = end
+    if stray_count <= MAX_STRAY:
+        _lex(source, begin, len(source.text), found, MAX_STRAY - stray_count)
+    return list(_joined(_named(found)))
+
+
+def _lex(
+    source: Source, begin: int, end: int, found: list[Token | Comment], most_stray: int
+) -> int:
+    """Adds the tokens and comments of a part of a text; returns how many of them are stray."""
+    text = source.text[begin:end] if begin or end < len(source.text) else source.text
+    if not text or text.isspace():
+        return 0
+    lines_before = source.position(begin)[0] - 1
+    stray_count = 0
+    for token in grammar().lex(text, dont_ignore=True):
+        start = begin + cast(int, token.start_pos)
+        line = lines_before + cast(int, token.line)
         span = source.span(start, start + len(token))
         if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
-            found.append(Comment(str(token).rstrip(), span, cast(int, token.line)))
+            found.append(Comment(str(token).rstrip(), span, line))
         elif token.type != "SPACE":
-            found.append(Token(token.type, str(token), span, cast(int, token.line)))
+            found.append(Token(token.type, str(token), span, line))
             stray_count += token.type in STRAY
-            if stray_count > MAX_STRAY:
+            if stray_count > most_stray:
                 break
-    return list(_joined(_named(found)))
+    return stray_count
 
 
 def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:

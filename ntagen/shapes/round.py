@@ -174,9 +174,10 @@ class Capsule(Shape):
 
     def reach_mm(self) -> float:
         """From the middle to the farther end."""
+        middle_mm = self.center_mm
         return max(
-            math.dist(self.center_mm, self.start_mm) + self.start_radius_mm,
-            math.dist(self.center_mm, self.end_mm) + self.end_radius_mm,
+            math.dist(middle_mm, self.start_mm) + self.start_radius_mm,
+            math.dist(middle_mm, self.end_mm) + self.end_radius_mm,
         )
 
 

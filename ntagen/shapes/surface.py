@@ -66,9 +66,12 @@ def is_in(shape: Shape, point_mm: Vector) -> bool:
 def overlap(one: Shape, two: Shape) -> bool:
     """Whether two shapes have more than their surfaces in common.
 
-    Exact for spheres; else some hundred points of the first surface are taken, and both middles.
+    Exact for spheres; else some hundred points of both surfaces are taken, and both middles.
     """
     if math.dist(one.center_mm, two.center_mm) >= one.reach_mm() + two.reach_mm():
+        return False
+    (low, high), (least, most) = one.bounds_mm(), two.bounds_mm()
+    if any(b <= c or d <= a for a, b, c, d in zip(low, high, least, most, strict=True)):
         return False
     # The distance of the middle of a sphere says all.
     if isinstance(one, Sphere):
@@ -77,8 +80,11 @@ def overlap(one: Shape, two: Shape) -> bool:
         return one.distance_at_mm(two.middle_mm) < two.radius_mm
     if is_in(one, two.center_mm) or is_in(two, one.center_mm):
         return True
-    points = surface_mm(one, directions().reshape(-1, 3))
-    return bool((two.distance_mm(points) < 0.0).any())
+    rays = directions().reshape(-1, 3)
+    return bool(
+        (two.distance_mm(surface_mm(one, rays)) < 0.0).any()
+        or (one.distance_mm(surface_mm(two, rays)) < 0.0).any()
+    )
 
 
 def thickness_mm(outer: Shape, inner: Shape) -> float:

@@ -17,6 +17,9 @@ from ntagen.shapes import (
     Shape,
     Sphere,
     Vector,
+    is_in,
+    overlap,
+    thickness_mm,
     turning,
 )
 from tests.oracles import surfaces
@@ -203,3 +206,29 @@ def test_what_is_too_small_to_shrink_vanishes() -> None:
         assert shape.grown(-shape.depth_mm - 0.5).depth_mm <= 0.0, name
     box = Box(MIDDLE, (2.0, 2.0, 2.0)).grown(1.0).grown(-1.5)
     assert box == replace(Box(MIDDLE, (2.0, 2.0, 2.0)), size_mm=(1.0, 1.0, 1.0))
+
+
+PAIRS = [
+    (Sphere(MIDDLE, 2.0), Box((4.5, -20.0, 5.0), (3.1, 4.0, 6.0)), True),
+    (Sphere(MIDDLE, 2.0), Box((4.5, -20.0, 5.0), (2.9, 4.0, 6.0)), False),
+    (Box(MIDDLE, (2.0, 2.0, 2.0)), Box(MIDDLE, (9.0, 9.0, 9.0), AXES), True),
+    (Box(MIDDLE, (2.0, 2.0, 2.0)), Cylinder((5.0, -20.0, 5.0), (9.0, -20.0, 5.0), 1.0), False),
+    (Ellipsoid(MIDDLE, (3.0, 1.0, 1.0)), Cylinder((3.9, -20, 5), (9.0, -20.0, 5.0), 1.0), True),
+    (Ellipsoid(MIDDLE, (3.0, 1.0, 1.0)), Cylinder((4.1, -20, 5), (9.0, -20.0, 5.0), 1.0), False),
+    (Box(MIDDLE, (4.0, 2.0, 2.0)), HalfSpace((2.9, 0.0, 0.0), (1.0, 0.0, 0.0)), True),
+    (Box(MIDDLE, (4.0, 2.0, 2.0)), HalfSpace((3.1, 0.0, 0.0), (1.0, 0.0, 0.0)), False),
+]
+
+
+@pytest.mark.parametrize(("one", "two", "expected"), PAIRS)
+def test_what_has_points_in_common_overlaps(one: Shape, two: Shape, *, expected: bool) -> None:
+    assert overlap(one, two) is overlap(two, one) is expected
+
+
+def test_how_deep_one_shape_lies_in_another() -> None:
+    box = Box(MIDDLE, (10.0, 8.0, 6.0), AXES)
+    assert thickness_mm(box, Sphere(MIDDLE, 1.0)) == pytest.approx(2.0)
+    assert thickness_mm(box.grown(2.5), box) == pytest.approx(2.5, abs=1e-9)
+    assert thickness_mm(Sphere(MIDDLE, 1.0), box) < 0.0
+    assert is_in(box, MIDDLE)
+    assert not is_in(box, (1.0, -20.0, 9.0))
