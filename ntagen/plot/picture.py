@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.scene import Region, Scene, Vector
-from ntagen.shapes import Sphere, directions, surface_mm
+from ntagen.shapes import Sphere, directions, outline_mm
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -164,7 +164,7 @@ def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> A
     if isinstance(region.shape, Sphere):
         center = [region.center_mm[axis] for axis in shown]
         return Circle((center[0], center[1]), region.radius_mm, **style)
-    points = surface_mm(region.shape, directions().reshape(-1, 3))[:, list(shown)]
+    points = outline_mm(region.shape, directions().reshape(-1, 3))[:, list(shown)]
     angles = np.linspace(0.0, 2.0 * math.pi, 240, endpoint=False)
     farthest = np.argmax(points @ np.array([np.cos(angles), np.sin(angles)]), axis=0)
     return Polygon(points[farthest], **style)
@@ -268,7 +268,7 @@ def _ticks() -> Any:  # noqa: ANN401
 
 def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
     grid = directions()
-    points = surface_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
+    points = outline_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
     surface = [points[..., i] for i in order]
     colour = _COLOURS[region.kind]
     if region.kind in _OUTLINES:

@@ -7,6 +7,7 @@ from ntagen.shapes.straight import Box, Cylinder
 from ntagen.shapes.surface import (
     directions,
     is_in,
+    outline_mm,
     overlap,
     surface_mm,
     thickness_mm,
@@ -28,6 +29,7 @@ __all__ = [
     "Vector",
     "directions",
     "is_in",
+    "outline_mm",
     "overlap",
     "surface_mm",
     "thickness_mm",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Final
 
@@ -32,6 +33,29 @@ def surface_mm(shape: Shape, directions: Points, most_mm: float = 100.0) -> Poin
     return np.asarray(middle + high[:, None] * directions)
 
 
+def outline_mm(shape: Shape, directions: Points) -> Points:
+    """The points of the surface that are nearest to points around the shape, in these directions.
+
+    So ends, edges and corners have many points, and flat sides few: what a picture of a convex
+    shape needs, and where another convex shape is least deep around it. The nearest point follows
+    from the slope of the distance. A half-space has no points around; see `surface_mm`.
+    """
+    import numpy as np
+
+    if not math.isfinite(shape.reach_mm()):
+        return surface_mm(shape, directions)
+    away_mm = _AROUND_RATIO * shape.reach_mm()
+    points = np.array(shape.center_mm) + away_mm * directions
+    step = 1e-4 * away_mm * np.eye(3)
+    rises = [shape.distance_mm(points + one) - shape.distance_mm(points - one) for one in step]
+    slope = np.stack(rises, axis=1)
+    slope /= np.linalg.norm(slope, axis=1)[:, None]
+    # The second and third time correct the slope's rounding.
+    for _ in range(3):
+        points = points - shape.distance_mm(points)[:, None] * slope
+    return np.asarray(points)
+
+
 def directions() -> Points:
     """Unit vectors all around, as a grid of rows from pole to pole: (rows, columns, 3)."""
     import numpy as np
@@ -52,7 +76,7 @@ def triangles(shape: Shape) -> tuple[Points, list[int]]:
             one = row * columns + column
             two = one + columns
             indices += [one, two, one + 1, one + 1, two, two + 1]
-    return surface_mm(shape, grid.reshape(-1, 3)), indices
+    return outline_mm(shape, grid.reshape(-1, 3)), indices
 
 
 def is_in(shape: Shape, point_mm: Vector) -> bool:
@@ -91,9 +115,23 @@ def thickness_mm(outer: Shape, inner: Shape) -> float:
     """The least depth in one shape of the surface of another; negative if it is not inside.
 
     It is exact for a sphere inside, and for a grown shape around the one that it was made of. Else
-    the depth of some hundred points of the surface is taken.
+    the depth of some hundred points of the surface is taken. Their places are right to 1e-7 mm.
     """
     if isinstance(inner, Sphere):
         return -(outer.distance_at_mm(inner.middle_mm) + inner.radius_mm)
-    points = surface_mm(inner, directions().reshape(-1, 3))
+    (low, high), (least, most) = inner.bounds_mm(), outer.bounds_mm()
+    ends = [(c - a) for a, c in zip(low, least, strict=True) if math.isfinite(c)]
+    ends += [(b - d) for b, d in zip(high, most, strict=True) if math.isfinite(d)]
+    outside_mm = max(ends, default=-math.inf)
+    return -outside_mm if outside_mm > _TOUCH_MM else _thickness_mm(outer, inner)
+
+
+@functools.lru_cache(maxsize=4096)
+def _thickness_mm(outer: Shape, inner: Shape) -> float:
+    """The same for shapes whose bounds say nothing; a driver asks for the same ones often."""
+    points = outline_mm(inner, directions().reshape(-1, 3))
     return float(-outer.distance_mm(points).max())
+
+
+_AROUND_RATIO: Final = 3.0
+_TOUCH_MM: Final = 1e-6

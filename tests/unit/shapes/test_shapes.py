@@ -17,7 +17,9 @@ from ntagen.shapes import (
     Shape,
     Sphere,
     Vector,
+    directions,
     is_in,
+    outline_mm,
     overlap,
     thickness_mm,
     turning,
@@ -228,7 +230,24 @@ def test_what_has_points_in_common_overlaps(one: Shape, two: Shape, *, expected:
 def test_how_deep_one_shape_lies_in_another() -> None:
     box = Box(MIDDLE, (10.0, 8.0, 6.0), AXES)
     assert thickness_mm(box, Sphere(MIDDLE, 1.0)) == pytest.approx(2.0)
-    assert thickness_mm(box.grown(2.5), box) == pytest.approx(2.5, abs=1e-9)
+    assert thickness_mm(box.grown(2.5), box) == pytest.approx(2.5, abs=1e-6)
+    wall = HalfSpace((0.0, 9.0, 0.0), (0.0, 1.0, 0.0))
+    assert thickness_mm(wall.grown(2.0), wall) == pytest.approx(2.0)
+    assert thickness_mm(wall, wall.grown(2.0)) < 0.0
+    assert thickness_mm(wall, box) < -25.0
+    assert thickness_mm(box, wall) < 0.0
+    assert thickness_mm(wall, Box((0.0, 15.0, 0.0), (4.0, 4.0, 4.0))) == pytest.approx(4.0)
     assert thickness_mm(Sphere(MIDDLE, 1.0), box) < 0.0
     assert is_in(box, MIDDLE)
     assert not is_in(box, (1.0, -20.0, 9.0))
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_an_outline_lies_on_the_surface_and_reaches_all_ends(name: str) -> None:
+    shape, _ = CASES[name]
+    points = outline_mm(shape, directions().reshape(-1, 3))
+    assert np.abs(shape.distance_mm(points)).max() < 1e-7
+    low, high = shape.bounds_mm()
+    width = np.array(high) - np.array(low)
+    assert (np.abs(points.min(axis=0) - low) < 0.05 * width).all()
+    assert (np.abs(points.max(axis=0) - high) < 0.05 * width).all()
