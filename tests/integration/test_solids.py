@@ -13,7 +13,7 @@ from ntagen.render import render
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, turning
 from tests.oracles import surfaces
-from tests.oracles.declaration import Contains, Instance, enumerate_paths
+from tests.oracles.declaration import Contains, End, Instance, Needle, enumerate_paths
 from tests.scenes import PAPER, paper, with_limits
 
 AXES = turning((0.2, 1.0, -0.4), 0.8)
@@ -160,3 +160,51 @@ def test_no_size_overflows(resolution_per_mm: int) -> None:
     model = checker.load(render(replace(scene, limits=replace(scene.limits, step_s=40.0))))
     for query in model.queries:
         assert model.check(query.text).verdict in ("satisfied", "not satisfied")
+
+
+def swept_plans(scene: Scene, shape: Shape, by_mm: float) -> int:
+    """Paths to the target that keep farther than this from a shape, also between two pushes."""
+    scale = scene.resolution_per_mm
+    waiting = [(Needle.start(Instance.of_scene(scene)), np.zeros((1, 3)))]
+    plans = 0
+    while waiting:
+        needle, arc = waiting.pop()
+        if (shape.distance_mm(arc) <= by_mm).any():
+            continue
+        end = needle.check()
+        if end is not None:
+            plans += end is End.FINAL_TR_REACHED
+            continue
+        here = np.array([needle.tip_pos]) / scale
+        for angle in needle.instance.angles if needle.may_roll() else ():
+            rolled = needle.copy()
+            rolled.roll(angle)
+            waiting.append((rolled, here))
+        middle = np.array(needle.motion_circle_center) / scale
+        needle.push()
+        waiting.append((needle, between(here[0], np.array(needle.tip_pos) / scale, middle)))
+    return plans
+
+
+def between(start: surfaces.Array, end: surfaces.Array, middle: surfaces.Array) -> surfaces.Array:
+    """Points on the short arc about a middle from one place to another, both ends included."""
+    first, last = start - middle, end - middle
+    angle = np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last))
+    shares = np.linspace(0.0, 1.0, 60)[:, None]
+    along = np.sin((1.0 - shares) * angle) * first + np.sin(shares * angle) * last
+    return np.asarray(middle + along / np.sin(angle))
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_the_swept_check_is_sound_and_not_too_strict(name: str) -> None:
+    """The needle keeps off the shape itself, and the shape counts as larger by the margins only.
+
+    These are 11 units of a direction times the radius, and a 64th of a push.
+    """
+    shape, _ = MAKERS[name]((0.0, -28.0, -3.0), 1.2)
+    swept = replace(ONE_ROLL, safety="swept")
+    found = plans_of(swept.with_regions(Region("C", "critical", shape)))
+    margin_mm = 0.001 * (11 * 30 + 2) + 2.0 / 64.0
+    assert swept_plans(ONE_ROLL, shape, margin_mm + 0.01) <= found
+    assert found <= swept_plans(ONE_ROLL, shape, 0.0)
+    assert found < swept_plans(ONE_ROLL, shape, -99.0), "the shape is not in the way"
