@@ -86,6 +86,7 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadlocks, state spaces, code, loading, zones) and trackers
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
+	$(BIN)/python tests/benchmarks/many_regions.py
 	$(BIN)/python tests/benchmarks/reductions.py
 	$(BIN)/python tests/benchmarks/deadlocks.py
 	$(BIN)/python tests/benchmarks/tracker.py
