@@ -48,7 +48,7 @@ def aimed(draw: st.DrawFn) -> Scene:
         actions.append(Push(step_mm * draw(st.integers(1, 8))))
     x, y, z = Plan.of(actions).arcs(scene.needle)[-1].end.position_mm
     dx, dy, dz = draw(st.tuples(*(lengths(-3.0, 3.0) for _ in range(3))))
-    target = Region("T", "target", (x + dx, y + dy, z + dz), draw(lengths(0.5, 5.0)))
+    target = Region.ball("T", "target", (x + dx, y + dy, z + dz), draw(lengths(0.5, 5.0)))
     return replace(scene, targets=(target,))
 
 
