@@ -54,6 +54,8 @@ class Options:
 
     seed: int = 0
     """For ``search="random"``: the same seed gives the same search."""
+    guide: str | None = None
+    """An integer expression: games explore first where its value is least."""
 
     forced: ForcedRule = "tiga"
     """When the environment must move at a moment at which time cannot pass: if the process that

@@ -21,6 +21,7 @@ _SYMBOLIC_ONLY: Final = {
 """For each parameter, the note if all queries are games."""
 
 _GAMES_ONLY: Final = {
+    "guide": "--guide has no effect here: it guides games, and no query is a game",
     "forced": "--forced has no effect here: it is a rule of games, and no query is a game",
     "priorities": "--priorities has no effect here: only games and queries under a strategy may "
     "ignore priorities; in other queries they always count",

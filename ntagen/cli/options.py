@@ -96,6 +96,12 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         help="The order of the search: breadth first, depth first or random. Verdicts do not "
         "depend on it.  [default: bfs]",
     ),
+    "guide": click.option(
+        "--guide",
+        metavar="EXPR",
+        help="An integer expression of the model, for example a function that says how far a state "
+        "is from the goal: games explore first where it is least. Verdicts do not depend on it.",
+    ),
     "threads": click.option(
         "--threads",
         metavar="N",

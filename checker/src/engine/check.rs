@@ -5,14 +5,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
+use super::codes;
 use super::evidence::named_strategies::StrategyFile;
 use super::loaded_model::{Due, LoadedModel, NamedStrategy};
 use super::options::Options;
 use super::query_form::unnamed;
 use super::rejection::Rejection;
+use crate::diagnostics::Diagnostic;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
-use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
+use crate::ir::{FunctionId, Measure, Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
 use crate::network::Failure;
 use crate::syntax::ast::QueryText;
 
@@ -27,7 +29,8 @@ impl LoadedModel {
 
     fn check_it(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
-        let (query, warnings) = self.compile(text.span)?;
+        let (mut query, warnings) = self.compile(text.span)?;
+        query.guide = self.compile_guide(options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         if let Some(name) = &query.under {
             // What is supported depends on it.
@@ -55,6 +58,29 @@ impl LoadedModel {
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
         Ok(answer)
+    }
+
+    /// The function that computes the guide, if there is one.
+    fn compile_guide(&mut self, options: &Options) -> Result<Option<FunctionId>, Rejection> {
+        let Some(guide) = &options.guide else {
+            return Ok(None);
+        };
+        // Whatever `sup` can measure on the words is a guide.
+        let text = self.add_query(&format!("sup: {guide}"));
+        let (query, _) = self.compile(text.span)?;
+        let function = match query.kind {
+            QueryKind::Extremum { items, .. } => match items.as_slice() {
+                [(Measure::Integer(function), _)] => Some(*function),
+                _ => None,
+            },
+            _ => None,
+        };
+        function.map(Some).ok_or_else(|| {
+            let message = format!("`{guide}` is no guide");
+            let help = "write one integer expression without clocks";
+            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
+            Rejection::new(vec![error], &self.sources)
+        })
     }
 
     /// Answers a query that is no file operation; keeps the strategy that it defines.

@@ -94,6 +94,8 @@ impl Default for Reductions {
 pub struct Options {
     /// In which order states are explored.
     pub order: Order,
+    /// An integer expression on the words: games explore first where its value is least.
+    pub guide: Option<String>,
     /// How many threads share the work, at most [`MOST_THREADS`]; 0 counts as 1. More than one
     /// share searches for a reachable state and for values, breadth first, and compute what is won
     /// in games; other searches take one.

@@ -49,6 +49,7 @@
 //! for the Analysis of Timed Games", CONCUR 2005; the forced moves are those of G. Behrmann et al.,
 //! "UPPAAL-TIGA: Time for Playing Games!", CAV 2007, and the tool's manual, section 3.1.
 
+use crate::ir::FunctionId;
 use crate::network::Failure;
 use crate::search::limits::Watch;
 
@@ -128,6 +129,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         self.threads = threads;
     }
 
+    /// Explores first where the value of this function is least.
+    pub fn be_guided_by(&mut self, guide: Option<FunctionId>) {
+        if let Some(guide) = guide {
+            self.exploration.waiting.be_guided_by(guide);
+        }
+    }
+
     /// Solves the game.
     ///
     /// # Errors
@@ -174,7 +182,10 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let is_dry = self.exploration.waiting.len() == 0;
         let is_computed = is_dry || explored >= self.agenda.next_computation;
         if is_computed {
-            self.agenda.next_computation = if self.graph.symbolic.tuning().delayed_zones {
+            // A guide waits for no computation: what it seeks next depends on what is won.
+            let is_delayed = self.graph.symbolic.tuning().delayed_zones
+                && self.exploration.waiting.guide().is_none();
+            self.agenda.next_computation = if is_delayed {
                 explored + explored / BETWEEN_COMPUTATIONS
             } else {
                 explored

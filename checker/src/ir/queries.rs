@@ -15,6 +15,8 @@ pub struct Query {
     pub under: Option<String>,
     /// What is asked.
     pub kind: QueryKind,
+    /// Where a game is explored first: where the value of this function is least.
+    pub guide: Option<FunctionId>,
     /// The whole query.
     pub span: Span,
 }

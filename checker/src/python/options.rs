@@ -16,6 +16,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
     let text = |name| field::<String>(given, name);
     Ok(Options {
         order: order(&text("search")?, field(given, "seed")?)?,
+        guide: field(given, "guide")?,
         threads: threads(given)?,
         forced: forced_rule(&text("forced")?)?,
         priorities: priority_rule(&text("priorities")?)?,

@@ -37,6 +37,7 @@ impl Checker<'_> {
             strategy: name(&query.strategy),
             under: name(&query.under),
             kind,
+            guide: None,
             span: query.span,
         })
     }

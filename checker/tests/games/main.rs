@@ -15,6 +15,7 @@ mod dead_ends;
 #[path = "../common/games.rs"]
 mod families;
 mod game_threads;
+mod guides;
 mod machines;
 mod nodes;
 #[path = "../common/plates.rs"]

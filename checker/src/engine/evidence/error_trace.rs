@@ -149,6 +149,7 @@ impl LoadedModel {
             executor: self.executor(),
             under: None,
             options,
+            guide: None,
         };
         let wanted = Abstraction::LowerUpper;
         let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);

@@ -45,6 +45,7 @@ impl LoadedModel {
                 .zip(within)
                 .map(|(moves, strategy)| Followed { moves, strategy }),
             options,
+            guide: query.guide,
         };
         let mut answer = answer(subject, query);
         if time_limit.is_some() && query.strategy.is_none() {

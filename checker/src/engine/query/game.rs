@@ -245,6 +245,7 @@ impl<'a> Game<'a> {
             Err(failure) => return Answer::failed(failure).into(),
         };
         let mut solver = Solver::new(&mut graph, sides.seeker, self.subject.options.forced);
+        solver.be_guided_by(self.subject.guide);
         solver.share_among(self.subject.options.thread_count());
         solver.give_up_beyond(attempt.allowance);
         if attempt.nodes == Nodes::Automatic {

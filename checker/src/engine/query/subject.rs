@@ -22,6 +22,8 @@ pub(crate) struct Subject<'a> {
     pub(crate) under: Option<Followed<'a>>,
     /// The options for the answer.
     pub(crate) options: &'a Options,
+    /// Where a game is explored first: where the value of this function is least.
+    pub(crate) guide: Option<FunctionId>,
 }
 
 /// A strategy that the controller follows.
@@ -74,6 +76,7 @@ pub(crate) fn symbolic<'a>(
         executor,
         under,
         options,
+        guide: _,
     } = subject;
     let mut atoms = atoms_of(predicates);
     atoms.extend(further.iter().chain(subject.atoms()).cloned());

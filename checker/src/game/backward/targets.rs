@@ -23,11 +23,23 @@ impl Solver<'_, '_, '_> {
             };
             self.won.add_node(win, rest);
             self.exploration.add_node();
+            self.guide_node(node as u32);
             self.agenda.add_node();
             if node == 0 {
                 self.wait_for(0);
             }
         }
+    }
+
+    /// Evaluates the guide in a new node. What it cannot be computed for is explored last.
+    fn guide_node(&mut self, node: u32) {
+        let Some(guide) = self.exploration.waiting.guide() else {
+            return;
+        };
+        self.graph.load(node, &mut self.words);
+        let value = self.graph.symbolic.stepper.evaluate(guide, &mut self.words);
+        let value = value.unwrap_or(i32::MAX);
+        self.exploration.waiting.set_value(node, value);
     }
 
     /// The part of a node that is the target of the seeker.

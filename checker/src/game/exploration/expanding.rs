@@ -108,6 +108,10 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn on_update(&mut self, node: u32) {
         if !self.exploration.schedule.is_running {
             self.choose(node);
+            if self.exploration.waiting.guide().is_some() {
+                // Zones are computed later, and the guide must not lead away from here meanwhile.
+                self.note_spoilers(node);
+            }
         }
     }
 
