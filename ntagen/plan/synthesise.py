@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
 """The paper's second query; its strategy has the plans."""
 
+_GUIDE: Final = "get_miss()"
+"""The function of the model that says by how much the tip misses the target after one more roll."""
+
 
 @dataclass(frozen=True, slots=True)
 class Margins:
@@ -196,6 +199,7 @@ class EngineSynthesiser:
             STRATEGY_QUERY,
             plans="all",
             max_plans=self.max_plans,
+            guide=_GUIDE,
             timeout_s=self.timeout_s,
             memory_bytes=self.memory_bytes,
             strategy=self.keeps_strategy,

@@ -12,6 +12,7 @@ from tests.scenes import PAPER
 WRAPPING = """
 const int distance = 2000000000;
 int[0, 1] one = 1;
+int get_miss() { return 0; }
 process Automaton() {
   state Start, Final_TR_Reached;
   init Start;
