@@ -166,12 +166,15 @@ class Limits:
         roll_angles_rad: The rolls that may be chosen, as whole degrees in the model.
         max_rolls: The maximum number of rolls in a plan (`MAX_ROT_COUNT`).
         min_roll_distance_mm: The minimum insertion between two rolls (`MIN_PROG_BETWEEN_ROTS`).
+        free_bevel: Whether the direction of the bevel before the entry may be chosen: one roll
+            before the first push is not counted.
     """
 
     step_s: float
     roll_angles_rad: tuple[float, ...]
     max_rolls: int
     min_roll_distance_mm: float
+    free_bevel: bool = False
 
     def __post_init__(self) -> None:
         step, distance = "the step", "the distance between rolls"
@@ -267,11 +270,13 @@ class Scene:
         Args:
             tip: The tip's pose.
             radius_mm: The radius of the motion circle.
-            inserted_mm: How much more of the needle is inserted than before.
+            inserted_mm: How much more of the needle is inserted than before. In the tissue, no roll
+                is free any more.
         """
         length_mm = max(0.0, self.needle.length_mm - inserted_mm)
         needle = replace(self.needle, tip=tip, radius_mm=radius_mm, length_mm=length_mm)
-        return replace(self, needle=needle)
+        is_free = self.limits.free_bevel and inserted_mm <= 0.0
+        return replace(self, needle=needle, limits=replace(self.limits, free_bevel=is_free))
 
     def with_targets(self, targets: Sequence[Region]) -> Scene:
         """The same scene with other targets: those that are still to be visited."""

@@ -160,6 +160,8 @@ class _Builder:
         position = DEFAULT_TIP_MM if tip is None else tip.value
         heading = self._direction("heading", DEFAULT_HEADING)
         bevel = self._direction("bevel", DEFAULT_BEVEL)
+        if self._draft.is_bevel_free and heading is not None:
+            bevel = _across(heading)
         if position is None or heading is None or bevel is None:
             return None
         cosine = dot(heading, bevel)
@@ -253,7 +255,7 @@ class _Builder:
             distance = None
         if step is None or angles is None or count is None or distance is None:
             return None
-        return Limits(step, angles, count, distance)
+        return Limits(step, angles, count, distance, draft.is_bevel_free)
 
     def _roll_angles(self) -> tuple[float, ...] | None:
         """The rolls in rad, exactly those of whole degrees."""
@@ -381,6 +383,13 @@ class _Builder:
 def _of_kind(spheres: list[PlacedRegion], kind: RegionKind) -> tuple[Region, ...]:
     """The regions of one kind, in their order."""
     return tuple(sphere.region for sphere in spheres if sphere.region.kind == kind)
+
+
+def _across(heading: Vector) -> Vector:
+    """The usual bevel if it is at right angles to the heading, else the axis that is most so."""
+    axes = (DEFAULT_BEVEL, (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    axis = min(axes, key=lambda axis: abs(dot(axis, heading)))
+    return unit(minus(axis, times(dot(axis, heading), heading)))
 
 
 def _rounded(component: float) -> float:

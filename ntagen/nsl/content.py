@@ -37,6 +37,9 @@ VECTORS: Final = {
 }
 """The settings of needle and motion: their dimension, and what they are."""
 
+FREE: Final = "free"
+"""The word for a bevel whose direction the strategy chooses; older files may use it as a name."""
+
 
 class ContentResolver:
     """Adds single statements to a draft."""
@@ -180,8 +183,11 @@ class ContentResolver:
 
     def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
         """A property of the needle or of its motion."""
-        span = statement.value.span
-        if statement.keyword in VECTORS:
+        span, value = statement.value.span, statement.value
+        is_free = isinstance(value, tree.Name) and value.text == FREE and not scope.find(FREE)
+        if statement.keyword == "bevel" and is_free:
+            draft.is_bevel_free = True
+        elif statement.keyword in VECTORS:
             dimension, role = VECTORS[statement.keyword]
             vector = self._evaluator.vector(statement.value, scope, dimension, role)
             draft.vectors[statement.keyword] = Placed(vector, span)

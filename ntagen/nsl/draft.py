@@ -68,6 +68,7 @@ class Draft:
     max_rolls: Placed[int] | None = None
     roll_distance: Placed[float] | None = None
     choices: dict[str, str] = field(default_factory=dict)
+    is_bevel_free: bool = False
     resolution: Placed[float] | None = None
     regions: dict[str, DraftRegion] = field(default_factory=dict)
     target_count: int = 0

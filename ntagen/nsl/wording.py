@@ -49,7 +49,7 @@ FORMS: Final = {
     "safe": "write for example `safe S1 sphere (0, -9, 0) mm radius 5 mm`",
     "tip": "write for example `tip (0, 0, 0) mm`",
     "heading": "write for example `heading -y` or `heading (0, -1, 0)`",
-    "bevel": "write for example `bevel +z` or `bevel (0, 0, 1)`",
+    "bevel": "write for example `bevel +z`, `bevel (0, 0, 1)`, or `bevel free`",
     "radius": "write for example `radius 30 mm`",
     "speed": "write for example `speed 1 mm/s`",
     "length": "write for example `length 150 mm`",

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ntagen.needle.kinematics import Arc, push, roll
-from ntagen.scene import Needle, Pose
+from ntagen.scene import Limits, Needle, Pose
 from ntagen.units import deg_from_rad
 
 
@@ -67,6 +67,11 @@ class Plan:
     def roll_count(self) -> int:
         """The number of rolls."""
         return sum(1 for action in self.actions if isinstance(action, Roll))
+
+    def counted_rolls(self, limits: Limits) -> int:
+        """The number of rolls; one that chooses a free bevel before the entry does not count."""
+        is_free = limits.free_bevel and self.actions[:1] and isinstance(self.actions[0], Roll)
+        return self.roll_count - 1 if is_free else self.roll_count
 
     def arcs(self, needle: Needle) -> tuple[Arc, ...]:
         """The arcs that the tip of this needle draws when it follows the plan exactly."""

@@ -262,7 +262,9 @@ def sequences(scene: Scene) -> float:
         (a - b) * c for a, b, c in zip(target.center_mm, tip.position_mm, scene.axis, strict=True)
     )
     steps = max(1.0, reach_mm / step_length_mm(scene))
-    return (steps * max(1, len(scene.limits.roll_angles_rad))) ** scene.limits.max_rolls
+    angles = max(1, len(scene.limits.roll_angles_rad))
+    bevels = angles + 1 if scene.limits.free_bevel else 1
+    return float(bevels * (steps * angles) ** scene.limits.max_rolls)
 
 
 def _shorter(scene: Scene, length_mm: float) -> Scene:

@@ -68,7 +68,7 @@ class Certificate:
         end_mm: The position of the tip at the end.
         end_distance_mm: The distance from there to the centre of the last target.
         length_mm: Total insertion.
-        roll_count: Number of rolls.
+        roll_count: Number of rolls that count; see `Plan.counted_rolls`.
     """
 
     clearances: tuple[Clearance, ...]
@@ -135,7 +135,7 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
         end_mm=end_mm,
         end_distance_mm=distance(end_mm, last.center_mm) if last else 0.0,
         length_mm=plan.length_mm,
-        roll_count=plan.roll_count,
+        roll_count=plan.counted_rolls(scene.limits),
     )
 
 

@@ -72,7 +72,10 @@ class _Steps:
         return _Steps(self.pushes, angles)
 
     def is_possible(self, scene: Scene) -> bool:
-        """Whether the rolls are far enough apart, and the last move is a push."""
+        """Whether the rolls are few and far enough apart, and the last move is a push."""
+        is_free = scene.limits.free_bevel and self.pushes[0] == 0
+        if len(self.angles) > scene.limits.max_rolls + is_free:
+            return False
         apart = scene.limits.min_roll_distance_mm / step_length_mm(scene) - 1e-9
         first, *between = self.pushes[:-1] or (0,)
         return first >= 0 and all(steps >= apart for steps in between) and self.pushes[-1] > 0

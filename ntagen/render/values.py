@@ -63,6 +63,7 @@ class ModelValues:
     max_progress: str
     max_rolls: int
     max_actions: int
+    free_bevel: bool
     angles: tuple[int, ...]
     tip_position: str
     base_matrix: str
@@ -145,7 +146,8 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
         min_progress=writer.number(limits.min_roll_distance_mm, "the distance between rolls"),
         max_progress=writer.number(needle.length_mm, "the needle's length"),
         max_rolls=limits.max_rolls,
-        max_actions=max(MIN_ACTIONS, 2 * limits.max_rolls + 2),
+        max_actions=max(MIN_ACTIONS, 2 * (limits.max_rolls + limits.free_bevel) + 2),
+        free_bevel=limits.free_bevel,
         angles=tuple(_whole_degrees(angle) for angle in limits.roll_angles_rad),
         tip_position=writer.vector(tip.position_mm, "the tip's position"),
         base_matrix=writer.matrix(

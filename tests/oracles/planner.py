@@ -36,6 +36,16 @@ def plans(scene: Scene) -> list[Steps]:
     family = _Family(
         np.array([tip.position_mm]), np.array([tip.heading]), np.array([tip.bevel]), [()]
     )
+    found = _plans_from(family, scene, is_rolled=False)
+    if scene.limits.free_bevel:
+        start = family.position[:, None], family.heading[:, None], family.bevel[:, None]
+        chosen = _rolled(family, *start, np.ones((1, 1), dtype=bool), scene)
+        found += _plans_from(chosen, scene, is_rolled=True)
+    return found
+
+
+def _plans_from(family: _Family, scene: Scene, *, is_rolled: bool) -> list[Steps]:
+    """All plans that begin with a family; the next roll keeps its distance from a roll before."""
     found: list[Steps] = []
     for rolls in range(scene.limits.max_rolls + 1):
         positions, headings, bevels = _pushed(family, scene)
@@ -45,7 +55,7 @@ def plans(scene: Scene) -> list[Steps]:
             found.append((*family.ways[row], ("push", float(column * step_mm))))
         if rolls == scene.limits.max_rolls:
             break
-        if rolls > 0:
+        if rolls > 0 or is_rolled:
             least = math.ceil(scene.limits.min_roll_distance_mm / step_mm - 1e-9)
             alive[:, :least] = False
         if not alive.any():
