@@ -169,6 +169,22 @@ def visible(length_mm: float, per_mm: int, what: str) -> Breach | None:
     )
 
 
+MOST_ENTRIES: Final = 2**22
+"""All tables of distances of a model together have at most so many entries."""
+
+
+def table_fits(entries: int) -> Breach | None:
+    """The tables of distances of all shapes from files fit into a model."""
+    if entries <= MOST_ENTRIES:
+        return None
+    return Breach(
+        "image-too-large",
+        f"the shapes from files have {entries:,} distances together,"
+        f" more than the {MOST_ENTRIES:,} that a model can have",
+        "write a coarser `grid` for some of them",
+    )
+
+
 def motion(
     step_s: float, speed_mm_per_s: float, radius_mm: float, per_mm: int, *, swept: bool
 ) -> Breach | None:

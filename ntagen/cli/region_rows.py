@@ -13,7 +13,7 @@ from typing import Final
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.nearest import nearest_to
 from ntagen.scene import Pose, Region, Scene
-from ntagen.shapes import Vector
+from ntagen.shapes import Field, Vector
 
 _MM3_PER_CM3: Final = 1000.0
 
@@ -30,6 +30,7 @@ def region_facts(scene: Scene) -> list[dict[str, object]]:
             "low_mm": [_finite(part) for part in region.shape.bounds_mm()[0]],
             "high_mm": [_finite(part) for part in region.shape.bounds_mm()[1]],
             "from_straight_way_mm": _away_mm(region, way),
+            "error_mm": region.shape.error_mm,
         }
         for region in scene.regions
     ]
@@ -54,8 +55,22 @@ def region_rows(scene: Scene, most: int) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip()
+    for region in regions:
+        if isinstance(region.shape, Field):
+            yield f"{' '.join(region.name.split())}: {_exactness(region.shape)}"
     if len(scene.regions) > most:
         yield f"… {len(scene.regions) - most} more (all of them: --json)"
+
+
+def _exactness(shape: Field) -> str:
+    """How fine a field is, and how far its distances may be off."""
+    size = " x ".join(map(str, shape.counts))
+    steps = " x ".join(f"{step:.2g}" for step in shape.steps_mm)
+    return (
+        f"a grid of {size} points, {steps} mm apart; distances are at most"
+        f" {shape.error_mm:.2f} mm too {'great' if shape.is_inner else 'small'}, never too"
+        f" {'small' if shape.is_inner else 'great'}"
+    )
 
 
 def _straight_way(scene: Scene) -> Sequence[Arc]:

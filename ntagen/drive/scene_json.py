@@ -8,8 +8,9 @@ from typing import Any, Final, cast
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
+from ntagen.imaging.store import from_entry, to_entry
 from ntagen.scene import Region, Scene
-from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere
+from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
 
 VERSION: Final = 1
 
@@ -88,6 +89,9 @@ def _from_region(region: Region) -> dict[str, object]:
     if isinstance(shape, Sphere):
         ball = _Ball(region.name, region.kind, shape.middle_mm, shape.radius_mm, around)
         return dataclasses.asdict(ball)
+    if isinstance(shape, Field):
+        entry = _Solid(region.name, region.kind, "field", to_entry(shape), around)
+        return dataclasses.asdict(entry)
     form = next(form for form, kind in _SHAPES.items() if type(shape) is kind)
     measures = dataclasses.asdict(cast("Any", shape))
     return dataclasses.asdict(_Solid(region.name, region.kind, form, measures, around))
@@ -99,5 +103,8 @@ def _to_region(entry: dict[str, object]) -> Region:
         sphere = Sphere(ball.center_mm, ball.radius_mm)
         return Region(ball.name, cast("Any", ball.kind), sphere, ball.around)
     solid = value_from_json(entry, _Solid)
-    shape = value_from_json(solid.shape, _SHAPES[solid.form])
+    if solid.form == "field":
+        shape: Shape = from_entry(solid.shape)
+    else:
+        shape = value_from_json(solid.shape, _SHAPES[solid.form])
     return Region(solid.name, cast("Any", solid.kind), shape, solid.around)

@@ -24,6 +24,7 @@ TOLERANCE_MM: Final = 1e-3
 """A distance to a shape that is no sphere is at most this much too small, and never too great."""
 
 _FIRST_PIECE_MM: Final = 4.0
+_SAMPLE_MM: Final = 0.02
 
 _Array = NDArray[np.float64]
 
@@ -55,18 +56,21 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
         pieces = np.concatenate([pieces - halves, pieces + halves])
         halves = np.concatenate([halves, halves])
         owners, offsets = np.tile(owners[is_open], 2), np.tile(offsets[is_open], 2)
-    return Nearest(best_mm - TOLERANCE_MM - shape.error_mm, best_at_mm)
+    return Nearest(best_mm - TOLERANCE_MM - shape.excess_mm, best_at_mm)
 
 
 def enters_at(arc: Arc, shape: Shape) -> float | None:
     """The arc length at which an arc first touches a shape; 0 inside, None if it never does.
 
-    For a shape that is no sphere, a touch that is shorter than `TOLERANCE_MM` may be left out.
+    For a shape that is no sphere, a touch that is shorter than `TOLERANCE_MM` may be left out; for
+    one whose distances are bounds, a touch that is shorter than 0.02 mm.
     """
     if isinstance(shape, Sphere):
         return arc.enters_at(shape.middle_mm, shape.radius_mm)
     if shape.distance_at_mm(arc.start.position_mm) <= 0.0:
         return 0.0
+    if shape.error_mm > TOLERANCE_MM:
+        return _enters_bound_at(arc, shape)
     waiting = [(0.5 * arc.length_mm, 0.5 * arc.length_mm)]
     while waiting:
         at_mm, half_mm = waiting.pop()
@@ -81,6 +85,15 @@ def enters_at(arc: Arc, shape: Shape) -> float | None:
         half_mm *= 0.5
         waiting += [(at_mm + half_mm, half_mm), (at_mm - half_mm, half_mm)]
     return arc.length_mm if shape.distance_at_mm(arc.end.position_mm) <= 0.0 else None
+
+
+def _enters_bound_at(arc: Arc, shape: Shape) -> float | None:
+    """The same for a shape whose distance is a bound, which may change faster than the place."""
+    count = max(1, math.ceil(arc.length_mm / _SAMPLE_MM))
+    along = np.linspace(0.0, arc.length_mm, count + 1)
+    owners = np.zeros(count + 1, dtype=np.intp)
+    touched = np.flatnonzero(shape.distance_mm(_places([arc], owners, along)) <= 0.0)
+    return float(along[touched[0]]) if len(touched) else None
 
 
 def _pieces(arcs: Sequence[Arc]) -> tuple[_Array, _Array, NDArray[np.intp], _Array]:

@@ -70,5 +70,5 @@ class Sweep:
             distances = np.sqrt((between**2).sum(axis=2)) - self._radii
             self._least_mm = min(self._least_mm, float(distances.min()))
         for shape in self._shapes:
-            least_mm = float(shape.distance_mm(points).min()) - shape.error_mm
+            least_mm = float(shape.distance_mm(points).min()) - shape.excess_mm
             self._least_mm = min(self._least_mm, least_mm)

@@ -94,7 +94,7 @@ class _Builder:
         for name, query in draft.queries.items():
             self._reporter.obeys(rules.query(name, query.value or ""), query.span)
         resolution = self._resolution()
-        spheres = self._regions.spheres()
+        spheres = self._regions.spheres(needle)
         # The next rules compute squares, which are infinite for absurdly large values.
         if self._check_range(resolution or 1, tip, needle, limits, spheres):
             if tip is not None:

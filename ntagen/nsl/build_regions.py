@@ -6,17 +6,26 @@ Touching a region counts as being in it, as in the model's declaration (paper, a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
 from ntagen import rules
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.draft import Draft, DraftRegion
+from ntagen.nsl.images import ImageBuilder
 from ntagen.nsl.solids import SolidBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus
 from ntagen.nsl.wording import article
-from ntagen.scene import Pose, Region
+from ntagen.scene import Needle, Pose, Region, Vector
 from ntagen.shapes import Sphere, is_in, overlap, thickness_mm
+
+if TYPE_CHECKING:
+    from ntagen.imaging.grid import Wish
+
+_FIELD_MARGIN_MM: Final = 4.0
+"""How far around a shape from a file its distances are exact, besides margins around it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +50,80 @@ class Regions:
         self._reporter = reporter
         self._report = reporter.report
         self._solids = SolidBuilder(reporter)
+        self._images = ImageBuilder(draft, reporter)
+        self._needle: Needle | None = None
+        self._depth_mm = math.inf
         self._made: dict[str, Region | None] = {}
 
-    def spheres(self) -> list[PlacedRegion]:
-        """All regions without mistakes, in the order written."""
+    def spheres(self, needle: Needle | None) -> list[PlacedRegion]:
+        """All regions without mistakes, in the order written.
+
+        Args:
+            needle: The needle; shapes from files are as large as it can reach. None if it has a
+                mistake: then such shapes are left out.
+        """
+        self._needle = needle
+        self._images.is_placed()
+        self._expand_marks()
+        self._find_depth()
         spheres = []
         for draft in self._draft.regions.values():
             region = self._around(draft) if draft.around is not None else self._own(draft)
             if region is not None:
                 spheres.append(PlacedRegion(region, draft))
         return spheres
+
+    def _expand_marks(self) -> None:
+        """Puts the shapes of markups in the place of the regions that name their files."""
+        regions: dict[str, DraftRegion] = {}
+        for name, draft in self._draft.regions.items():
+            if draft.image is None or draft.image.form != "markups":
+                regions[name] = draft
+                continue
+            for number, (own, shape) in enumerate(self._images.marks(draft)):
+                made = replace(draft, name=own, image=None, made=shape)
+                if regions.setdefault(own, made) is not made or (
+                    number > 0 and own in self._draft.regions
+                ):
+                    self._report(
+                        "duplicate-name",
+                        draft.name_span,
+                        f"there is a region `{own}` already",
+                        hint="choose another name",
+                    )
+        self._draft.regions = regions
+
+    def _find_depth(self) -> None:
+        """How deep the targets reach along the heading: no plan goes deeper."""
+        needle = self._needle
+        if needle is None:
+            return
+        targets = [draft for draft in self._draft.regions.values() if draft.kind == "target"]
+        depths = []
+        for region in map(self._own, targets):
+            if region is None:
+                return
+            ends = _corners(region)
+            depths += [dot(minus(end, needle.tip.position_mm), needle.tip.heading) for end in ends]
+        self._depth_mm = max(0.0, *depths, 0.0) + _FIELD_MARGIN_MM
+
+    def _wish(self, draft: DraftRegion) -> Wish | None:
+        """What the scene says of the grid of a shape from a file."""
+        from ntagen.imaging.grid import Wish, Workspace
+
+        needle = self._needle
+        if needle is None:
+            return None
+        margins = [
+            other.margin.value or 0.0
+            for other in self._draft.regions.values()
+            if other.around is not None and other.around.value == draft.name
+        ]
+        tip = needle.tip
+        depth_mm = math.inf if draft.kind == "target" else self._depth_mm
+        space = Workspace(tip.position_mm, tip.heading, needle.length_mm, depth_mm)
+        margin_mm = _FIELD_MARGIN_MM + max((0.0, *margins))
+        return Wish(space, margin_mm, is_inner=draft.kind == "target")
 
     def _own(self, draft: DraftRegion) -> Region | None:
         """A region with its own geometry; it is made once, since others may lie around it."""
@@ -60,6 +133,12 @@ class Regions:
 
     def _sphere(self, draft: DraftRegion) -> Region | None:
         """A region that is a sphere or another shape."""
+        if draft.made is not None:
+            return Region(draft.name, draft.kind, draft.made)
+        if draft.image is not None:
+            wish = self._wish(draft)
+            field = None if wish is None else self._images.field(draft, wish)
+            return None if field is None else Region(draft.name, draft.kind, field)
         if draft.solid is not None:
             shape = self._solids.shape(draft, draft.solid)
             return None if shape is None else Region(draft.name, draft.kind, shape)
@@ -226,3 +305,13 @@ class Regions:
             f"the needle's tip lies in the {region.kind} region `{region.name}`",
             hint="move the tip or the region",
         )
+
+
+def _corners(region: Region) -> Iterator[Vector]:
+    """The corners of the bounds of a region that has an end."""
+    low, high = region.shape.bounds_mm()
+    for x in (low[0], high[0]):
+        for y in (low[1], high[1]):
+            for z in (low[2], high[2]):
+                if math.isfinite(x) and math.isfinite(y) and math.isfinite(z):
+                    yield (x, y, z)

@@ -14,6 +14,7 @@ from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, DraftRegion, Placed
 from ntagen.nsl.driving import DriverResolver, is_choice
 from ntagen.nsl.evaluate import Evaluator, Scope
+from ntagen.nsl.image_content import ImageResolver
 from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, SPEED, TIME
 from ntagen.nsl.solids import EXTENTS, SolidResolver
 from ntagen.nsl.wording import article
@@ -49,6 +50,7 @@ class ContentResolver:
         self._evaluator = evaluator
         self._driver = driver
         self._solids = SolidResolver(evaluator)
+        self._images = ImageResolver(reporter, evaluator)
 
     def add(
         self, statement: tree.Statement, scope: Scope, draft: Draft, *, is_in_loop: bool
@@ -71,6 +73,9 @@ class ContentResolver:
                 self._driver.axis(statement, scope, draft)
             case tree.Tracker():
                 self._driver.tracker(statement, draft)
+            case tree.Transform():
+                draft.transform = self._images.transform(statement, scope)
+                draft.has_gaps |= draft.transform is None
             case tree.Resolution():
                 self._resolution(statement, scope, draft)
 
@@ -139,6 +144,12 @@ class ContentResolver:
             solid = self._solids.solid(shape, name, scope)
             extent: Placed[float] = Placed(None, shape.measures[EXTENTS[shape.form]].span)
             return DraftRegion(keyword, name, span, solid.vectors[0], extent, solid=solid)
+        if isinstance(shape, tree.Image):
+            image = self._images.image(shape, name, scope)
+            place: Placed[float] = Placed(None, shape.path.span)
+            if image is None:
+                return None
+            return DraftRegion(keyword, name, span, None, place, image=image)
         around = self._region_name(shape.region, scope)
         margin = self._evaluator.number(shape.margin, scope, LENGTH, f"the margin of `{name}`")
         if keyword != "detection":

@@ -49,11 +49,22 @@ class TreeBuilder:
                 return self._roll(parts, span)
             case "tissue" | "safety":
                 return tree.Choice(span, keyword, self._identifier(parts[0]))
-            case "resolution":
-                return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
+            case "resolution" | "transform":
+                return self._measured(keyword, parts, span)
             case "tip" | "heading" | "bevel" | "radius" | "speed" | "length" | "step":
                 return tree.Setting(span, keyword, self.expression(parts[0]))
         raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
+
+    def _measured(
+        self, keyword: str, parts: Sequence[object], span: Span
+    ) -> tree.Resolution | tree.Transform:
+        """The scale of the model, or a matrix in the file, or in another one."""
+        if keyword == "resolution":
+            return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
+        direction, space = self._identifier(parts[0]), self._identifier(parts[1])
+        if isinstance(parts[2], str):
+            return tree.Transform(span, direction, space, self._text(parts[2]), ())
+        return tree.Transform(span, direction, space, None, tuple(map(self.expression, parts[2:])))
 
     def _driving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
         """A setting of the driver, a device, its axis, or a tracker."""
@@ -75,9 +86,15 @@ class TreeBuilder:
         shape = cast("lark.Tree[lark.Token]", shape)
         return tree.Region(span, keyword, self._region_name(name), self._shape(shape))
 
-    def _shape(self, node: lark.Tree[lark.Token]) -> tree.Sphere | tree.Solid | tree.Around:
+    def _shape(
+        self, node: lark.Tree[lark.Token]
+    ) -> tree.Sphere | tree.Solid | tree.Image | tree.Around:
         """A shape of any kind."""
         span = self._span(node)
+        if node.data in ("mesh", "segmentation", "markups"):
+            path, *clauses = node.children
+            of_file = cast(tree.ImageForm, node.data)
+            return tree.Image(span, of_file, self._text(path), tuple(map(self._clause, clauses)))
         if node.data not in ("sphere", "around"):
             nodes = [cast("lark.Tree[lark.Token]", child) for child in node.children]
             turns = [one for one in nodes if one.data == "turned"]
@@ -91,6 +108,23 @@ class TreeBuilder:
         if node.data == "sphere":
             return tree.Sphere(span, self.expression(first), self.expression(second))
         return tree.Around(span, self._region_name(first), self.expression(second))
+
+    def _clause(self, node: object) -> tree.Clause:
+        """A clause of a shape from a file."""
+        node = cast("lark.Tree[lark.Token]", node)
+        span, parts = self._span(node), node.children
+        match node.data:
+            case "in_space":
+                return tree.Clause(span, "in", tuple(map(self._identifier, parts)))
+            case "segment":
+                return tree.Clause(span, "segment", (self._text(parts[0]),))
+            case "point":
+                return tree.Clause(span, "point", (self._text(parts[0]),))
+            case "label":
+                return tree.Clause(span, "label", (), self.expression(parts[0]))
+            case "thick":
+                return tree.Clause(span, "radius", (), self.expression(parts[0]))
+        return tree.Clause(span, "grid", (), self.expression(parts[0]))
 
     def _region_name(self, node: object) -> tree.RegionName:
         """A name with its indices."""

@@ -162,6 +162,18 @@ KINDS: Final = _kinds(
     ("N089", "address-malformed", "error", "An address is a host and a port."),
     ("N090", "safe-overlaps", "warning", "A safe region has nothing critical or unexplored in it."),
     ("N091", "target-without-end", "error", "A target must end somewhere: plans lead into it."),
+    # Regions from files.
+    ("N100", "package-missing", "error", "A package that reads such files is not installed."),
+    ("N101", "image-malformed", "error", "The file is not what its name says."),
+    ("N102", "image-too-large", "error", "The file, or a table of distances, is too large."),
+    ("N103", "mesh-not-closed", "error", "A mesh must have an inside and an outside."),
+    ("N104", "mesh-inverted", "error", "The triangles of a mesh must face outwards."),
+    ("N105", "space-unknown", "error", "Something must say whether a file is in LPS or in RAS."),
+    ("N106", "unit-unknown", "error", "Something must say in which unit of length a file is."),
+    ("N107", "part-missing", "error", "The file has no such part, or no part is named."),
+    ("N108", "matrix-degenerate", "error", "A matrix of a file may only turn and move."),
+    ("N109", "transform-missing", "error", "Imaging space needs a place in the needle's frame."),
+    ("N110", "clause-misused", "error", "A region from such a file has no such clause."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from ntagen.nsl.source import Span
-from ntagen.nsl.tree import SolidForm
+from ntagen.nsl.tree import ImageForm, SolidForm
 from ntagen.parameters import Given
 from ntagen.scene import RegionKind, Vector
+from ntagen.shapes import Shape
 
 T = TypeVar("T")
 
@@ -35,10 +36,53 @@ class DraftSolid:
 
 
 @dataclass(frozen=True, slots=True)
+class DraftImage:
+    """A shape from a file.
+
+    Attributes:
+        form: What the file has.
+        path: The file, as it is written.
+        space: LPS or RAS.
+        unit_mm: How many mm one unit of the file is.
+        part: The name of a segment or of a point, or the number of a label.
+        radius_mm: How thick points and lines are.
+        grid_mm: How fine the table of distances is.
+    """
+
+    form: ImageForm
+    path: Placed[str]
+    space: Placed[str] | None = None
+    unit_mm: Placed[float] | None = None
+    part: Placed[str] | Placed[int] | None = None
+    radius_mm: Placed[float] | None = None
+    grid_mm: Placed[float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DraftTransform:
+    """Where imaging space is: a matrix in a file, or its rows.
+
+    Attributes:
+        span: Its words.
+        is_from: Whether the matrix leads from imaging space to the frame of the scene.
+        space: LPS or RAS.
+        file: The file, as it is written.
+        rows: The rows of the matrix; the last number of each is in mm.
+    """
+
+    span: Span
+    is_from: bool
+    space: Placed[str]
+    file: Placed[str] | None = None
+    rows: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class DraftRegion:
     """A region: a sphere, another shape, or a margin around another region.
 
-    A solid has its first place as the centre, and what makes it wide as the radius.
+    A solid has its first place as the centre, and what makes it wide as the radius. A shape from a
+    file has neither; `made` is one that was made of a part of such a file.
     """
 
     kind: RegionKind
@@ -48,6 +92,8 @@ class DraftRegion:
     radius: Placed[float]
     around: Placed[str] | None = None
     solid: DraftSolid | None = None
+    image: DraftImage | None = None
+    made: Shape | None = None
 
     @property
     def margin(self) -> Placed[float]:
@@ -75,6 +121,8 @@ class Draft:
     broken_names: set[str] = field(default_factory=set)
     queries: dict[str, Placed[str]] = field(default_factory=dict)
     has_gaps: bool = False
+    transform: DraftTransform | None = None
+    folders: tuple[str, ...] = ()
     given: list[Given] = field(default_factory=list)
     devices: dict[str, DraftDevice] = field(default_factory=dict)
 

@@ -38,8 +38,13 @@ _NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
 _NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
 _OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "RPAR", "RSQB"})
 _CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"}) | {
-    *("BOX", "SIZE", "TURNED", "CAPSULE", "CYLINDER", "ELLIPSOID", "RADII", "HALFSPACE", "TOWARDS")
+    *("BOX", "SIZE", "TURNED", "CAPSULE", "CYLINDER", "ELLIPSOID", "RADII", "HALFSPACE", "TOWARDS"),
+    *("MESH", "SEGMENTATION", "MARKUPS", "SEGMENT", "POINT", "LABEL", "GRID"),
 }
+
+
+_ROWS_AT: Final = 3
+"""The rows of a transform begin here; a parenthesis behind a name is no call there."""
 
 
 def format_source(source: Source) -> str:
@@ -208,12 +213,14 @@ def _cells(items: Sequence[Token | Comment]) -> Iterator[str]:
     previous: Token | Comment | None = None
     last_token: Token | None = None
     is_prefix = False
-    for item in items:
+    first = items[0]
+    for index, item in enumerate(items):
         if _begins_clause(previous, item):
             yield cell
             cell = ""
         elif previous is not None and not is_prefix:
-            cell += _space(previous, item)
+            is_row = index == _ROWS_AT and isinstance(first, Token) and first.text == "transform"
+            cell += " " if is_row else _space(previous, item)
         cell += _text(item)
         is_letter = previous is items[0] and isinstance(previous, Token) and previous.type == "AXIS"
         is_prefix = _is_prefix(last_token, item)

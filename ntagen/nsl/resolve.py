@@ -20,6 +20,7 @@ from ntagen.nsl.draft import Draft
 from ntagen.nsl.driving import CHOICES, DriverResolver
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
+from ntagen.nsl.paths import is_below
 from ntagen.nsl.quantity import Quantity, is_unit, scalar
 from ntagen.nsl.reading import read_source
 from ntagen.nsl.source import Source
@@ -33,7 +34,18 @@ MAX_LOOP_STATEMENTS: Final = 100_000
 """All these rounds together execute at most this many statements."""
 
 _ONCE: Final = frozenset(
-    {"needle", "motion", "roll", "resolution", "drive", *NUMBERS, *VECTORS, *CHOICES, *BY_WORDS}
+    {
+        "needle",
+        "motion",
+        "roll",
+        "resolution",
+        "transform",
+        "drive",
+        *NUMBERS,
+        *VECTORS,
+        *CHOICES,
+        *BY_WORDS,
+    }
 )
 _ONCE_IN_DEVICE: Final = frozenset({"insert", "roll"})
 
@@ -181,7 +193,8 @@ class _Resolver:
                 notes=(f"the first is at {self._draft.span.place}",),
             )
             return
-        self._draft = Draft(statement.name.span, statement.name.text)
+        folders = tuple(self._folders)
+        self._draft = Draft(statement.name.span, statement.name.text, folders=folders)
         self._statements(statement.body, Scope(scope), "environment")
 
     def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
@@ -213,7 +226,7 @@ class _Resolver:
                 "nesting-too-deep", span, f"includes are nested deeper than {MAX_DEPTH}"
             )
             return
-        if not any(_is_below(key, folder) for folder in self._folders):
+        if not any(is_below(key, folder) for folder in self._folders):
             self._reporter.report(
                 "include-outside",
                 span,
@@ -317,8 +330,3 @@ class _Resolver:
             )
             return False
         return True
-
-
-def _is_below(path: str, folder: str) -> bool:
-    """Whether a file lies below a folder; links have been followed in both paths."""
-    return path.startswith(folder if folder.endswith(os.sep) else folder + os.sep)

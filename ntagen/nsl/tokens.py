@@ -29,6 +29,7 @@ _BODY_ITEMS: Final = REGIONS | {
     "tissue",
     "resolution",
     "safety",
+    "transform",
     "query",
     "needle",
     "motion",
@@ -59,10 +60,16 @@ KEYWORDS: Final = frozenset().union(*(ALLOWED[kind] for kind in ALLOWED if kind 
 _OTHER_WORDS: Final = frozenset(
     {"sphere", "around", "margin", "by", "at", "most", "least", "times", "apart", "per", "in"}
 )
-SOLIDS: Final = frozenset({"box", "capsule", "cylinder", "ellipsoid", "halfspace"})
+IMAGES: Final = frozenset({"mesh", "segmentation", "markups"})
+"""The shapes from files."""
+
+SOLIDS: Final = frozenset({"box", "capsule", "cylinder", "ellipsoid", "halfspace"}) | IMAGES
 """The shapes whose words are not reserved: they came later, and older files use them as names."""
 
-_SOLID_WORDS: Final = SOLIDS | {"size", "to", "radii", "turned", "about", "towards"}
+_SOLID_WORDS: Final = SOLIDS | {
+    *("size", "to", "radii", "turned", "about", "towards"),
+    *("segment", "point", "label", "grid"),
+}
 
 RESERVED: Final = KEYWORDS | _OTHER_WORDS
 """All words that cannot be names because of the grammar."""

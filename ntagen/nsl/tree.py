@@ -126,6 +126,36 @@ class Solid:
     turned: tuple[Expression, Expression] | None = None
 
 
+ImageForm = Literal["mesh", "segmentation", "markups"]
+
+
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """A clause of a region from a file: ``in LPS mm``, ``segment "tumor"``, ``grid 1 mm``.
+
+    Attributes:
+        span: Its words.
+        keyword: What it says.
+        words: Its names, or its text without the quotes.
+        value: Its value, if it has one.
+    """
+
+    span: Span
+    keyword: Literal["in", "segment", "point", "label", "radius", "grid"]
+    words: tuple[Identifier, ...] = ()
+    value: Expression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A shape from a file: ``mesh "liver.stl" in LPS mm``; the path is without the quotes."""
+
+    span: Span
+    form: ImageForm
+    path: Identifier
+    clauses: tuple[Clause, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Around:
     """``around C1 margin 3 mm``."""
@@ -142,7 +172,7 @@ class Region:
     span: Span
     keyword: RegionKind
     name: RegionName
-    shape: Sphere | Solid | Around
+    shape: Sphere | Solid | Image | Around
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,6 +241,26 @@ class Resolution:
     count: Expression
     unit: Identifier
     keyword: Literal["resolution"] = "resolution"
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """``transform from LPS "ct.tfm"``, or with the rows of a matrix in place of the file.
+
+    Attributes:
+        span: Its words.
+        direction: ``from`` or ``to``.
+        space: ``LPS`` or ``RAS``.
+        file: The path of a file, without the quotes.
+        rows: The rows of the matrix, if there is no file.
+    """
+
+    span: Span
+    direction: Identifier
+    space: Identifier
+    file: Identifier | None
+    rows: tuple[Expression, ...]
+    keyword: Literal["transform"] = "transform"
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,6 +361,7 @@ Statement = (
     | Roll
     | Choice
     | Resolution
+    | Transform
     | Section
     | Parameter
     | Device

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.scene import Region, Scene, Vector
-from ntagen.shapes import Sphere, directions, outline_mm
+from ntagen.shapes import Field, Sphere, directions, outline_mm, skin
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,6 +36,7 @@ _OTHER: Final = "#8a94a6"
 _TRUE: Final = "#0b2545"
 _MEASURED: Final = "#7a3e9d"
 _LEGEND_COLUMNS: Final = 6
+_FLAT_MM2: Final = 1e-9
 
 Curve = Sequence[Vector]
 
@@ -116,7 +117,7 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
         low = min(point[axis] for point in points)
         high = max(point[axis] for point in points)
         for region in picture.scene.regions:
-            least, most = (bound[axis] for bound in region.shape.bounds_mm())
+            least, most = (bound[axis] for bound in _seen_bounds(region))
             low = min(low, least) if math.isfinite(least) else low
             high = max(high, most) if math.isfinite(most) else high
         bounds.append((low - room_mm, high + room_mm))
@@ -129,6 +130,17 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
     return bounds
 
 
+def _seen_bounds(region: Region) -> tuple[Vector, Vector]:
+    """The bounds of what is drawn: of a field only what lies in its grid."""
+    if isinstance(region.shape, Field):
+        points, _ = skin(region.shape)
+        if len(points):
+            a, b, c = map(float, points.min(axis=0))
+            d, e, f = map(float, points.max(axis=0))
+            return (a, b, c), (d, e, f)
+    return region.shape.bounds_mm()
+
+
 def _draw_projection(
     axes: Any,  # noqa: ANN401  matplotlib's own stubs leave axes open
     picture: Picture,
@@ -137,7 +149,8 @@ def _draw_projection(
 ) -> Any:  # noqa: ANN401
     across, depth = shown
     for region in _back_to_front(picture.scene.regions):
-        axes.add_patch(_outline(region, shown, _face(region, picture)))
+        for patch in _outline(region, shown, _face(region, picture)):
+            axes.add_patch(patch)
     for style, curves in _curves(picture):
         for curve in curves:
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
@@ -156,18 +169,55 @@ def _draw_projection(
     return axes
 
 
-def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
+def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> list[Any]:
     """What a region looks like along an axis: a circle, or the hull of points of its surface."""
     import numpy as np
     from matplotlib.patches import Circle, Polygon
 
     if isinstance(region.shape, Sphere):
         center = [region.center_mm[axis] for axis in shown]
-        return Circle((center[0], center[1]), region.radius_mm, **style)
+        return [Circle((center[0], center[1]), region.radius_mm, **style)]
+    if isinstance(region.shape, Field):
+        return _shadow(region.shape, shown, style)
     points = outline_mm(region.shape, directions().reshape(-1, 3))[:, list(shown)]
     angles = np.linspace(0.0, 2.0 * math.pi, 240, endpoint=False)
     farthest = np.argmax(points @ np.array([np.cos(angles), np.sin(angles)]), axis=0)
-    return Polygon(points[farthest], **style)
+    return [Polygon(points[farthest], **style)]
+
+
+def _shadow(shape: Field, shown: tuple[int, int], style: dict[str, Any]) -> list[Any]:
+    """What a field looks like along an axis: the shadow of its surface, and where that folds."""
+    import numpy as np
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    points, triangles = skin(shape)
+    if not len(triangles):
+        return []
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    triangles = triangles[np.linalg.norm(np.cross(b - a, c - a), axis=1) > _FLAT_MM2]
+    flat = points[:, list(shown)]
+    corners = flat[triangles]
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    is_front = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] > 0.0
+    # All turned the same way round, the triangles fill their union only once.
+    corners[~is_front] = corners[~is_front][:, ::-1]
+    closed = np.concatenate([corners, corners[:, :1]], axis=1).reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], len(corners))
+    hidden = {"linewidth": 0.0, "edgecolor": "none"}
+    is_filled = style["facecolor"] != "none"
+    fill = PathPatch(Path(closed, codes), **{**style, **hidden})
+    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
+    edges = edges.reshape(-1, 2)
+    names, index = np.unique(edges, axis=0, return_inverse=True)
+    fronts = np.bincount(index.reshape(-1), weights=np.repeat(is_front, 3), minlength=len(names))
+    uses = np.bincount(index.reshape(-1), minlength=len(names))
+    folds = flat[names[(fronts > 0.0) & (fronts < uses) | (uses == 1)]]
+    codes = np.tile([Path.MOVETO, Path.LINETO], len(folds))
+    plain = {key: style[key] for key in ("edgecolor", "linewidth", "zorder")}
+    label = None if is_filled else style["label"]
+    rim = PathPatch(Path(folds.reshape(-1, 2), codes), facecolor="none", label=label, **plain)
+    return [fill, rim] if is_filled else [rim]
 
 
 _TIP_STYLE: Final[dict[str, Any]] = {
@@ -267,6 +317,16 @@ def _ticks() -> Any:  # noqa: ANN401
 
 
 def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401
+    if isinstance(region.shape, Field):
+        points, triangles = skin(region.shape)
+        if len(triangles):
+            mesh = [points[:, i] for i in order]
+            face = _COLOURS[region.kind]
+            alpha = 0.08 if region.kind in _OUTLINES else 0.25
+            axes.plot_trisurf(
+                *mesh[:2], mesh[2], triangles=triangles, color=face, alpha=alpha, linewidth=0
+            )
+        return
     grid = directions()
     points = outline_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
     surface = [points[..., i] for i in order]

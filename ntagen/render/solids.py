@@ -13,16 +13,17 @@ from dataclasses import dataclass
 from typing import Final
 
 from ntagen.errors import InputError
+from ntagen.render.fields import FieldRow, Samples, field_rows
 from ntagen.render.fixed_point import fixed_point
 from ntagen.render.frame import Matrix
 from ntagen.rules import units_of
 from ntagen.scene import Region, Vector
-from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere
+from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
 
 DIRECTION_UNITS: Final = 2**28
 """The units of a direction's components: at most half of one is lost, 2e-9."""
 
-FORMS: Final[tuple[type[Shape], ...]] = (Box, Capsule, Cylinder, Ellipsoid, HalfSpace)
+FORMS: Final[tuple[type[Shape], ...]] = (Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Field)
 """The kinds of shapes; their places in this list, from 1, are their numbers in the model."""
 
 
@@ -72,10 +73,12 @@ class Solids:
     Attributes:
         tables: By kind of shape, those that occur.
         targets: All targets, if one of them is no sphere; else none.
+        samples: The table of distances of shapes from files, if there are any.
     """
 
     tables: tuple[Table, ...] = ()
     targets: tuple[SolidTarget, ...] = ()
+    samples: Samples | None = None
 
     @property
     def direction_units(self) -> int:
@@ -99,6 +102,7 @@ def solids(
     axes = _columns(frame)
     tables: list[Table] = []
     places: dict[int, int] = {}
+    samples: Samples | None = None
     for form in FORMS:
         mine = [region for region in avoided if isinstance(region.shape, form)]
         wanted = [region for region in targets if isinstance(region.shape, form)]
@@ -106,6 +110,15 @@ def solids(
             continue
         for number, target in enumerate(wanted):
             places[id(target)] = len(mine) + number
+        if form is Field:
+            fields = [
+                (region, shape)
+                for region in (*mine, *wanted)
+                if isinstance(shape := region.shape.placed(axes, (0, 0, 0)), Field)
+            ]
+            found, samples = field_rows(fields, scale)
+            tables.append(_field_table(found, len(mine), scale))
+            continue
         rows = [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in mine]
         rows += [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in wanted]
         columns = tuple(
@@ -113,9 +126,37 @@ def solids(
             for name, dims, note, make in _COLUMNS[form]
         )
         tables.append(Table(_NAMES[form], FORMS.index(form) + 1, len(rows), len(mine), columns))
-    if not places:
-        return Solids(tuple(tables))
-    return Solids(tuple(tables), tuple(_target(one, places, scale, axes) for one in targets))
+    goals = tuple(_target(one, places, scale, axes) for one in targets) if places else ()
+    return Solids(tuple(tables), goals, samples)
+
+
+def _field_table(rows: Sequence[FieldRow], avoided: int, scale: int) -> Table:
+    """The table of fields."""
+
+    def column(name: str, dimensions: str, note: str, make: Callable[[FieldRow], str]) -> Column:
+        entries = tuple(Entry(make(row), " ".join(row.region.name.split())) for row in rows)
+        return Column(name, dimensions, note, entries)
+
+    def lengths(row: FieldRow, values: Vector) -> str:
+        return _Row(row.region, row.field, scale).lengths(values)
+
+    columns = (
+        column("corner", "[3]", "The first point.", lambda r: lengths(r, r.field.corner_mm)),
+        column(
+            "axes",
+            "[3][3]",
+            "Its own axes.",
+            lambda r: _axes(_Row(r.region, r.field, scale), r.field.axes),
+        ),
+        column("extent", "[3]", "From there to the last.", lambda r: lengths(r, r.field.extent_mm)),
+        column("count", "[3]", "How many points.", lambda r: _braced(map(str, r.field.counts))),
+        column("first", "", "Where its samples begin.", lambda r: str(r.first)),
+        column("low", "[3]", "Where the solid begins.", lambda r: _braced(map(str, r.low))),
+        column("high", "[3]", "Where it ends.", lambda r: _braced(map(str, r.high))),
+        column("side", "", "-1: samples are depths.", lambda r: "-1" if r.field.is_inner else "1"),
+        column("rounding", "", _ROUNDING, lambda r: str(r.rounding)),
+    )
+    return Table("FIELD", FORMS.index(Field) + 1, len(rows), avoided, columns)
 
 
 def _target(

