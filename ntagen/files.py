@@ -195,8 +195,17 @@ def read_file(path: str | Path, limit_bytes: int) -> bytes:
     Raises:
         OSError: The file cannot be read, or is too large (`errno.EFBIG`).
     """
+    return b"".join(read_pieces(path, limit_bytes))
+
+
+def read_pieces(path: str | Path, limit_bytes: int) -> Iterator[bytes]:
+    """The bytes of a file in pieces, for a reader that keeps them: so they are in memory once.
+
+    Raises:
+        OSError: The file cannot be read, or is too large (`errno.EFBIG`).
+    """
     with open_file(path, limit_bytes) as file:
-        return _read_all(file, path, limit_bytes)
+        yield from _pieces(file, path, limit_bytes)
 
 
 def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
@@ -220,7 +229,8 @@ def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
         if first == b"" and kind == "pipe":
             raise OSError(errno.ENXIO, "it is a pipe, and nobody writes to it", str(path))
         os.set_blocking(descriptor, True)
-        return io.BytesIO(_read_all(file, path, limit_bytes, first or b""))
+        rest = _pieces(file, path, limit_bytes, first or b"")
+        return io.BytesIO(b"".join(rest))
 
 
 def _readable_kind(
@@ -245,15 +255,17 @@ def _readable_kind(
     raise OSError(errno.EINVAL, "it is a device, not a file", str(path))
 
 
-def _read_all(file: IO[bytes], path: str | Path, limit_bytes: int, first: bytes = b"") -> bytes:
+def _pieces(
+    file: IO[bytes], path: str | Path, limit_bytes: int, first: bytes = b""
+) -> Iterator[bytes]:
     """The bytes in `first` and all that follow, read in pieces: a pipe does not tell its length."""
-    pieces, length = [first], len(first)
+    length = len(first)
+    yield first
     while length <= limit_bytes and (piece := file.read(_PIECE_BYTES)):
-        pieces.append(piece)
         length += len(piece)
+        yield piece
     if length > limit_bytes:
         raise _too_large(path, limit_bytes)
-    return b"".join(pieces)
 
 
 def _too_large(path: str | Path, limit_bytes: int) -> OSError:

@@ -16,6 +16,10 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
+mod text;
+
+pub use text::Text;
+
 /// Index of a [`Source`] in a [`SourceMap`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct SourceId(pub u32);
@@ -55,7 +59,7 @@ pub struct Source {
     /// file.
     pub place: String,
     /// The decoded text that spans count in.
-    pub text: String,
+    pub text: Text,
     /// The byte of the file that the text begins at.
     pub file_start: u32,
     /// Pairs (byte of `text`, byte of the file), ascending, where the two do not advance together;
@@ -87,6 +91,20 @@ impl Source {
             Some((text, file)) => file + (text_offset - text),
             None => self.file_start + text_offset,
         }
+    }
+
+    /// The first byte of the text that comes from this byte of the file or one behind it.
+    fn first_from(&self, file_offset: u32) -> usize {
+        let (mut low, mut high) = (0, self.text.len());
+        while low < high {
+            let middle = low.midpoint(high);
+            if u32::try_from(middle).is_ok_and(|middle| self.file_offset(middle) < file_offset) {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        low
     }
 }
 
@@ -123,15 +141,9 @@ impl SourceMap {
         let line_start = lines[line - 1];
         // Only bytes of the file that belong to the text can be told to be the rest of a character.
         let first = source.text.floor_char_boundary(span.start as usize);
-        let rest_bytes = source.text[..first]
-            .bytes()
-            .enumerate()
-            .rev()
-            .take_while(|&(index, _)| {
-                u32::try_from(index).is_ok_and(|index| source.file_offset(index) >= line_start)
-            })
-            .filter(|&(_, byte)| byte & 0xc0 == 0x80)
-            .count();
+        let line_begin = source.first_from(line_start).min(first);
+        let of_line = &source.text.as_bytes()[line_begin..first];
+        let rest_bytes = of_line.iter().filter(|&byte| byte & 0xc0 == 0x80).count();
         let column = (offset - line_start.min(offset) + 1)
             .saturating_sub(u32::try_from(rest_bytes).unwrap_or(u32::MAX));
         Position {
@@ -294,6 +306,9 @@ fn visible_char(one: char) -> char {
     }
 }
 
+/// How many characters of a line are shown before the place that is meant, and from it on.
+const LONGEST_CONTEXT: usize = 200;
+
 struct Rendered<'a> {
     diagnostic: &'a Diagnostic,
     sources: &'a SourceMap,
@@ -333,13 +348,9 @@ impl fmt::Display for Rendered<'_> {
         if !line.trim().is_empty() {
             let end = floor_char_boundary(&source.text, diagnostic.span.end as usize)
                 .clamp(start, line_end);
-            let width = source.text[start..end].chars().count().max(1);
-            let indent: String = source.text[line_start..start]
-                .chars()
-                .map(|c| if c == '\t' { '\t' } else { ' ' })
-                .collect();
-            writeln!(f, "  | {line}")?;
-            writeln!(f, "  | {indent}{}", "^".repeat(width))?;
+            let shown = Shown::of(line, start - line_start..end - line_start);
+            writeln!(f, "  | {}", shown.text)?;
+            writeln!(f, "  | {}{}", shown.indent, "^".repeat(shown.width))?;
         }
         for note in &diagnostic.notes {
             writeln!(f, "  note: {note}")?;
@@ -351,9 +362,63 @@ impl fmt::Display for Rendered<'_> {
     }
 }
 
+/// The part of a source line that is shown: all of it, or what stands around the mistake.
+struct Shown {
+    text: String,
+    indent: String,
+    /// How many characters are marked.
+    width: usize,
+}
+
+impl Shown {
+    /// The part around these bytes of a line.
+    fn of(line: &str, marked: Range<usize>) -> Shown {
+        let marked = marked.start.min(line.len())..marked.end.min(line.len());
+        let before = &line[..marked.start];
+        let first = match before.char_indices().rev().nth(LONGEST_CONTEXT) {
+            Some((index, _)) => line.ceil_char_boundary(index + 1),
+            None => 0,
+        };
+        let behind = line[marked.start..].char_indices().nth(LONGEST_CONTEXT);
+        let last = behind.map_or(line.len(), |(index, _)| marked.start + index);
+        let mark = |is_cut| if is_cut { "…" } else { "" };
+        let (left, right) = (mark(first > 0), mark(last < line.len()));
+        let blank = |c| if c == '\t' { '\t' } else { ' ' };
+        let end = marked.end.clamp(marked.start, last);
+        Shown {
+            text: format!("{left}{}{right}", &line[first..last]),
+            indent: left
+                .chars()
+                .chain(before[first..].chars())
+                .map(blank)
+                .collect(),
+            width: line[marked.start..end].chars().count().max(1),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_a_long_line_only_the_surroundings_are_shown() {
+        let line = "é".repeat(10_000) + "wrong" + &"ü".repeat(10_000);
+        let start = line.find("wrong").expect("it is there");
+        let shown = Shown::of(&line, start..start + 5);
+        let expected = "…".to_owned()
+            + &"é".repeat(LONGEST_CONTEXT)
+            + "wrong"
+            + &"ü".repeat(LONGEST_CONTEXT - 5)
+            + "…";
+        assert_eq!(shown.text, expected);
+        assert_eq!(shown.indent.chars().count(), 1 + LONGEST_CONTEXT);
+        assert_eq!(shown.width, 5);
+
+        let shown = Shown::of("\tint x;", 5..6);
+        assert_eq!((shown.text.as_str(), shown.width), ("\tint x;", 1));
+        assert_eq!(shown.indent, "\t    ");
+    }
 
     #[test]
     fn rendered_text_commands_no_terminal() {
@@ -362,7 +427,7 @@ mod tests {
         let source = sources.add(Source {
             path: "a\x1b[2J.q".into(),
             place: "query \u{2066}".to_owned(),
-            text: text.to_owned(),
+            text: text.into(),
             ..Source::default()
         });
         let code = Code {

@@ -26,10 +26,14 @@ use convert::{FailedError, RejectedError, rejected, until_signal};
 use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
 
-/// Loads a model from its bytes; `path` names it in diagnostics.
+/// Loads a model from its bytes, which come in pieces so that they are in memory once; `path` names
+/// it in diagnostics.
 #[pyfunction]
-fn load(py: Python<'_>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Model> {
-    let bytes = data.as_bytes();
+fn load(py: Python<'_>, path: &str, pieces: &Bound<'_, PyAny>) -> PyResult<Model> {
+    let mut bytes = Vec::new();
+    for piece in pieces.try_iter()? {
+        bytes.extend_from_slice(piece?.cast::<PyBytes>()?.as_bytes());
+    }
     let model = until_signal(py, || LoadedModel::load(path, bytes))?.map_err(rejected)?;
     Ok(Model {
         inner: Mutex::new(model),

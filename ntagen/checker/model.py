@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -31,13 +31,14 @@ from ntagen.checker.runs import Choose, Run, simulated
 from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
 from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
-from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file
+from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file, read_pieces
 
 OverflowRule = Literal["wrap", "error"]
 
 HEURISTICS: dict[str, str] = dict(_checker.PARTS)
 """The heuristics that can be switched off, each with what it does."""
 
+_PIECE_CHARACTERS = 2**20
 _PROCESSES_SHOWN = 5
 """The short text of a model names at most this many processes."""
 
@@ -381,7 +382,7 @@ def load(text: str, path: str = "") -> Model:
     Raises:
         RejectedError: The engine does not accept it.
     """
-    return _load(path, text.encode())
+    return _load(path, _encoded(text))
 
 
 def load_file(path: Path) -> Model:
@@ -391,7 +392,7 @@ def load_file(path: Path) -> Model:
         RejectedError: The engine does not accept it.
         OSError: The file cannot be read.
     """
-    return _load(str(path), read_file(path, MODEL_BYTES))
+    return _load(str(path), read_pieces(path, MODEL_BYTES))
 
 
 def diagnostic_pages() -> list[tuple[str, str, str, str]]:
@@ -399,6 +400,12 @@ def diagnostic_pages() -> list[tuple[str, str, str, str]]:
     return _checker.explanations()
 
 
-def _load(path: str, data: bytes) -> Model:
+def _load(path: str, pieces: Iterable[bytes]) -> Model:
     with rejecting():
-        return Model(_checker.load(path, data))
+        return Model(_checker.load(path, pieces))
+
+
+def _encoded(text: str) -> Iterator[bytes]:
+    """The bytes of a text, piece by piece: together they would take as much memory once more."""
+    for start in range(0, len(text), _PIECE_CHARACTERS):
+        yield text[start : start + _PIECE_CHARACTERS].encode()

@@ -42,7 +42,7 @@ pub struct LoadedModel {
 
 impl LoadedModel {
     /// Reads and checks a model. `path` names it in diagnostics.
-    pub fn load(path: &str, bytes: &[u8]) -> Result<LoadedModel, Rejection> {
+    pub fn load(path: &str, bytes: impl Into<Vec<u8>>) -> Result<LoadedModel, Rejection> {
         let start = Instant::now();
         let mut sources = SourceMap::default();
         let prelude = syntax::prelude(&mut sources);

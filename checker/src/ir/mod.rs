@@ -20,6 +20,7 @@
 mod ids;
 
 mod code;
+mod constants;
 mod labels;
 mod network;
 mod operands;
@@ -29,6 +30,7 @@ mod accesses;
 mod print;
 
 pub use code::*;
+pub use constants::Constants;
 pub use ids::*;
 pub use labels::*;
 pub use network::*;

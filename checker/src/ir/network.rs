@@ -1,6 +1,7 @@
 //! The network: processes with locations and edges, clocks, channels, variables.
 
 use super::code::{Function, Overflow};
+use super::constants::Constants;
 use super::ids::{ChannelId, ClockId, EdgeId, FunctionId, LocationId, ProcessId, SiteId};
 use super::labels::{Guard, Update};
 use crate::diagnostics::Span;
@@ -19,7 +20,7 @@ pub struct Network {
     /// Where run-time errors come from.
     pub sites: Vec<Site>,
     /// The constant memory.
-    pub constants: Vec<i32>,
+    pub constants: Constants,
     /// What happens where results of integer arithmetic do not fit.
     pub overflow: Overflow,
     /// The first place, in the order of sites, where the value of a constant wrapped round.

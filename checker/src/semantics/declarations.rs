@@ -72,7 +72,7 @@ impl Checker<'_> {
         if ty.size().clocks + ty.size().channels > 0 {
             return Entity::Broken;
         }
-        let Some(parts) = parts else {
+        let Some(mut parts) = parts else {
             self.error(
                 codes::CONSTANT_NOT_INITIALISED,
                 variable.name.span,
@@ -82,8 +82,8 @@ impl Checker<'_> {
             return Entity::Broken;
         };
         let free = self.free_parameter_seen;
-        match self.initial_words(&parts, ty) {
-            Some(words) => self.constant_entity(&words, ty, free, variable.name.span),
+        match self.initial_words(&mut parts, ty) {
+            Some(words) => self.constant_entity(words, ty, free, variable.name.span),
             None => Entity::Broken,
         }
     }
@@ -91,7 +91,7 @@ impl Checker<'_> {
     /// A constant with these words.
     pub(super) fn constant_entity(
         &mut self,
-        words: &[i32],
+        words: Vec<i32>,
         ty: &Type,
         free: bool,
         span: Span,
@@ -106,7 +106,7 @@ impl Checker<'_> {
         {
             return Entity::Broken;
         }
-        self.distinguish_parts(ty, words, span);
+        self.distinguish_parts(ty, &words, span);
         if ty.is_register() {
             let value = match ty {
                 Type::Double => {
@@ -144,8 +144,8 @@ impl Checker<'_> {
         if !self.has_room_for(ty, variable.name.span) {
             return Entity::Broken;
         }
-        let parts = parts.unwrap_or_default();
-        let words = self.initial_words(&parts, ty);
+        let mut parts = parts.unwrap_or_default();
+        let words = self.initial_words(&mut parts, ty);
         let declared = declared_at(ty, variable.name.span);
         let abstracted = ty.with_hybrid_clocks();
         let (ty, is_left_out) = match self.cause_of(declared) {
@@ -169,7 +169,8 @@ impl Checker<'_> {
             high: CLOCK_LIMIT,
         };
         for part in parts.iter().filter(|part| part.ty.is_clock()) {
-            if let Some(words) = self.known_words(&part.value, &clock_start, "the start of a clock")
+            if let Some(value) = part.expr()
+                && let Some(words) = self.known_words(value, &clock_start, "the start of a clock")
             {
                 let clock = place.base.clocks + part.offset.clocks;
                 self.world.network.initial_clocks[clock as usize] = words[0];

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::checker::Checker;
 use super::codes;
+use super::initialisers::{InitialPart, InitialValue};
 use super::left_out::causes::declared_at;
 use super::scalars::is_order_irrelevant;
 use super::scope::{Entity, Scope};
@@ -228,23 +229,29 @@ impl Checker<'_> {
         }
         let declared = declared_at(&ty, variable.name.span);
         for part in parts.iter().flatten() {
-            self.takes_unknown(declared, &part.value, before);
+            if let Some(value) = part.expr() {
+                self.takes_unknown(declared, value, before);
+            }
         }
         if self.cause_of(declared).is_some()
             && let Some(parts) = &mut parts
-            && !parts.iter().any(|part| part.value.has_effect())
+            && !parts
+                .iter()
+                .filter_map(InitialPart::expr)
+                .any(Expr::has_effect)
         {
             parts.clear();
             self.unknowns.truncate(before);
             return Some(self.declare_local(variable, ty, Vec::new()));
         }
-        let parts = parts.unwrap_or_default();
+        let mut parts = parts.unwrap_or_default();
         let is_known = parts
             .iter()
-            .all(|part| Self::is_computable(&part.value) && !part.value.is_unknown());
+            .filter_map(InitialPart::expr)
+            .all(|value| Self::is_computable(value) && !value.is_unknown());
         if prefixes.constant && is_known {
-            let entity = match self.initial_words(&parts, &ty) {
-                Some(words) => self.constant_entity(&words, &ty, false, variable.name.span),
+            let entity = match self.initial_words(&mut parts, &ty) {
+                Some(words) => self.constant_entity(words, &ty, false, variable.name.span),
                 None => Entity::Broken,
             };
             self.declare(&variable.name, entity);
@@ -257,7 +264,7 @@ impl Checker<'_> {
         &mut self,
         variable: &ast::Variable,
         ty: Type,
-        parts: Vec<super::initialisers::InitialPart>,
+        parts: Vec<InitialPart>,
     ) -> Statement {
         // Without a value, a scalar is the first member; in a list of values, the first comes
         // first.
@@ -270,8 +277,14 @@ impl Checker<'_> {
         let root = Root::Local(local);
         let assignments = parts
             .into_iter()
-            .filter(|part| !part.value.is_error())
-            .map(|part| initial_assignment(root, part))
+            .filter_map(|part| {
+                let value = match part.value {
+                    InitialValue::Expr(value) => value,
+                    InitialValue::Words(words, span) => self.constant_value(words, &part.ty, span),
+                };
+                let is_known = !value.is_error();
+                is_known.then(|| initial_assignment(root, part.offset, part.ty, value))
+            })
             .collect();
         let place = Place {
             root,
@@ -281,6 +294,14 @@ impl Checker<'_> {
         };
         self.declare(&variable.name, Entity::Variable { place, ty });
         Statement::Declare(local, assignments)
+    }
+
+    /// An array or struct of these words, which lie among the constants.
+    fn constant_value(&mut self, words: Vec<i32>, ty: &Type, span: Span) -> Expr {
+        match self.constant_entity(words, ty, false, span) {
+            Entity::Variable { place, ty } => Expr::new(Kind::Variable(place), ty, span),
+            _ => Expr::error(span),
+        }
     }
 
     fn statement(&mut self, statement: &ast::Statement, result: &Type) -> Statement {
@@ -497,17 +518,17 @@ impl Checker<'_> {
 }
 
 /// The assignment that gives a part of a local its initial value.
-fn initial_assignment(root: Root, part: super::initialisers::InitialPart) -> Expr {
+fn initial_assignment(root: Root, offset: Size, ty: Type, value: Expr) -> Expr {
     let place = Place {
         root,
-        base: part.offset,
+        base: offset,
         mutable: true,
         declared: Span::default(),
     };
-    let span = part.value.span;
-    let target = Expr::new(Kind::Variable(place), part.ty.clone(), span);
-    let kind = Kind::Assign(Box::new(target), Box::new(part.value));
-    Expr::new(kind, part.ty, span)
+    let span = value.span;
+    let target = Expr::new(Kind::Variable(place), ty.clone(), span);
+    let kind = Kind::Assign(Box::new(target), Box::new(value));
+    Expr::new(kind, ty, span)
 }
 
 /// Whether a statement always ends in `return`.

@@ -6,35 +6,94 @@ use super::codes;
 use super::typed::Expr;
 use super::types::{Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
+use crate::exec::arithmetic;
 use crate::ir::CLOCK_LIMIT;
-use crate::syntax::ast::{self, Initialiser, Name};
+use crate::syntax::ast::{self, ExprKind, Initialiser, Name, UnaryOp};
+use crate::syntax::codes::{MOST_MISTAKES, TOO_MANY_MISTAKES};
+use crate::syntax::{Piece, TableReader};
 
-/// The value that one part of a variable starts with.
+/// What one part of a variable starts with.
 pub(super) struct InitialPart {
     /// Where the part lies in the variable.
     pub(super) offset: Size,
     /// The type of the part.
     pub(super) ty: Type,
     /// Its value.
-    pub(super) value: Expr,
+    pub(super) value: InitialValue,
+}
+
+/// The value that a part of a variable starts with.
+pub(super) enum InitialValue {
+    /// One that was written as an expression.
+    Expr(Expr),
+    /// All words of an array or struct, from a table. Parts of it that have no words, or whose
+    /// values are not plain words of their type, follow as parts of their own.
+    Words(Vec<i32>, Span),
+}
+
+impl InitialPart {
+    /// The expression; nothing for words.
+    pub(super) fn expr(&self) -> Option<&Expr> {
+        match &self.value {
+            InitialValue::Expr(expr) => Some(expr),
+            InitialValue::Words(..) => None,
+        }
+    }
+}
+
+/// Numbers of a table that are no words of their type: the starts of clocks, of which there are not
+/// as many, and mistakes, of which nobody reads as many.
+const MOST_NUMBERS_APART: usize = 5_000;
+
+/// What a table gives: the words, and the parts that are no words.
+struct Filled {
+    words: Vec<i32>,
+    apart: Vec<InitialPart>,
+    /// How many mistakes were reported before.
+    reported: usize,
 }
 
 impl Checker<'_> {
-    /// The words of a variable with these initial parts.
-    pub(super) fn initial_words(&mut self, parts: &[InitialPart], ty: &Type) -> Option<Vec<i32>> {
-        let mut words = Vec::with_capacity(ty.size().words as usize);
-        ty.default_words(&mut words);
+    /// The words of a variable with these initial parts, which are used up.
+    pub(super) fn initial_words(
+        &mut self,
+        parts: &mut [InitialPart],
+        ty: &Type,
+    ) -> Option<Vec<i32>> {
+        let size = ty.size().words as usize;
+        let mut words = Vec::new();
         let mut is_complete = true;
-        for part in parts.iter().filter(|part| part.ty.size().words > 0) {
-            match self.known_words(&part.value, &part.ty, "an initial value") {
+        let reported = self.diagnostics.len();
+        for part in parts.iter_mut().filter(|part| part.ty.size().words > 0) {
+            if self.diagnostics.len() > reported + MOST_MISTAKES {
+                self.too_many_mistakes();
+                return None;
+            }
+            let known = match &mut part.value {
+                InitialValue::Words(table, _) => Some(std::mem::take(table)),
+                InitialValue::Expr(value) => self.known_words(value, &part.ty, "an initial value"),
+            };
+            match known {
+                Some(whole) if whole.len() == size => words = whole,
                 Some(known) => {
+                    fill(&mut words, ty);
                     let start = part.offset.words as usize;
                     words[start..start + known.len()].copy_from_slice(&known);
                 }
                 None => is_complete = false,
             }
         }
+        fill(&mut words, ty);
         is_complete.then_some(words)
+    }
+
+    /// Says that no more is reported about a list of values.
+    fn too_many_mistakes(&mut self) {
+        if let Some(span) = self.diagnostics.last().map(|last| last.span) {
+            let message =
+                format!("more than {MOST_MISTAKES} values are wrong; the others are not reported");
+            self.report(Diagnostic::new(TOO_MANY_MISTAKES, span, message));
+        }
     }
 
     /// The initial values of the parts of a variable.
@@ -53,13 +112,14 @@ impl Checker<'_> {
     ) {
         match (initialiser, ty) {
             (Initialiser::Expr(expr), _) => {
-                let value = self.initial_value(expr, ty);
+                let value = InitialValue::Expr(self.initial_value(expr, ty));
                 parts.push(InitialPart {
                     offset,
                     ty: ty.clone(),
                     value,
                 });
             }
+            (Initialiser::Table(span), _) => self.table(*span, ty, offset, parts),
             (Initialiser::List(items, span), Type::Array(array)) => {
                 if !self.has_fitting_length(items.len(), array.index.length as usize, *span) {
                     parts.push(broken_part(offset, ty, *span));
@@ -188,16 +248,7 @@ impl Checker<'_> {
                 }
             };
             if field >= given.len() || std::mem::replace(&mut given[field], true) {
-                let message = format!(
-                    "the struct has {} fields, but other values are given",
-                    given.len()
-                );
-                self.error(
-                    codes::INITIALISER_COUNT,
-                    span,
-                    message,
-                    "give one value for each field",
-                );
+                self.misfitting_fields(record, span);
                 continue;
             }
             let before = &record.fields[..field];
@@ -207,14 +258,170 @@ impl Checker<'_> {
             self.initial_parts(item, &record.fields[field].1, offset, parts);
         }
         if let Some(missing) = given.iter().position(|given| !given) {
-            let message = format!("the field '{}' has no value", record.fields[missing].0);
-            self.error(
-                codes::INITIALISER_COUNT,
-                span,
-                message,
-                "give one value for each field",
-            );
+            self.missing_field(&record.fields[missing].0, span);
         }
+    }
+
+    fn misfitting_fields(&mut self, record: &StructType, span: Span) {
+        let message = format!(
+            "the struct has {} fields, but other values are given",
+            record.fields.len()
+        );
+        let help = "give one value for each field";
+        self.error(codes::INITIALISER_COUNT, span, message, help);
+    }
+
+    fn missing_field(&mut self, field: &str, span: Span) {
+        let message = format!("the field '{field}' has no value");
+        let help = "give one value for each field";
+        self.error(codes::INITIALISER_COUNT, span, message, help);
+    }
+
+    /// The parts that a table gives: words as far as it can be, the same as the expressions would.
+    fn table(&mut self, span: Span, ty: &Type, offset: Size, parts: &mut Vec<InitialPart>) {
+        if ty.is_error() {
+            return;
+        }
+        let mut filled = Filled {
+            words: Vec::new(),
+            apart: Vec::new(),
+            reported: self.diagnostics.len(),
+        };
+        fill(&mut filled.words, ty);
+        let mut reader = TableReader::new(span, self.sources);
+        let first = reader.read();
+        self.table_piece(first, &mut reader, ty, Size::default(), &mut filled);
+        if self.diagnostics.len() > filled.reported + MOST_MISTAKES {
+            self.too_many_mistakes();
+        }
+        if !filled.words.is_empty() {
+            parts.push(InitialPart {
+                offset,
+                ty: ty.clone(),
+                value: InitialValue::Words(filled.words, span),
+            });
+        }
+        parts.extend(filled.apart.into_iter().map(|mut part| {
+            part.offset = offset.plus(part.offset);
+            part
+        }));
+    }
+
+    /// Takes one piece of a table, with what belongs to it, as the value of this type.
+    fn table_piece(
+        &mut self,
+        piece: Piece,
+        reader: &mut TableReader,
+        ty: &Type,
+        offset: Size,
+        filled: &mut Filled,
+    ) {
+        let at = offset.words as usize;
+        match (piece, ty) {
+            (Piece::Number(value), Type::Int { low, high }) if (*low..=*high).contains(&value) => {
+                filled.words[at] = value;
+            }
+            (Piece::Number(value), Type::Bool) => filled.words[at] = i32::from(value != 0),
+            (Piece::Number(value), Type::Double) => {
+                let words = arithmetic::double_words(f64::from(value));
+                filled.words[at..at + words.len()].copy_from_slice(&words);
+            }
+            (Piece::Number(value), _) => {
+                if self.takes_apart(filled) {
+                    let number = Initialiser::Expr(number(value, reader.place()));
+                    self.initial_parts(&number, ty, offset, &mut filled.apart);
+                }
+            }
+            (Piece::List(length), Type::Array(array)) => {
+                let (given, wanted) = (length as usize, array.index.length as usize);
+                if given != wanted {
+                    let span = reader.whole_list(reader.place());
+                    if !self.has_fitting_length(given, wanted, span) {
+                        filled.apart.push(broken_part(offset, ty, span));
+                        return reader.skip_list();
+                    }
+                }
+                let stride = array.part.size();
+                for i in 0..length {
+                    let piece = reader.read();
+                    let offset = offset.plus(stride.times(i));
+                    self.table_piece(piece, reader, &array.part, offset, filled);
+                }
+                reader.read();
+            }
+            (Piece::List(length), Type::Struct(record)) => {
+                self.table_fields(length as usize, reader, record, offset, filled);
+            }
+            (Piece::List(_), Type::Error) => reader.skip_list(),
+            (Piece::List(_), _) => {
+                let span = reader.whole_list(reader.place());
+                self.misplaced_initialiser(span, ty);
+                if self.takes_apart(filled) {
+                    filled.apart.push(broken_part(offset, ty, span));
+                }
+                reader.skip_list();
+            }
+            (Piece::End, _) => {}
+        }
+    }
+
+    /// Whether one more part is looked at that is no words.
+    fn takes_apart(&self, filled: &Filled) -> bool {
+        filled.apart.len() < MOST_NUMBERS_APART
+            && self.diagnostics.len() <= filled.reported + MOST_MISTAKES
+    }
+
+    fn table_fields(
+        &mut self,
+        given: usize,
+        reader: &mut TableReader,
+        record: &StructType,
+        mut offset: Size,
+        filled: &mut Filled,
+    ) {
+        let wanted = record.fields.len();
+        if given > wanted {
+            let span = reader.whole_list(reader.place());
+            self.misfitting_fields(record, span);
+        }
+        if given < wanted {
+            let span = reader.whole_list(reader.place());
+            self.missing_field(&record.fields[given].0, span);
+        }
+        for (_, ty) in record.fields.iter().take(given) {
+            let piece = reader.read();
+            self.table_piece(piece, reader, ty, offset, filled);
+            offset = offset.plus(ty.size());
+        }
+        reader.skip_list();
+    }
+}
+
+/// A number as the grammar reads it.
+fn number(value: i32, span: Span) -> ast::Expr {
+    let whole = |value: i64, span| ast::Expr {
+        kind: ExprKind::Int(value),
+        span,
+    };
+    if value >= 0 {
+        return whole(value.into(), span);
+    }
+    let digits = Span {
+        start: span.start + 1,
+        ..span
+    };
+    let inner = Box::new(whole(-i64::from(value), digits));
+    ast::Expr {
+        kind: ExprKind::Unary(UnaryOp::Minus, inner),
+        span,
+    }
+}
+
+/// Makes words those of a value without an initialiser, unless there are words.
+fn fill(words: &mut Vec<i32>, ty: &Type) {
+    if words.is_empty() {
+        words.reserve_exact(ty.size().words as usize);
+        ty.default_words(words);
     }
 }
 
@@ -222,6 +429,6 @@ fn broken_part(offset: Size, ty: &Type, span: Span) -> InitialPart {
     InitialPart {
         offset,
         ty: ty.clone(),
-        value: Expr::error(span),
+        value: InitialValue::Expr(Expr::error(span)),
     }
 }

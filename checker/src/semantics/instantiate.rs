@@ -406,7 +406,7 @@ impl Checker<'_> {
             let span = argument.span;
             let argument = self.converted(argument, ty)?;
             let words = self.known_words(&argument, ty, "an argument of a template")?;
-            return Some(self.constant_entity(&words, ty, free, span));
+            return Some(self.constant_entity(words, ty, free, span));
         }
         if !is_fixed_place(&argument) {
             self.error(

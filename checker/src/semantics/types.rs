@@ -323,12 +323,12 @@ impl Type {
             Type::Array(array) => {
                 let start = words.len();
                 array.part.default_words(words);
-                let part = words[start..].to_vec();
+                let end = words.len();
                 if array.index.length == 0 {
                     words.truncate(start);
                 }
                 for _ in 1..array.index.length {
-                    words.extend_from_slice(&part);
+                    words.extend_from_within(start..end);
                 }
             }
             Type::Struct(record) => record

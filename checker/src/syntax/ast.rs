@@ -216,6 +216,8 @@ pub enum Initialiser {
     Expr(Expr),
     /// `{ a, name: b, … }`
     List(Vec<(Option<Name>, Initialiser)>, Span),
+    /// The same of many numbers, unread: [`super::TableReader`] reads it.
+    Table(Span),
 }
 
 /// A formal parameter.

@@ -74,4 +74,4 @@ codes! {
 }
 
 /// After this many mistakes the rest of a text is left unread.
-pub(super) const MOST_MISTAKES: usize = 100;
+pub const MOST_MISTAKES: usize = 100;

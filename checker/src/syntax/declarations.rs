@@ -194,7 +194,11 @@ impl Parser<'_> {
     fn at_old_constant(&self) -> bool {
         self.is_name_at(1)
             && match self.peek(2).kind {
-                TokenKind::Int | TokenKind::LeftBrace | TokenKind::Minus | TokenKind::Comma => true,
+                TokenKind::Int
+                | TokenKind::LeftBrace
+                | TokenKind::Table
+                | TokenKind::Minus
+                | TokenKind::Comma => true,
                 TokenKind::LeftBracket | TokenKind::Word => self.dialect == Dialect::Old,
                 _ => false,
             }
@@ -273,6 +277,10 @@ impl Parser<'_> {
     }
 
     fn initialiser(&mut self) -> Initialiser {
+        if self.at(TokenKind::Table) {
+            let table = self.bump();
+            return Initialiser::Table(self.span_of(table));
+        }
         if !self.at(TokenKind::LeftBrace) {
             return Initialiser::Expr(self.expression());
         }

@@ -13,7 +13,7 @@ const MOST_BYTES: usize = 1 << 28;
 /// The text of a model; an empty file is refused.
 pub(super) fn decode_model(
     path: &str,
-    bytes: &[u8],
+    bytes: Vec<u8>,
     sources: &mut SourceMap,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<String> {
@@ -29,7 +29,7 @@ pub(super) fn decode_model(
 /// The text of a file without its byte order mark.
 pub(super) fn decode(
     path: &str,
-    bytes: &[u8],
+    bytes: Vec<u8>,
     sources: &mut SourceMap,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Option<String> {
@@ -40,21 +40,25 @@ pub(super) fn decode(
         report(codes::FILE_TOO_LARGE, "the file is larger than 256 MiB");
         return None;
     }
-    match bytes {
-        [0xef, 0xbb, 0xbf, rest @ ..] => return Some(utf8_or_latin1(rest, &mut report)),
+    match &bytes[..] {
+        [0xef, 0xbb, 0xbf, ..] => {
+            let mut bytes = bytes;
+            bytes.drain(..3);
+            return Some(utf8_or_latin1(bytes, &mut report));
+        }
         [0xff, 0xfe, rest @ ..] => return utf16(rest, u16::from_le_bytes, &mut report),
         [0xfe, 0xff, rest @ ..] => return utf16(rest, u16::from_be_bytes, &mut report),
-        [b'<', 0, ..] => return utf16(bytes, u16::from_le_bytes, &mut report),
-        [0, b'<', ..] => return utf16(bytes, u16::from_be_bytes, &mut report),
+        [b'<', 0, ..] => return utf16(&bytes, u16::from_le_bytes, &mut report),
+        [0, b'<', ..] => return utf16(&bytes, u16::from_be_bytes, &mut report),
         _ => {}
     }
     if bytes.contains(&0) {
         report(codes::NOT_A_MODEL, "this is a binary file, not a text");
         return None;
     }
-    match declared_encoding(bytes).as_deref() {
+    match declared_encoding(&bytes).as_deref() {
         Some("iso-8859-1" | "latin1" | "latin-1" | "iso8859-1" | "windows-1252" | "cp1252") => {
-            Some(latin1(bytes))
+            Some(latin1(&bytes))
         }
         None | Some("utf-8" | "utf8" | "us-ascii" | "ascii" | "utf-16" | "utf16") => {
             Some(utf8_or_latin1(bytes, &mut report))
@@ -80,13 +84,14 @@ fn about_file(path: &str, code: Code, message: &str, sources: &mut SourceMap) ->
     }
 }
 
-fn utf8_or_latin1(bytes: &[u8], report: &mut impl FnMut(Code, &str)) -> String {
-    if let Ok(text) = std::str::from_utf8(bytes) {
-        return text.to_owned();
-    }
-    let message = "the file is not UTF-8; it is read as Latin-1";
-    report(codes::NOT_UTF8, message);
-    latin1(bytes)
+fn utf8_or_latin1(bytes: Vec<u8>, report: &mut impl FnMut(Code, &str)) -> String {
+    String::from_utf8(bytes).unwrap_or_else(|error| {
+        report(
+            codes::NOT_UTF8,
+            "the file is not UTF-8; it is read as Latin-1",
+        );
+        latin1(error.as_bytes())
+    })
 }
 
 fn latin1(bytes: &[u8]) -> String {

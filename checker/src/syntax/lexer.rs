@@ -13,6 +13,7 @@
 use crate::cancellation;
 
 use super::codes;
+use super::tables::Finder;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
 /// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for
@@ -40,6 +41,8 @@ macro_rules! tokens {
             Double,
             /// `"…"`
             String,
+            /// A list of many numbers, or lists of them: see [`super::tables`].
+            Table,
             /// Bytes that form no token; reported already.
             Unknown,
             /// The end of the text.
@@ -57,6 +60,7 @@ macro_rules! tokens {
                     TokenKind::Word => "a name",
                     TokenKind::Int | TokenKind::Double => "a number",
                     TokenKind::String => "a string",
+                    TokenKind::Table => "a list of numbers",
                     TokenKind::Unknown => "an unknown symbol",
                     TokenKind::End => "the end",
                     $(TokenKind::$variant => concat!("`", $text, "`"),)*
@@ -94,6 +98,7 @@ pub(super) fn lex(text: &str, span: Span, diagnostics: &mut Vec<Diagnostic>) -> 
         position: span.start as usize,
         tokens: Vec::with_capacity(text.len().saturating_sub(span.start as usize) / 4 + 1),
         diagnostics,
+        tables: Finder::default(),
     };
     lexer.run();
     lexer.tokens
@@ -105,6 +110,7 @@ struct Lexer<'a> {
     position: usize,
     tokens: Vec<Token>,
     diagnostics: &'a mut Vec<Diagnostic>,
+    tables: Finder,
 }
 
 /// What it takes to read a token, and to parse it later: see [`cancellation::work`].
@@ -133,6 +139,7 @@ impl Lexer<'_> {
                 }
                 b'0'..=b'9' => self.number(),
                 b'"' => self.string(),
+                b'{' if self.table() => {}
                 _ if self.symbol() => {}
                 _ => self.unknown(),
             }
@@ -181,6 +188,17 @@ impl Lexer<'_> {
         self.report(
             Diagnostic::new(codes::UNCLOSED_COMMENT, span, message).help("end it with `*/`"),
         );
+    }
+
+    fn table(&mut self) -> bool {
+        let start = self.position;
+        let Some(end) = self.tables.table_at(self.text.as_bytes(), start) else {
+            return false;
+        };
+        cancellation::work(end - start);
+        self.position = end;
+        self.push(TokenKind::Table, start);
+        true
     }
 
     /// `\` and a line end: the line continues.

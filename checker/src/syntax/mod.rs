@@ -23,6 +23,8 @@ mod keywords;
 
 mod parser;
 
+mod tables;
+
 mod expressions;
 
 mod types;
@@ -41,6 +43,8 @@ mod q_file;
 
 mod xml_text;
 
+mod xml_tables;
+
 mod xml;
 
 mod xml_template;
@@ -53,11 +57,12 @@ mod print;
 
 use codes::MOST_MISTAKES;
 
-use crate::diagnostics::{Diagnostic, Source, SourceMap, Span};
+use crate::diagnostics::{Diagnostic, Source, SourceMap, Span, Text};
 
 pub use prelude::prelude;
 pub use print::{print_dimension, print_expr, print_type};
 pub use queries::{add_query_text, parse_query};
+pub use tables::{Piece, TableReader};
 
 /// A model as read: the tree is complete where no diagnostic says otherwise.
 pub struct Parsed {
@@ -69,11 +74,11 @@ pub struct Parsed {
 
 /// Reads a model. The format is found from the content: XML begins with `<`; everything else is a
 /// textual model, in the old syntax if it uses what only that one has.
-pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
+pub fn read_model(path: &str, bytes: impl Into<Vec<u8>>, sources: &mut SourceMap) -> Parsed {
     let mut diagnostics = Vec::new();
-    let document = match encoding::decode_model(path, bytes, sources, &mut diagnostics) {
+    let document = match encoding::decode_model(path, bytes.into(), sources, &mut diagnostics) {
         Some(text) if text.trim_start().starts_with('<') => {
-            xml::read(path, &text, sources, &mut diagnostics)
+            xml::read(path, &text.into(), sources, &mut diagnostics)
         }
         Some(text) => xta::read(path, text, sources, &mut diagnostics),
         None => ast::Document::default(),
@@ -89,11 +94,11 @@ pub fn read_model(path: &str, bytes: &[u8], sources: &mut SourceMap) -> Parsed {
 /// Splits a `.q` file into the texts of its queries.
 pub fn read_queries(
     path: &str,
-    bytes: &[u8],
+    bytes: impl Into<Vec<u8>>,
     sources: &mut SourceMap,
 ) -> (Vec<ast::QueryText>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    let queries = match encoding::decode(path, bytes, sources, &mut diagnostics) {
+    let queries = match encoding::decode(path, bytes.into(), sources, &mut diagnostics) {
         Some(text) => {
             let span = add_file(path, text, sources);
             let mut queries = q_file::split(span, sources, &mut diagnostics);
@@ -126,7 +131,8 @@ fn limit(diagnostics: &mut Vec<Diagnostic>) {
 }
 
 /// Adds a whole file as one source and returns the span of all of it.
-fn add_file(path: &str, text: String, sources: &mut SourceMap) -> Span {
+fn add_file(path: &str, text: impl Into<Text>, sources: &mut SourceMap) -> Span {
+    let text = text.into();
     let end = lexer::to_u32(text.len());
     let source = sources.add(Source {
         path: path.into(),

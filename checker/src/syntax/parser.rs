@@ -451,6 +451,11 @@ impl<'a> Parser<'a> {
                     return;
                 }
                 TokenKind::LeftBrace => depth += 1,
+                TokenKind::Table if depth == 0 => {
+                    self.bump();
+                    self.eat(TokenKind::Semicolon);
+                    return;
+                }
                 TokenKind::RightBrace if depth == 0 => return,
                 TokenKind::RightBrace => {
                     depth -= 1;

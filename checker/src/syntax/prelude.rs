@@ -33,7 +33,7 @@ const double M_SQRT2 = 1.4142135623730951, M_SQRT1_2 = 0.7071067811865476;
 pub fn prelude(sources: &mut SourceMap) -> Vec<Declaration> {
     let source = sources.add(Source {
         place: "the prelude".to_owned(),
-        text: PRELUDE.to_owned(),
+        text: PRELUDE.into(),
         ..Source::default()
     });
     let span = Span {

@@ -35,7 +35,7 @@ pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagn
 pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
     let source = sources.add(Source {
         place: "query".to_owned(),
-        text: text.to_owned(),
+        text: text.into(),
         ..Source::default()
     });
     Span {

@@ -15,9 +15,10 @@ use super::lexer::{end_of_word, lex, to_u32};
 use super::parser::Parser;
 use super::processes::{Part, query_texts};
 use super::q_file::{collapsed, expectation_in, trimmed};
+use super::xml_tables::Cuts;
 use super::xml_text::{XmlFile, end_of_tag};
 use super::xta::is_old_syntax;
-use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
+use crate::diagnostics::{Code, Diagnostic, SourceMap, Span, Text};
 use roxmltree::{Node, ParsingOptions};
 
 /// No model of 100 MB has as many nodes; it bounds the memory for files that are nothing but tags.
@@ -29,12 +30,13 @@ const MOST_EXPANDED_BYTES: usize = 1 << 30;
 /// Reads an XML model.
 pub(super) fn read(
     path: &str,
-    text: &str,
+    text: &Text,
     sources: &mut SourceMap,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Document {
-    let file = XmlFile::new(path, text);
-    let options = ParsingOptions {
+    let (left, cuts) = Cuts::of(text);
+    let file = XmlFile::new(path, text, cuts);
+    let options = || ParsingOptions {
         allow_dtd: true,
         nodes_limit: MOST_NODES,
         ..ParsingOptions::default()
@@ -45,7 +47,7 @@ pub(super) fn read(
         diagnostics.push(Diagnostic::new(codes::MALFORMED_XML, span, message));
         return Document::default();
     }
-    match roxmltree::Document::parse_with_options(text, options) {
+    match roxmltree::Document::parse_with_options(&left, options()) {
         Ok(tree) => {
             let mut reader = Reader {
                 file,
@@ -58,6 +60,9 @@ pub(super) fn read(
             reader.document
         }
         Err(error) => {
+            // Places in the whole text are asked for.
+            let whole = roxmltree::Document::parse_with_options(text, options());
+            let error = whole.err().unwrap_or(error);
             let diagnostic = malformed(&error, &file, sources);
             diagnostics.push(diagnostic);
             Document::default()
@@ -208,7 +213,7 @@ impl Reader<'_, '_> {
 
     /// A source for an element's start tag.
     pub(super) fn tag(&mut self, node: Node, place: &str) -> Span {
-        let range = node.range();
+        let range = self.file.range(node);
         let raw = self.file.text.get(range.clone()).unwrap_or("");
         let end = range.start + end_of_tag(raw);
         self.file

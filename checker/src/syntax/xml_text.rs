@@ -2,20 +2,26 @@
 //! references, CDATA and line ends make the text that is parsed differ from the bytes of the file.
 
 use super::lexer::to_u32;
-use crate::diagnostics::{Source, SourceId, SourceMap, Span};
+use super::xml_tables::Cuts;
+use crate::diagnostics::{Source, SourceId, SourceMap, Span, Text};
 use roxmltree::Node;
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Smaller texts are copied.
+const LEAST_SHARED_BYTES: usize = 1 << 12;
+
 /// The file that elements are read from.
 pub(super) struct XmlFile<'a> {
     pub(super) path: Arc<str>,
-    pub(super) text: &'a str,
+    pub(super) text: &'a Text,
+    /// What was cut out of the text that nodes refer to.
+    cuts: Cuts,
     line_starts: Arc<[u32]>,
 }
 
 impl<'a> XmlFile<'a> {
-    pub(super) fn new(path: &str, text: &'a str) -> XmlFile<'a> {
+    pub(super) fn new(path: &str, text: &'a Text, cuts: Cuts) -> XmlFile<'a> {
         let ends = text.bytes().enumerate().filter(|&(_, byte)| byte == b'\n');
         let line_starts = std::iter::once(0)
             .chain(ends.map(|(index, _)| to_u32(index + 1)))
@@ -23,17 +29,26 @@ impl<'a> XmlFile<'a> {
         XmlFile {
             path: path.into(),
             text,
+            cuts,
             line_starts,
         }
+    }
+
+    /// The bytes of the file that a node stands in.
+    pub(super) fn range(&self, node: Node) -> Range<usize> {
+        self.cuts.whole(node.range())
     }
 
     /// Adds the text inside an element as a source; `place` says in words where it stands.
     pub(super) fn add_text(&self, node: Node, place: String, sources: &mut SourceMap) -> Span {
         let (start, end) = self.inner_range(node);
         let raw = self.text.get(start..end).unwrap_or("");
-        let (text, offsets) = match decode(raw, start) {
-            Some(decoded) => decoded,
-            None => (all_text(node), Vec::new()),
+        let (text, offsets) = if raw.contains(['&', '<', '\r']) {
+            let (text, offsets) =
+                decode(raw, start).unwrap_or_else(|| (all_text(node), Vec::new()));
+            (text.into(), offsets)
+        } else {
+            (self.piece(start..end), Vec::new())
         };
         self.add(text, offsets, start..end, place, sources)
     }
@@ -45,13 +60,22 @@ impl<'a> XmlFile<'a> {
         place: String,
         sources: &mut SourceMap,
     ) -> Span {
-        let text = self.text.get(range.clone()).unwrap_or("").to_owned();
+        let text = self.piece(range.clone());
         self.add(text, Vec::new(), range, place, sources)
+    }
+
+    /// Bytes of the file as they are. A large piece shares them with the file, which stays in
+    /// memory for it.
+    fn piece(&self, range: Range<usize>) -> Text {
+        if range.len() > LEAST_SHARED_BYTES && range.len() > self.text.len() / 2 {
+            return self.text.piece(range);
+        }
+        self.text.get(range).unwrap_or("").into()
     }
 
     fn add(
         &self,
-        text: String,
+        text: Text,
         offsets: Vec<(u32, u32)>,
         range: Range<usize>,
         place: String,
@@ -79,7 +103,7 @@ impl<'a> XmlFile<'a> {
 
     /// The bytes between an element's tags; empty for `<a/>`.
     fn inner_range(&self, node: Node) -> (usize, usize) {
-        let range = node.range();
+        let range = self.range(node);
         let raw = self.text.get(range.clone()).unwrap_or("");
         let start = end_of_tag(raw);
         match raw.rfind("</") {

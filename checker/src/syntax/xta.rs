@@ -90,7 +90,7 @@ pub(super) fn is_old_syntax(text: &str, tokens: &[Token]) -> bool {
                 is_name
                     && matches!(
                         third.kind,
-                        TokenKind::Int | TokenKind::LeftBrace | TokenKind::Minus
+                        TokenKind::Int | TokenKind::LeftBrace | TokenKind::Table | TokenKind::Minus
                     )
             }
             "process" if third.kind == TokenKind::LeftBrace => is_name,

@@ -28,7 +28,7 @@ pub(crate) fn load(text: &str) -> LoadedModel {
 #[track_caller]
 pub(crate) fn load_file(path: &Path) -> LoadedModel {
     let bytes = fs::read(path).expect("the model is there");
-    LoadedModel::load(&path.display().to_string(), &bytes)
+    LoadedModel::load(&path.display().to_string(), bytes)
         .unwrap_or_else(|rejection| panic!("{}", rejection.rendered.join("\n")))
 }
 

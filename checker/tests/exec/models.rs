@@ -132,7 +132,7 @@ fn engines_agree_on_walks_through_every_model() {
     let mut differences = Vec::new();
     for path in &paths {
         let bytes = fs::read(path).expect("the model can be read");
-        let Ok(model) = LoadedModel::load("model", &bytes) else {
+        let Ok(model) = LoadedModel::load("model", bytes.as_slice()) else {
             continue;
         };
         let network = model.network();

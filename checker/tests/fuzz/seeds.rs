@@ -71,7 +71,7 @@ impl Seeds {
             }
         } else {
             let mut sources = SourceMap::default();
-            let parsed = syntax::read_model("seed", &bytes, &mut sources);
+            let parsed = syntax::read_model("seed", bytes.as_slice(), &mut sources);
             for query in &parsed.document.queries {
                 self.add(Kind::Query, query.text.as_bytes());
             }

@@ -41,7 +41,7 @@ fn codes(model: Option<&Example>, example: &Example) -> BTreeSet<String> {
         "q" => ask(model, |loaded| {
             loaded.read_queries("example.q", example.text.as_bytes())
         }),
-        _ => LoadedModel::load("example", &bytes(example.text)).map(|loaded| loaded.warnings),
+        _ => LoadedModel::load("example", bytes(example.text)).map(|loaded| loaded.warnings),
     };
     codes_of(&result.unwrap_or_else(|rejection| rejection.rendered))
 }

@@ -9,3 +9,4 @@ mod corpus;
 mod explanations;
 mod semantics;
 mod syntax;
+mod tables;

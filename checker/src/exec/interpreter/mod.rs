@@ -15,8 +15,8 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use crate::ir::{
-    Address, Base, Block, CLOCK_LIMIT, Function, FunctionId, Instruction, Overflow, Register,
-    RegisterType, RunTimeErrorKind, Terminator,
+    Address, Base, Block, CLOCK_LIMIT, Constants, Function, FunctionId, Instruction, Overflow,
+    Register, RegisterType, RunTimeErrorKind, Terminator,
 };
 
 use crate::exec::rounds::{ROUND_LIMIT, count_rounds};
@@ -28,14 +28,14 @@ use machine::{Activation, Space, Stacks, WordPlace};
 #[derive(Clone, Debug, Default)]
 pub struct Interpreter {
     functions: Vec<Function>,
-    constants: Vec<i32>,
+    constants: Constants,
     overflow: Overflow,
     wraps: Arc<Wraps>,
 }
 
 impl Interpreter {
     /// An interpreter of the given functions over the given constant memory.
-    pub fn new(functions: &[Function], constants: &[i32]) -> Interpreter {
+    pub fn new(functions: &[Function], constants: impl Into<Constants>) -> Interpreter {
         let mut interpreter = Interpreter::default();
         interpreter.extend(functions, constants);
         interpreter
@@ -50,12 +50,11 @@ impl Interpreter {
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before.
-    pub fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+    pub fn extend(&mut self, functions: &[Function], constants: impl Into<Constants>) {
         let known = self.functions.len();
         self.functions.extend_from_slice(&functions[known..]);
         self.functions[known..].iter_mut().for_each(count_rounds);
-        self.constants.clear();
-        self.constants.extend_from_slice(constants);
+        self.constants = constants.into();
     }
 
     /// Calls a function that may take this number of rounds instead of [`ROUND_LIMIT`]; returns

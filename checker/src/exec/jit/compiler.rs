@@ -17,7 +17,7 @@ use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
 use crate::exec::optimise::Optimiser;
-use crate::ir::{Function, FunctionId, Overflow, RegisterType};
+use crate::ir::{Constants, Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
 use super::needs::AllNeeds;
@@ -113,7 +113,7 @@ impl Compiler {
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before.
-    pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+    pub(super) fn extend(&mut self, functions: &[Function], constants: &Constants) {
         self.optimiser.extend(functions, constants);
     }
 

@@ -27,7 +27,7 @@ use std::ptr;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicPtr, AtomicU64, AtomicUsize, Ordering};
 
-use crate::ir::{Function, FunctionId, Overflow, SiteId};
+use crate::ir::{Constants, Function, FunctionId, Overflow, SiteId};
 
 use crate::tuning::Tuning;
 
@@ -50,7 +50,7 @@ const NEVER: u64 = u64::MAX;
 pub struct Jit {
     interpreter: Interpreter,
     entries: Vec<Entry>,
-    constants: Vec<i32>,
+    constants: Constants,
     /// How many words of state the code reaches.
     state_words: usize,
     hot_instructions: u64,
@@ -70,14 +70,14 @@ struct Entry {
 
 impl Jit {
     /// An engine that compiles a function once it has run for a while.
-    pub fn new(functions: &[Function], constants: &[i32]) -> Result<Jit, JitError> {
+    pub fn new(functions: &[Function], constants: impl Into<Constants>) -> Result<Jit, JitError> {
         Jit::with_overflow(functions, constants, Overflow::default())
     }
 
     /// The same, with what happens where results of integer arithmetic do not fit.
     pub fn with_overflow(
         functions: &[Function],
-        constants: &[i32],
+        constants: impl Into<Constants>,
         overflow: Overflow,
     ) -> Result<Jit, JitError> {
         Jit::tuned(functions, constants, overflow, Tuning::default())
@@ -86,14 +86,14 @@ impl Jit {
     /// The same, with these heuristics only.
     pub fn tuned(
         functions: &[Function],
-        constants: &[i32],
+        constants: impl Into<Constants>,
         overflow: Overflow,
         tuning: Tuning,
     ) -> Result<Jit, JitError> {
         let mut jit = Jit {
             interpreter: Interpreter::default().with_overflow(overflow),
             entries: Vec::new(),
-            constants: Vec::new(),
+            constants: Constants::default(),
             state_words: 0,
             hot_instructions: if tuning.interpret_first {
                 HOT_INSTRUCTIONS
@@ -109,7 +109,7 @@ impl Jit {
     /// An engine that has compiled everything that can be called from outside.
     pub fn compile(
         functions: &[Function],
-        constants: &[i32],
+        constants: impl Into<Constants>,
         overflow: Overflow,
     ) -> Result<Jit, JitError> {
         let jit = Jit::with_overflow(functions, constants, overflow)?;
@@ -122,7 +122,12 @@ impl Jit {
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before. What is compiled stays so. An error for code that is not a valid program
     /// ([`validate`]), and then nothing is taken over.
-    pub fn extend(&mut self, functions: &[Function], constants: &[i32]) -> Result<(), JitError> {
+    pub fn extend(
+        &mut self,
+        functions: &[Function],
+        constants: impl Into<Constants>,
+    ) -> Result<(), JitError> {
+        let constants = constants.into();
         let words =
             validate(functions, self.entries.len(), constants.len()).map_err(JitError::new)?;
         self.state_words = self.state_words.max(words);
@@ -130,9 +135,9 @@ impl Jit {
         self.compiler
             .get_mut()
             .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .extend(functions, constants);
-        self.interpreter.extend(functions, constants);
-        self.constants = constants.to_vec();
+            .extend(functions, &constants);
+        self.interpreter.extend(functions, &constants);
+        self.constants = constants;
         Ok(())
     }
 

@@ -17,7 +17,7 @@ mod unroll;
 
 use std::collections::BTreeMap;
 
-use crate::ir::{Block, Function, FunctionId, Instruction};
+use crate::ir::{Block, Constants, Function, FunctionId, Instruction};
 
 use super::rounds::count_rounds;
 use crate::tuning::Tuning;
@@ -28,7 +28,7 @@ const MAX_SIZE: usize = 1500;
 const MAX_SIZE_TO_OPTIMISE: usize = 20_000;
 
 /// Optimises all functions of a program, which must not call each other thousands deep.
-pub fn optimise(functions: &[Function], constants: &[i32]) -> Vec<Function> {
+pub fn optimise(functions: &[Function], constants: impl Into<Constants>) -> Vec<Function> {
     let mut optimiser = Optimiser::default();
     optimiser.extend(functions, constants);
     let numbers: Vec<u32> = (0..functions.len() as u32)
@@ -59,7 +59,7 @@ pub fn optimise(functions: &[Function], constants: &[i32]) -> Vec<Function> {
 #[derive(Debug, Default)]
 pub(super) struct Optimiser {
     functions: Vec<Function>,
-    constants: Vec<i32>,
+    constants: Constants,
     tuning: Tuning,
     /// The optimised functions; calls in them refer to each other.
     made: Vec<Function>,
@@ -79,11 +79,10 @@ impl Optimiser {
 
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before.
-    pub(super) fn extend(&mut self, functions: &[Function], constants: &[i32]) {
+    pub(super) fn extend(&mut self, functions: &[Function], constants: impl Into<Constants>) {
         let known = self.functions.len();
         self.functions.extend_from_slice(&functions[known..]);
-        self.constants.clear();
-        self.constants.extend_from_slice(constants);
+        self.constants = constants.into();
     }
 
     /// The functions as they were given.

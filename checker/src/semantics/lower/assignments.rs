@@ -194,12 +194,13 @@ impl Builder<'_> {
     }
 
     /// Copies the words of a value into fresh memory of the frame.
-    pub(super) fn default_words(&mut self, address: Address, words: &[i32]) {
-        let offset = super::store_constant(self.network, self.images, words);
+    pub(super) fn default_words(&mut self, address: Address, image: Vec<i32>) {
+        let words = image.len() as u32;
+        let offset = super::store_constant(self.network, self.images, image);
         self.emit(Instruction::CopyWords {
             target: address,
             source: at(Base::Constants, offset),
-            words: words.len() as u32,
+            words,
         });
     }
 }

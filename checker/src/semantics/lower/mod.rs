@@ -20,7 +20,9 @@ mod places;
 mod quantifiers;
 mod statements;
 
-use std::collections::HashMap;
+use std::hash::BuildHasher;
+
+use rustc_hash::{FxBuildHasher, FxHashMap};
 
 use crate::cancellation;
 
@@ -32,17 +34,21 @@ use crate::ir::{
     Register, RegisterType, Site, SiteId, Terminator,
 };
 
-/// Images of values in the constant memory that were stored before.
-pub(super) type Images = HashMap<Vec<i32>, u32>;
+/// Images of values in the constant memory that were stored before: by a hash of the words, where
+/// they begin. The words themselves decide.
+pub(super) type Images = FxHashMap<u64, Vec<u32>>;
 
 /// Puts words into the constant memory once, and returns where they lie.
-pub(super) fn store_constant(network: &mut Network, images: &mut Images, words: &[i32]) -> u32 {
-    if let Some(&offset) = images.get(words) {
+pub(super) fn store_constant(network: &mut Network, images: &mut Images, words: Vec<i32>) -> u32 {
+    let same = images.entry(FxBuildHasher.hash_one(&words)).or_default();
+    let known = &network.constants;
+    let is_same = |&&offset: &&u32| known[offset as usize..].starts_with(&words);
+    if let Some(&offset) = same.iter().find(is_same) {
         return offset;
     }
-    let offset = network.constants.len() as u32;
-    network.constants.extend_from_slice(words);
-    images.insert(words.to_vec(), offset);
+    let offset = known.len() as u32;
+    network.constants.append(words);
+    same.push(offset);
     offset
 }
 

@@ -60,7 +60,7 @@ impl Builder<'_> {
             let mut image = Vec::with_capacity(words as usize);
             ty.default_words(&mut image);
             if self.loops > 0 || image.iter().any(|&word| word != 0) {
-                self.default_words(address, &image);
+                self.default_words(address, image);
             }
         }
         for initialiser in initialisers {
