@@ -301,15 +301,17 @@ class _Builder:
         placed = self._draft.numbers.get("step")
         span = self._draft.span if placed is None else placed.span
         advance = needle.speed_mm_per_s * limits.step_s
+        swept = self._draft.choices.get("safety") == "swept"
         circle = rules.visible(needle.radius_mm, resolution, "the radius of the motion circle")
         if self._reporter.obeys(circle, self._draft.numbers["radius"].span):
-            swept = self._draft.choices.get("safety") == "swept"
             speed, radius = needle.speed_mm_per_s, needle.radius_mm
             self._reporter.obeys(
                 rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span
             )
         seen = [sphere for sphere in spheres if self._regions.is_visible(sphere, resolution)]
-        checked = (sphere for sphere in seen if sphere.region.kind != "safe")
+        # The swept check sees critical regions between the ends of pushes, but no targets.
+        jumped = ("target",) if swept else ("target", "critical", "detection", "unexplored")
+        checked = (sphere for sphere in seen if sphere.region.kind in jumped)
         smallest = min(checked, key=lambda s: s.region.shape.depth_mm, default=None)
         if smallest is not None and advance > 2.0 * smallest.region.shape.depth_mm:
             self._report(

@@ -36,7 +36,7 @@ _OTHER: Final = "#8a94a6"
 _TRUE: Final = "#0b2545"
 _MEASURED: Final = "#7a3e9d"
 _LEGEND_COLUMNS: Final = 6
-_FLAT_MM2: Final = 1e-9
+_SHADOW_POINTS: Final = 160
 
 Curve = Sequence[Vector]
 
@@ -92,7 +92,7 @@ def draw(picture: Picture) -> Figure:
         frameon=False,
         fontsize=9,
     )
-    figure.suptitle(_heading(picture), fontsize=11)
+    figure.suptitle(_heading(picture), fontsize=11, wrap=True)
     return figure
 
 
@@ -149,8 +149,7 @@ def _draw_projection(
 ) -> Any:  # noqa: ANN401
     across, depth = shown
     for region in _back_to_front(picture.scene.regions):
-        for patch in _outline(region, shown, _face(region, picture)):
-            axes.add_patch(patch)
+        axes.add_patch(_outline(region, shown, _face(region, picture)))
     for style, curves in _curves(picture):
         for curve in curves:
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
@@ -169,55 +168,51 @@ def _draw_projection(
     return axes
 
 
-def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> list[Any]:
+def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
     """What a region looks like along an axis: a circle, or the hull of points of its surface."""
     import numpy as np
     from matplotlib.patches import Circle, Polygon
 
     if isinstance(region.shape, Sphere):
         center = [region.center_mm[axis] for axis in shown]
-        return [Circle((center[0], center[1]), region.radius_mm, **style)]
+        return Circle((center[0], center[1]), region.radius_mm, **style)
     if isinstance(region.shape, Field):
         return _shadow(region.shape, shown, style)
     points = outline_mm(region.shape, directions().reshape(-1, 3))[:, list(shown)]
     angles = np.linspace(0.0, 2.0 * math.pi, 240, endpoint=False)
     farthest = np.argmax(points @ np.array([np.cos(angles), np.sin(angles)]), axis=0)
-    return [Polygon(points[farthest], **style)]
+    return Polygon(points[farthest], **style)
 
 
-def _shadow(shape: Field, shown: tuple[int, int], style: dict[str, Any]) -> list[Any]:
-    """What a field looks like along an axis: the shadow of its surface, and where that folds."""
+def _shadow(shape: Field, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
+    """The outline of a field along an axis: where the least distance along the axis is 0."""
     import numpy as np
+    from contourpy import contour_generator
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
 
-    points, triangles = skin(shape)
-    if not len(triangles):
-        return []
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    triangles = triangles[np.linalg.norm(np.cross(b - a, c - a), axis=1) > _FLAT_MM2]
-    flat = points[:, list(shown)]
-    corners = flat[triangles]
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    is_front = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] > 0.0
-    # All turned the same way round, the triangles fill their union only once.
-    corners[~is_front] = corners[~is_front][:, ::-1]
-    closed = np.concatenate([corners, corners[:, :1]], axis=1).reshape(-1, 2)
-    codes = np.tile([Path.MOVETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY], len(corners))
-    hidden = {"linewidth": 0.0, "edgecolor": "none"}
-    is_filled = style["facecolor"] != "none"
-    fill = PathPatch(Path(closed, codes), **{**style, **hidden})
-    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
-    edges = edges.reshape(-1, 2)
-    names, index = np.unique(edges, axis=0, return_inverse=True)
-    fronts = np.bincount(index.reshape(-1), weights=np.repeat(is_front, 3), minlength=len(names))
-    uses = np.bincount(index.reshape(-1), minlength=len(names))
-    folds = flat[names[(fronts > 0.0) & (fronts < uses) | (uses == 1)]]
-    codes = np.tile([Path.MOVETO, Path.LINETO], len(folds))
-    plain = {key: style[key] for key in ("edgecolor", "linewidth", "zorder")}
-    label = None if is_filled else style["label"]
-    rim = PathPatch(Path(folds.reshape(-1, 2), codes), facecolor="none", label=label, **plain)
-    return [fill, rim] if is_filled else [rim]
+    points, _ = skin(shape)
+    if not len(points):
+        return PathPatch(Path(np.zeros((0, 2))), **style)
+    room_mm = max(shape.steps_mm)
+    low, high = points.min(axis=0) - room_mm, points.max(axis=0) + room_mm
+    spacing_mm = max(0.6 * min(shape.steps_mm), float((high - low).max()) / _SHADOW_POINTS)
+    lines = [np.arange(a, b + spacing_mm, spacing_mm) for a, b in zip(low, high, strict=True)]
+    away = np.full([len(lines[axis]) for axis in shown], np.inf)
+    along = next(axis for axis in range(3) if axis not in shown)
+    layer = np.zeros((*away.shape, 3))
+    layer[..., shown[0]] = lines[shown[0]][:, None]
+    layer[..., shown[1]] = lines[shown[1]][None, :]
+    for place in lines[along]:
+        layer[..., along] = place
+        found = shape.interpolated_mm(layer.reshape(-1, 3)).reshape(away.shape)
+        away = np.minimum(away, found)
+    found_rims: Any = contour_generator(lines[shown[0]], lines[shown[1]], away.T).lines(0.0)
+    rims: list[Any] = list(found_rims)
+    codes = [[Path.MOVETO] + [Path.LINETO] * (len(rim) - 1) for rim in rims]
+    if not rims:
+        return PathPatch(Path(np.zeros((0, 2))), **style)
+    return PathPatch(Path(np.concatenate(rims), np.concatenate(codes)), **style)
 
 
 _TIP_STYLE: Final[dict[str, Any]] = {
