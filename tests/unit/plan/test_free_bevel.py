@@ -46,7 +46,7 @@ def test_a_target_on_one_side_is_reached_without_a_roll_that_counts() -> None:
     assert certify(plan, limited(where, rolls=1, free=False)).roll_count == 1
 
 
-@pytest.mark.parametrize("apart_mm", [2.0, 10.0])
+@pytest.mark.parametrize("apart_mm", [0.0, 2.0, 10.0])
 @pytest.mark.parametrize("rolls", [0, 1])
 @pytest.mark.parametrize("free", [False, True])
 def test_the_engine_finds_what_brute_force_finds(rolls: int, free: bool, apart_mm: float) -> None:
