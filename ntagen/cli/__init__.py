@@ -31,6 +31,7 @@ __all__ = ["main"]
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
     "check": "Answer the queries of a model or an environment.",
+    "plan": "Find the best plans of a task within a budget of time.",
     "verify": "Check a trace, certificate or strategy independently.",
     "play": "Play a timed game against a strategy.",
     "info": "Show what is in a model or an environment.",

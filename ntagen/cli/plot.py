@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -16,6 +17,9 @@ from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:
     from ntagen.plot.picture import Picture
+
+_BUDGET_S: Final = 3.0
+"""The time to look for plans, if there are too many to list all."""
 
 _MCAP_MAGIC: Final = b"\x89MCAP"
 
@@ -112,13 +116,22 @@ def _of_scene(
     from ntagen.drive.configure import configure
     from ntagen.drive.simulate import synthesiser_for
     from ntagen.nsl import load_task
+    from ntagen.plan.anytime import synthesis_within
+    from ntagen.plan.best_plan import MOST_WHEN_NARROW, sequences
     from ntagen.plot.run import picture_of_plans
 
     task = load_task(source, include=include)
     for warning in task.warnings:
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
-    # All plans are listed here, since some are to be shown beside the best one.
-    lister = synthesiser_for(settings).inner.engine
-    synthesise = replace(lister, ranking=ranking or settings.ranking)
-    return picture_of_plans(task.scene, synthesise(task.scene) if shown > 0 else None, shown)
+    engine = synthesiser_for(settings).inner.engine
+    engine = replace(engine, ranking=ranking or settings.ranking)
+    if shown == 0:
+        return picture_of_plans(task.scene, None, shown)
+    if sequences(task.scene) <= MOST_WHEN_NARROW:
+        # All plans are listed, since some are to be shown beside the best one.
+        return picture_of_plans(task.scene, engine(task.scene), shown)
+    synthesis = synthesis_within(
+        task.scene, engine, clock=time.monotonic, count=shown, budget_s=_BUDGET_S
+    )
+    return picture_of_plans(task.scene, synthesis, shown)

@@ -35,20 +35,21 @@ from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.neighbours import improved
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
+from ntagen.plan.stricter import BETWEEN_STEPS_MM, shorter, stricter
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
 from ntagen.scene import Pose, Region, Scene
 
 _MOST_LISTED: Final = 600
 """All plans are listed if so few sequences of rolls can begin at so few places."""
 
-_BETWEEN_STEPS_MM: Final = 0.3
-"""A path can be this much nearer to a ball between two steps of 2 mm than at their ends."""
-
 _NARROW_MM: Final = 1.0
 """Less clearance than this is little: it is about what a phantom's needle errs in 20 mm."""
 
-_MOST_WHEN_NARROW: Final = 20_000
+MOST_WHEN_NARROW: Final = 20_000
 """All plans are also listed in more sequences than usual, if the best plan is that near."""
+
+_MOST_TRIED: Final = 500
+"""Among more sequences, so many plans are tried if all those that were found fail."""
 
 _CLEARANCE_QUESTIONS: Final = 4
 """Questions for more clearance."""
@@ -101,10 +102,15 @@ class BestPlanSynthesiser:
             known.raise_worth()
             known.lower_rolls()
             known.straighten()
-            if not known.candidates or (known.is_narrow and sequences(scene) <= _MOST_WHEN_NARROW):
+            is_listed = sequences(scene) <= MOST_WHEN_NARROW
+            if known.is_narrow and is_listed:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
                 return self.engine(scene)
+            if not known.candidates:
+                return replace(self.engine, max_plans=min(_MOST_TRIED, self.engine.max_plans))(
+                    scene
+                )
         return Synthesis(
             scene=scene,
             model_xml=first.model_xml,
@@ -154,7 +160,7 @@ class _Known:
         if not self._scene.criticals and self.candidates:
             return
         longest_mm = self._first.plans[0].length_mm + _MORE_STEPS * step_length_mm(self._scene)
-        no_longer = _shorter(self._scene, longest_mm)
+        no_longer = shorter(self._scene, longest_mm)
         wanted_mm = most_mm = USEFUL_CLEARANCE_MM
         for _ in range(_CLEARANCE_QUESTIONS):
             least_mm = max(0.0, self._worth_mm())
@@ -222,12 +228,12 @@ class _Known:
     def _strict(self, scene: Scene, worth_mm: float) -> Scene:
         """The scene whose plans have this clearance or reserve."""
         depth_mm = self._asker.engine.margins.depth_mm
-        shells_mm = min(worth_mm, _BETWEEN_STEPS_MM)
+        shells_mm = min(worth_mm, BETWEEN_STEPS_MM)
         if self._counts_reserve:
             depth_mm = max(depth_mm, worth_mm)
             # Half way, half of the distance is the same reserve.
             worth_mm = shells_mm = 0.5 * worth_mm
-        return _stricter(scene, worth_mm, shells_mm, depth_mm)
+        return stricter(scene, worth_mm, shells_mm, depth_mm)
 
     def _note(self, listing: Listing) -> Candidate | None:
         """Certifies what was found in the scene itself; one that holds, or None."""
@@ -267,12 +273,6 @@ def sequences(scene: Scene) -> float:
     return float(bevels * (steps * angles) ** scene.limits.max_rolls)
 
 
-def _shorter(scene: Scene, length_mm: float) -> Scene:
-    """The scene with plans of at most this length."""
-    shortest_mm = min(scene.needle.length_mm, length_mm)
-    return replace(scene, needle=replace(scene.needle, length_mm=shortest_mm))
-
-
 def _gates(scene: Scene) -> list[Region]:
     """Places to visit on the straight way to the only target; none if it is blocked or short."""
     target, tip_mm = scene.targets[-1], scene.needle.tip.position_mm
@@ -296,24 +296,3 @@ def _gates(scene: Scene) -> list[Region]:
         )
         for number, share in enumerate(shares)
     ]
-
-
-def _stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> Scene:
-    """The scene with larger critical regions, and shells and target that plans do not graze.
-
-    Args:
-        scene: The scene.
-        by_mm: By how much the critical regions are larger.
-        shells_mm: By how much the other regions to avoid are larger.
-        depth_mm: How deep a plan must lead into the last target.
-    """
-    *before, last = scene.targets
-    most_mm = last.shape.depth_mm
-    shallow_mm = max(0.5 * most_mm, most_mm - depth_mm - _BETWEEN_STEPS_MM)
-    scene = scene.with_targets([*before, last.grown(shallow_mm - most_mm)])
-    return replace(
-        scene,
-        criticals=tuple(region.grown(by_mm) for region in scene.criticals),
-        detections=tuple(region.grown(shells_mm) for region in scene.detections),
-        unexplored=tuple(region.grown(shells_mm) for region in scene.unexplored),
-    )

@@ -27,7 +27,7 @@ USEFUL_CLEARANCE_MM: Final = 5.0
 USEFUL_RESERVE_MM: Final = 4.0
 """More reserve is not better: a needle in a phantom errs about so much in 30 mm."""
 
-_MOST_RATIO: Final = 3.0
+MOST_RESERVE_RATIO: Final = 3.0
 """Distances to regions that are near the start count at most this much more."""
 
 _CLEARANCE_STEP_MM: Final = 0.1
@@ -60,14 +60,14 @@ def reserve_of(certificate: Certificate) -> float:
 
     What is off by 1 mm at the end of a path is off by less before: an error of the direction grows
     with the length. So a distance to a region counts by the length of the path divided by the
-    length up to there, at most `_MOST_RATIO` times.
+    length up to there, at most `MOST_RESERVE_RATIO` times.
 
     More than `USEFUL_RESERVE_MM` counts as that, and so much less too.
     """
     least_mm = certificate.target_depth_mm
     for one in certificate.clearances:
-        nearer = certificate.length_mm / one.at_mm if one.at_mm > 0.0 else _MOST_RATIO
-        ratio = min(_MOST_RATIO, nearer) if one.distance_mm > 0.0 else 1.0
+        nearer = certificate.length_mm / one.at_mm if one.at_mm > 0.0 else MOST_RESERVE_RATIO
+        ratio = min(MOST_RESERVE_RATIO, nearer) if one.distance_mm > 0.0 else 1.0
         least_mm = min(least_mm, ratio * one.distance_mm)
     return max(-USEFUL_RESERVE_MM, min(USEFUL_RESERVE_MM, least_mm))
 

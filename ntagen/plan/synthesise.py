@@ -98,6 +98,7 @@ class Listing:
         plans: Its plans.
         seconds: The time that the engine took.
         strategy_json: The strategy, if it is kept; empty without one.
+        is_complete: Whether the model has no other plans.
     """
 
     model_xml: str
@@ -105,6 +106,7 @@ class Listing:
     plans: tuple[Plan, ...]
     seconds: float
     strategy_json: str = ""
+    is_complete: bool = True
 
     def has(self, plan: Plan, scene: Scene) -> bool:
         """Whether the model, which is that of the scene, can make a plan and reaches its target.
@@ -177,6 +179,7 @@ class EngineSynthesiser:
             margins=self.margins,
             ranking=self.ranking,
             strategy_json=listing.strategy_json,
+            is_complete=listing.is_complete,
         )
 
     def listed(self, scene: Scene) -> Listing:
@@ -212,7 +215,9 @@ class EngineSynthesiser:
         is_won = answer.verdict == "satisfied"
         plans = extract(answer.plans, scene) if is_won else ()
         strategy_json = (answer.strategy_json() or "") if is_won and self.keeps_strategy else ""
-        return Listing(model_xml, model, plans, answer.seconds, strategy_json)
+        return Listing(
+            model_xml, model, plans, answer.seconds, strategy_json, not answer.has_more_plans
+        )
 
     def _heard(self, plans: Iterable[Plan]) -> Iterator[Plan]:
         """The plans; calls `listen` before each."""

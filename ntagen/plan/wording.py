@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from ntagen.plan.certify import Certificate
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM
 from ntagen.plan.synthesise import Margins
+
+if TYPE_CHECKING:
+    from ntagen.plan.anytime import Best
+    from ntagen.scene import Scene
 
 _CRITERIA: Final = {
     "clearance": f"clearance (up to {USEFUL_CLEARANCE_MM:g} mm counts)",
@@ -63,6 +67,29 @@ def judged(certificate: Certificate, margins: Margins) -> str:
         distances.append(f"only {depth_mm:.2f} mm deep in the target")
     said = ", ".join(part for part in distances if part)
     return f"{verdict} ({said})" if said else verdict
+
+
+def bounded(best: Best, ranking: Sequence[str], scene: Scene) -> list[str]:
+    """How good the best plan is by each criterion, and how good any plan can be; a line each."""
+    from ntagen.plan.anytime import CRITERIA, goodness
+
+    certificate = best.candidates[0].certificate
+    lines = []
+    among = "no plan"
+    for name in ranking:
+        value = goodness(name, CRITERIA[name].badness(certificate))
+        unit = "" if name == "rolls" else " mm"
+        if best.is_settled(name, scene):
+            said = f"{among} is better"
+        elif name in best.limits:
+            than = "more" if name in ("clearance", "reserve") else "less"
+            limit = goodness(name, best.limits[name])
+            said = f"{among} has {than} than {limit:.4g}{unit}; whether one has, is unknown"
+        else:
+            said = "whether there is a better one, is unknown"
+        lines.append(f"{name}: {value:.4g}{unit}; {said}")
+        among = "no plan that is as good so far"
+    return lines
 
 
 def clearance_of(certificate: Certificate) -> str:

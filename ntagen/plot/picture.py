@@ -11,6 +11,7 @@ Nothing about needles is computed here: the curves are given as points.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -37,6 +38,7 @@ _TRUE: Final = "#0b2545"
 _MEASURED: Final = "#7a3e9d"
 _LEGEND_COLUMNS: Final = 6
 _SHADOW_POINTS: Final = 160
+_TITLE_WIDTH: Final = 120
 
 Curve = Sequence[Vector]
 
@@ -98,7 +100,8 @@ def draw(picture: Picture) -> Figure:
 
 def _heading(picture: Picture) -> str:
     title = picture.title or picture.scene.name
-    return f"{title}\n{picture.caption}" if picture.caption else title
+    lines = [title, *picture.caption.splitlines()]
+    return "\n".join(part for line in lines for part in textwrap.wrap(line, _TITLE_WIDTH))
 
 
 def _depth_axis(scene: Scene) -> int:
