@@ -238,6 +238,18 @@ def time_units(step_s: float, speed_mm_per_s: float) -> tuple[int, float, float]
     return 1, speed_mm_per_s * step_s, step_s
 
 
+TIMES_PER_S: Final = 10_000
+"""Times of models with moving regions are whole multiples of 1 / this of a second."""
+
+
+def common_time(*times_s: float) -> Fraction:
+    """The longest time of which all these are whole multiples, in s, after rounding to 0.1 ms."""
+    fractions = [Fraction(time_s).limit_denominator(TIMES_PER_S) for time_s in times_s]
+    denominator = math.lcm(*(one.denominator for one in fractions))
+    numerator = math.gcd(*(int(one * denominator) for one in fractions))
+    return Fraction(numerator, denominator)
+
+
 def units_of(value: float, per_mm: int) -> int:
     """The number of units nearest to a finite value (ties go to the even number)."""
     return round(Fraction(value) * per_mm)

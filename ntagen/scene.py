@@ -25,6 +25,7 @@ from typing import Literal
 
 from ntagen import rules
 from ntagen.errors import InputError
+from ntagen.motion import Breath, Motion
 from ntagen.shapes import Shape, Sphere
 
 Vector = tuple[float, float, float]
@@ -52,12 +53,14 @@ class Region:
             critical is there, so none is expected there).
         shape: Where it is; a signed distance to its surface, and more.
         around: For a detection region that was written as ``around C1 margin …``, the name of C1.
+        motion: How it moves with the breath; then the shape says where it is at rest.
     """
 
     name: str
     kind: RegionKind
     shape: Shape
     around: str | None = None
+    motion: Motion | None = None
 
     @staticmethod
     def ball(
@@ -85,6 +88,13 @@ class Region:
     def distance_mm(self, point_mm: Vector) -> float:
         """The signed distance of a point to the surface; negative inside."""
         return self.shape.distance_at_mm(point_mm)
+
+    def distance_at_mm(self, point_mm: Vector, clock_s: float) -> float:
+        """The signed distance of a point at a time of the breath."""
+        if self.motion is None:
+            return self.shape.distance_at_mm(point_mm)
+        x, y, z = (a - b for a, b in zip(point_mm, self.motion.at_mm(clock_s), strict=True))
+        return self.shape.distance_at_mm((x, y, z))
 
     def grown(self, by_mm: float) -> Region:
         """The same region, larger on all sides by a length."""
@@ -222,6 +232,7 @@ class Scene:
         safety: ``sampled`` checks regions at the ends of model steps as the paper does;
             ``swept`` also on the arc between them.
         queries: Named queries besides the two of the paper.
+        breath: The breath with which regions move; None if all keep still.
     """
 
     name: str
@@ -237,6 +248,7 @@ class Scene:
     resolution_per_mm: int = 1000
     safety: Literal["sampled", "swept"] = "sampled"
     queries: tuple[NamedQuery, ...] = ()
+    breath: Breath | None = None
 
     def __post_init__(self) -> None:
         _require(
@@ -253,6 +265,11 @@ class Scene:
                     raise InputError(
                         f"`{region.name}` is a {region.kind} region among the {kind} regions"
                     )
+
+        period_s = None if self.breath is None else self.breath.period_s
+        for region in self.regions:
+            if region.motion is not None and region.motion.period_s != period_s:
+                raise InputError(f"`{region.name}` does not move with the period of the breath")
 
     @property
     def regions(self) -> tuple[Region, ...]:
@@ -277,6 +294,13 @@ class Scene:
         needle = replace(self.needle, tip=tip, radius_mm=radius_mm, length_mm=length_mm)
         is_free = self.limits.free_bevel and inserted_mm <= 0.0
         return replace(self, needle=needle, limits=replace(self.limits, free_bevel=is_free))
+
+    def at_clock(self, clock_s: float) -> Scene:
+        """The same scene with plans that begin at another time of the breath, if there is one."""
+        if self.breath is None:
+            return self
+        clock_s %= self.breath.period_s
+        return replace(self, breath=replace(self.breath, clock_s=clock_s))
 
     def with_targets(self, targets: Sequence[Region]) -> Scene:
         """The same scene with other targets: those that are still to be visited."""

@@ -15,14 +15,15 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "ntagen"
 
-BASE = {"errors", "hardware", "parameters", "rules", "scene", "shapes", "units"}
+BASE = {"errors", "hardware", "motion", "parameters", "rules", "scene", "shapes", "units"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "errors": set(),
     "units": set(),
     "rules": {"units"},
-    "scene": {"errors", "rules", "shapes"},
+    "scene": {"errors", "motion", "rules", "shapes"},
     "shapes": set(),
+    "motion": {"shapes"},
     "parameters": {"rules", "units"},
     "hardware": {"errors", "rules"},
     "imaging": {"cache", "errors", "files", "shapes"},

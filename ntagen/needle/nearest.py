@@ -46,7 +46,7 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
     best_mm, best_at_mm = shape.distance_at_mm(entry_mm), 0.0
     pieces, halves, owners, offsets = _pieces(arcs)
     while len(pieces):
-        distances = shape.distance_mm(_places(arcs, owners, pieces))
+        distances = shape.distance_mm(places_on(arcs, owners, pieces))
         least = int(np.argmin(distances))
         if distances[least] < best_mm:
             best_mm = float(distances[least])
@@ -111,7 +111,7 @@ def _pieces(arcs: Sequence[Arc]) -> tuple[_Array, _Array, NDArray[np.intp], _Arr
     return np.array(middles), np.array(halves), np.array(owners, dtype=np.intp), np.array(offsets)
 
 
-def _places(arcs: Sequence[Arc], owners: NDArray[np.intp], along: _Array) -> _Array:
+def places_on(arcs: Sequence[Arc], owners: NDArray[np.intp], along: _Array) -> _Array:
     """The places at some lengths along their arcs, as in `ntagen.needle.kinematics.push`."""
     starts = np.array([arc.start.position_mm for arc in arcs])[owners]
     headings = np.array([arc.start.heading for arc in arcs])[owners]

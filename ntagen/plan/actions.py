@@ -1,7 +1,7 @@
-"""A plan: the sequence of pushes and rolls that steers the needle.
+"""A plan: the sequence of pushes and rolls that steers the needle, and of waits between them.
 
 A plan is a value. Pushes that follow each other are one push, and no push is empty, so that two
-plans that move the needle in the same way are equal.
+plans that move the needle in the same way are equal. So are waits.
 """
 
 from __future__ import annotations
@@ -29,7 +29,14 @@ class Roll:
     angle_rad: float
 
 
-Action = Push | Roll
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """The needle rests for a time, while regions move with the breath."""
+
+    seconds: float
+
+
+Action = Push | Roll | Wait
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +53,20 @@ class Plan:
     def of(actions: Iterable[Action]) -> Plan:
         """The plan of these actions with neighbouring pushes merged and empty ones left out.
 
+        Waits too.
+
         Raises:
-            ValueError: A push is negative, or a number is not finite.
+            ValueError: A push or a wait is negative, or a number is not finite.
         """
         merged: list[Action] = []
         for action in actions:
             _require_possible(action)
-            if isinstance(action, Push) and merged and isinstance(merged[-1], Push):
-                merged[-1] = Push(merged[-1].length_mm + action.length_mm)
-            elif isinstance(action, Roll) or action.length_mm > 0.0:
+            last = merged[-1] if merged else None
+            if isinstance(action, Push) and isinstance(last, Push):
+                merged[-1] = Push(last.length_mm + action.length_mm)
+            elif isinstance(action, Wait) and isinstance(last, Wait):
+                merged[-1] = Wait(last.seconds + action.seconds)
+            elif isinstance(action, Roll) or _amount(action) > 0.0:
                 merged.append(action)
         return Plan(tuple(merged))
 
@@ -68,6 +80,11 @@ class Plan:
         """The number of rolls."""
         return sum(1 for action in self.actions if isinstance(action, Roll))
 
+    @property
+    def waits_s(self) -> float:
+        """How long the needle rests, in all its waits."""
+        return sum(action.seconds for action in self.actions if isinstance(action, Wait))
+
     def counted_rolls(self, limits: Limits) -> int:
         """The number of rolls; one that chooses a free bevel before the entry does not count."""
         is_free = limits.free_bevel and self.actions[:1] and isinstance(self.actions[0], Roll)
@@ -80,7 +97,7 @@ class Plan:
         for action in self.actions:
             if isinstance(action, Roll):
                 pose = roll(pose, action.angle_rad)
-            else:
+            elif isinstance(action, Push):
                 arcs.append(Arc(pose, needle.radius_mm, action.length_mm))
                 pose = arcs[-1].end
         return tuple(arcs)
@@ -91,7 +108,7 @@ class Plan:
         for action in self.actions:
             if isinstance(action, Roll):
                 pose = roll(pose, action.angle_rad)
-            else:
+            elif isinstance(action, Push):
                 pose = push(pose, needle.radius_mm, action.length_mm)
         return pose
 
@@ -99,13 +116,28 @@ class Plan:
         return ", ".join(_text(action) for action in self.actions) or "nothing to do"
 
 
+def _amount(action: Action) -> float:
+    """The number of an action: mm, rad or s."""
+    match action:
+        case Push():
+            return action.length_mm
+        case Roll():
+            return action.angle_rad
+        case Wait():
+            return action.seconds
+
+
 def _require_possible(action: Action) -> None:
-    number = action.length_mm if isinstance(action, Push) else action.angle_rad
-    if not math.isfinite(number) or (isinstance(action, Push) and number < 0.0):
+    number = _amount(action)
+    if not math.isfinite(number) or (not isinstance(action, Roll) and number < 0.0):
         raise ValueError(f"a needle cannot do {action}")
 
 
 def _text(action: Action) -> str:
-    if isinstance(action, Push):
-        return f"push {action.length_mm:g} mm"
-    return f"roll {deg_from_rad(action.angle_rad):.4g} deg"
+    match action:
+        case Push():
+            return f"push {action.length_mm:g} mm"
+        case Roll():
+            return f"roll {deg_from_rad(action.angle_rad):.4g} deg"
+        case Wait():
+            return f"wait {action.seconds:.6g} s"

@@ -8,6 +8,9 @@ on exact circles, also between the ends of steps. It shares no code with the eng
 Cost: one closed form for each arc and sphere, about 20 microseconds each; those of many spheres are
 computed together, in a tenth of that. Less than a millisecond for each other shape, but for an
 ellipsoid, which takes a few.
+
+Where regions move with the breath, the certificate follows the plan in time (`moving.py` beside
+this file).
 """
 
 from __future__ import annotations
@@ -15,11 +18,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ntagen.motion import Breath
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.nearest import enters_at, nearest_to
 from ntagen.needle.path import nearest_on_all
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Plan
+from ntagen.plan.moving import arrivals_in_time, center_at_mm, nearest_in_time, timeline
 from ntagen.scene import Region, RegionKind, Scene, Vector
 from ntagen.shapes import Sphere
 
@@ -69,6 +74,8 @@ class Certificate:
         end_distance_mm: The distance from there to the centre of the last target.
         length_mm: Total insertion.
         roll_count: Number of rolls that count; see `Plan.counted_rolls`.
+        keeps_gate: Whether all pushes are made while the gate of the breath is open.
+        seconds: How long pushes and waits take, where regions move.
     """
 
     clearances: tuple[Clearance, ...]
@@ -77,6 +84,8 @@ class Certificate:
     end_distance_mm: float
     length_mm: float
     roll_count: int
+    keeps_gate: bool = True
+    seconds: float = 0.0
 
     @property
     def critical_clearance_mm(self) -> float:
@@ -117,7 +126,7 @@ class Certificate:
         free = self.critical_clearance_mm > clearance_mm
         unfelt = self.detection_clearance_mm > detection_mm
         known = self.unexplored_clearance_mm > 0.0
-        return free and unfelt and known and self.target_depth_mm >= depth_mm
+        return free and unfelt and known and self.keeps_gate and self.target_depth_mm >= depth_mm
 
     def _smallest(self, kind: RegionKind) -> float:
         return min((c.distance_mm for c in self.clearances if c.kind == kind), default=math.inf)
@@ -125,6 +134,8 @@ class Certificate:
 
 def certify(plan: Plan, scene: Scene) -> Certificate:
     """The certificate of a plan that starts at the needle's pose in the scene."""
+    if scene.breath is not None:
+        return _certified_in_time(plan, scene, scene.breath)
     arcs = plan.arcs(scene.needle)
     entry_mm = scene.needle.tip.position_mm
     end_mm = arcs[-1].end.position_mm if arcs else entry_mm
@@ -136,6 +147,36 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
         end_distance_mm=distance(end_mm, last.center_mm) if last else 0.0,
         length_mm=plan.length_mm,
         roll_count=plan.counted_rolls(scene.limits),
+    )
+
+
+def _certified_in_time(plan: Plan, scene: Scene, breath: Breath) -> Certificate:
+    """The certificate where regions may move."""
+    needle = scene.needle
+    line, keeps_gate = timeline(plan, needle, breath)
+    unmoved = tuple(one for one in scene.avoided if one.motion is None)
+    near = iter(_clearances(plan.arcs(needle), needle.tip.position_mm, unmoved))
+    clearances = []
+    for one in scene.avoided:
+        if one.motion is None:
+            clearances.append(next(near))
+        else:
+            found = nearest_in_time(line, one, one.motion)
+            clearances.append(Clearance(one.name, one.kind, found.distance_mm, found.at_mm))
+    arrivals = arrivals_in_time(line, scene.targets, breath.clock_s)
+    return Certificate(
+        clearances=tuple(clearances),
+        arrivals=tuple(Arrival(one.name, at_mm, -away_mm) for one, at_mm, away_mm in arrivals),
+        end_mm=line.end_mm,
+        end_distance_mm=(
+            distance(line.end_mm, center_at_mm(scene.targets[-1], line.end_s))
+            if scene.targets
+            else 0.0
+        ),
+        length_mm=plan.length_mm,
+        roll_count=plan.counted_rolls(scene.limits),
+        keeps_gate=keeps_gate,
+        seconds=plan.length_mm / needle.speed_mm_per_s + plan.waits_s,
     )
 
 

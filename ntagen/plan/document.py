@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from ntagen.errors import InputError
-from ntagen.plan.actions import Action, Plan, Push, Roll
+from ntagen.plan.actions import Action, Plan, Push, Roll, Wait
 from ntagen.plan.certify import Certificate
 from ntagen.plan.rank import DEFAULT_RANKING, Candidate
 from ntagen.plan.synthesise import Margins
@@ -50,7 +50,7 @@ def document(
 
 
 def plan_to_json(plan: Plan) -> list[dict[str, float]]:
-    """The actions as objects ``{"push_mm": …}`` and ``{"roll_deg": …}``."""
+    """The actions as objects ``{"push_mm": …}``, ``{"roll_deg": …}`` and ``{"wait_s": …}``."""
     return [_action_to_json(action) for action in plan.actions]
 
 
@@ -71,6 +71,8 @@ def plan_from_json(actions: object) -> Plan:
 def _action_to_json(action: Action) -> dict[str, float]:
     if isinstance(action, Push):
         return {"push_mm": action.length_mm}
+    if isinstance(action, Wait):
+        return {"wait_s": action.seconds}
     return {"roll_deg": round(deg_from_rad(action.angle_rad), 9)}
 
 
@@ -80,8 +82,10 @@ def _action_from_json(action: object) -> Action:
             return Push(float(length_mm))
         case {"roll_deg": float() | int() as angle_deg}:
             return Roll(rad_from_deg(float(angle_deg)))
+        case {"wait_s": float() | int() as seconds}:
+            return Wait(float(seconds))
         case _:
-            raise InputError(f"unknown action {action!r}\nhint: use push_mm or roll_deg")
+            raise InputError(f"unknown action {action!r}\nhint: use push_mm, roll_deg or wait_s")
 
 
 def _certificate(certificate: Certificate) -> dict[str, Any]:

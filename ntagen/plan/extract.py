@@ -3,7 +3,8 @@
 It also asks the model whether it can make a plan that was not found by the engine.
 
 In the model, the User's edge with ``do_push!`` is a push of one model step. Its edge with
-``do_rotate!`` is a roll by the angle whose index the edge selects. All other edges (checks, the
+``do_rotate!`` is a roll by the angle whose index the edge selects, and that with ``do_wait!`` is a
+wait, which only models with moving regions have. All other edges (checks, the
 tissue's answers) are not actions of the needle.
 """
 
@@ -13,11 +14,12 @@ from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 
 from ntagen.errors import NtagenError
-from ntagen.plan.actions import Action, Plan, Push, Roll
+from ntagen.plan.actions import Action, Plan, Push, Roll, Wait
 from ntagen.scene import Scene
 
 _PUSH: Final = "do_push!"
 _ROLL: Final = "do_rotate!"
+_WAIT: Final = "do_wait!"
 _ANGLE_INDEX: Final = "angle_index"
 _CHECKER: Final = "Checker"
 _REACHED: Final = "Final_TR_Reached"
@@ -109,6 +111,8 @@ def _moves_of(plan: Plan, scene: Scene) -> list[tuple[str, int]]:
     for action in plan.actions:
         if isinstance(action, Push):
             moves += [(_PUSH, -1)] * round(action.length_mm / step_length_mm(scene))
+        elif isinstance(action, Wait):
+            moves += [(_WAIT, -1)] * round(action.seconds / _wait_s(scene))
         else:
             moves.append((_ROLL, scene.limits.roll_angles_rad.index(action.angle_rad)))
     return moves[::-1]
@@ -117,8 +121,8 @@ def _moves_of(plan: Plan, scene: Scene) -> list[tuple[str, int]]:
 def _decision(step: Step) -> tuple[str, int] | None:
     """What the User's edge of a move sends, with the index of the angle or -1."""
     for edge in step.edges:
-        if edge.sync == _PUSH:
-            return _PUSH, -1
+        if edge.sync in (_PUSH, _WAIT):
+            return edge.sync, -1
         if edge.sync == _ROLL:
             return _ROLL, edge.select.get(_ANGLE_INDEX, -1)
     return None
@@ -129,6 +133,13 @@ def step_length_mm(scene: Scene) -> float:
     return scene.needle.speed_mm_per_s * scene.limits.step_s
 
 
+def _wait_s(scene: Scene) -> float:
+    """The length of one wait of the model."""
+    if scene.breath is None:
+        raise NtagenError("the model waits, but in the scene nothing moves")
+    return scene.breath.wait_s
+
+
 def _plan(run: Run, scene: Scene) -> Plan:
     edges = (edge for step in run.steps for edge in step.edges)
     return Plan.of(action for edge in edges if (action := _action(edge, scene)) is not None)
@@ -137,6 +148,8 @@ def _plan(run: Run, scene: Scene) -> Plan:
 def _action(edge: Edge, scene: Scene) -> Action | None:
     if edge.sync == _PUSH:
         return Push(step_length_mm(scene))
+    if edge.sync == _WAIT:
+        return Wait(_wait_s(scene))
     if edge.sync != _ROLL:
         return None
     index = edge.select.get(_ANGLE_INDEX, -1)

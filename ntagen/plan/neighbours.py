@@ -45,7 +45,7 @@ class _Steps:
         for action in plan.actions:
             if isinstance(action, Push):
                 pushes[-1] += round(action.length_mm / step_length_mm(scene))
-            else:
+            elif isinstance(action, Roll):
                 pushes.append(0)
                 angles.append(scene.limits.roll_angles_rad.index(action.angle_rad))
         return _Steps(tuple(pushes), tuple(angles))
@@ -85,8 +85,10 @@ def neighbours(plan: Plan, scene: Scene) -> Iterator[Plan]:
     """The plans with one small change.
 
     A roll comes one step earlier or later, or by the next smaller or larger angle; or the plan is
-    one step shorter or longer.
+    one step shorter or longer. Where regions move there are none: they would meet other places.
     """
+    if scene.breath is not None:
+        return
     steps = _Steps.of(plan, scene)
     count = len(scene.limits.roll_angles_rad)
     changed: list[_Steps] = []

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from ntagen.errors import InputError
@@ -53,6 +53,7 @@ class Table:
     form: int
     count: int
     avoided: int
+    still: int
     columns: tuple[Column, ...]
 
 
@@ -74,11 +75,13 @@ class Solids:
         tables: By kind of shape, those that occur.
         targets: All targets, if one of them is no sphere; else none.
         samples: The table of distances of shapes from files, if there are any.
+        places: By region (`id`) its row in the tables of its kind.
     """
 
     tables: tuple[Table, ...] = ()
     targets: tuple[SolidTarget, ...] = ()
     samples: Samples | None = None
+    places: dict[int, int] = field(default_factory=dict)
 
     @property
     def direction_units(self) -> int:
@@ -87,8 +90,8 @@ class Solids:
 
     @property
     def is_avoided(self) -> bool:
-        """Whether plans must avoid one of the shapes."""
-        return any(table.avoided for table in self.tables)
+        """Whether plans must avoid one of the shapes, and it keeps still."""
+        return any(table.still for table in self.tables)
 
 
 def solids(
@@ -104,12 +107,13 @@ def solids(
     places: dict[int, int] = {}
     samples: Samples | None = None
     for form in FORMS:
-        mine = [region for region in avoided if isinstance(region.shape, form)]
+        all_mine = [region for region in avoided if isinstance(region.shape, form)]
+        unmoved = [region for region in all_mine if region.motion is None]
+        mine = unmoved + [region for region in all_mine if region.motion is not None]
         wanted = [region for region in targets if isinstance(region.shape, form)]
         if not mine and not wanted:
             continue
-        for number, target in enumerate(wanted):
-            places[id(target)] = len(mine) + number
+        places |= {id(region): number for number, region in enumerate([*mine, *wanted])}
         if form is Field:
             fields = [
                 (region, shape)
@@ -117,7 +121,7 @@ def solids(
                 if isinstance(shape := region.shape.placed(axes, (0, 0, 0)), Field)
             ]
             found, samples = field_rows(fields, scale)
-            tables.append(_field_table(found, len(mine), scale))
+            tables.append(_field_table(found, (len(mine), len(unmoved)), scale))
             continue
         rows = [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in mine]
         rows += [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in wanted]
@@ -125,13 +129,16 @@ def solids(
             Column(name, dims, note, tuple(Entry(make(row), row.note) for row in rows))
             for name, dims, note, make in _COLUMNS[form]
         )
-        tables.append(Table(_NAMES[form], FORMS.index(form) + 1, len(rows), len(mine), columns))
-    goals = tuple(_target(one, places, scale, axes) for one in targets) if places else ()
-    return Solids(tuple(tables), goals, samples)
+        number = FORMS.index(form) + 1
+        tables.append(Table(_NAMES[form], number, len(rows), len(mine), len(unmoved), columns))
+    if all(isinstance(target.shape, Sphere) for target in targets):
+        return Solids(tuple(tables), samples=samples, places=places)
+    goals = tuple(_target(one, places, scale, axes) for one in targets)
+    return Solids(tuple(tables), goals, samples, places)
 
 
-def _field_table(rows: Sequence[FieldRow], avoided: int, scale: int) -> Table:
-    """The table of fields."""
+def _field_table(rows: Sequence[FieldRow], avoided: tuple[int, int], scale: int) -> Table:
+    """The table of fields; so many of them are to be avoided, and so many of these keep still."""
 
     def column(name: str, dimensions: str, note: str, make: Callable[[FieldRow], str]) -> Column:
         entries = tuple(Entry(make(row), " ".join(row.region.name.split())) for row in rows)
@@ -156,7 +163,7 @@ def _field_table(rows: Sequence[FieldRow], avoided: int, scale: int) -> Table:
         column("side", "", "-1: samples are depths.", lambda r: "-1" if r.field.is_inner else "1"),
         column("rounding", "", _ROUNDING, lambda r: str(r.rounding)),
     )
-    return Table("FIELD", FORMS.index(Field) + 1, len(rows), avoided, columns)
+    return Table("FIELD", FORMS.index(Field) + 1, len(rows), *avoided, columns)
 
 
 def _target(

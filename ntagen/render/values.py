@@ -19,6 +19,7 @@ from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
+from ntagen.render.moving import Moving, moving, still
 from ntagen.render.solids import Solids, solids
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import Sphere
@@ -77,6 +78,7 @@ class ModelValues:
     sweep_margin: int
     only_plans: bool
     solids: Solids
+    moving: Moving | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,11 +137,13 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
     needle, limits = scene.needle, scene.limits
     tip = needle.tip
     _check_motion(scene)
+    tables = solids(scene.avoided, scene.targets, scale, frame)
+    breathing = moving(scene, tables.places, frame)
     dt, velocity_mm, unit_s = rules.time_units(limits.step_s, needle.speed_mm_per_s)
     return ModelValues(
         name=_one_line(scene.name),
         frame_note="" if _is_identity(frame) else "The scene was turned so that this is so.",
-        time_unit="1 s" if unit_s == 1.0 else f"one push: {unit_s:g} s",
+        time_unit=_time_unit(unit_s, breathing),
         scale=scale,
         dt=dt,
         velocity=writer.number(velocity_mm, "the insertion per unit of time"),
@@ -155,15 +159,23 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
         ),
         circle_radius=writer.number(needle.radius_mm, "the radius of the motion circle"),
         targets=writer.spheres(scene.targets),
-        criticals=writer.spheres(_balls(scene.criticals)),
-        detections=writer.spheres(_balls(scene.detections)),
-        unexplored=writer.spheres(_balls(scene.unexplored)),
+        criticals=writer.spheres(_balls(still(scene.criticals))),
+        detections=writer.spheres(_balls(still(scene.detections))),
+        unexplored=writer.spheres(_balls(still(scene.unexplored))),
         safe=writer.spheres(_balls(scene.safe)),
         swept=scene.safety == "swept",
         sweep_margin=_sweep_margin(scale, needle.radius_mm),
         only_plans=only_plans,
-        solids=solids(scene.avoided, scene.targets, scale, frame),
+        solids=tables,
+        moving=breathing,
     )
+
+
+def _time_unit(unit_s: float, breathing: Moving | None) -> str:
+    """One unit of the clocks, in words."""
+    if breathing is not None:
+        return breathing.unit
+    return "1 s" if unit_s == 1.0 else f"one push: {unit_s:g} s"
 
 
 def _balls(regions: Sequence[Region]) -> list[Region]:
