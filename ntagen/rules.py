@@ -242,9 +242,25 @@ TIMES_PER_S: Final = 10_000
 """Times of models with moving regions are whole multiples of 1 / this of a second."""
 
 
+MAX_PAUSES: Final = 100
+"""A plan waits at most at this many places although it may push."""
+
+
+def pause_count(count: int) -> Breach | None:
+    """The number of pauses is one that the model counts."""
+    if 0 <= count <= MAX_PAUSES:
+        return None
+    return Breach("wait-wrong", f"the number of waits is {count}", f"use 0 to {MAX_PAUSES}")
+
+
+def rounded_time(time_s: float) -> Fraction:
+    """A time as a whole multiple of 0.1 ms, in s."""
+    return Fraction(round(time_s * TIMES_PER_S), TIMES_PER_S)
+
+
 def common_time(*times_s: float) -> Fraction:
     """The longest time of which all these are whole multiples, in s, after rounding to 0.1 ms."""
-    fractions = [Fraction(time_s).limit_denominator(TIMES_PER_S) for time_s in times_s]
+    fractions = [rounded_time(time_s) for time_s in times_s]
     denominator = math.lcm(*(one.denominator for one in fractions))
     numerator = math.gcd(*(int(one * denominator) for one in fractions))
     return Fraction(numerator, denominator)

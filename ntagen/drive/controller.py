@@ -57,12 +57,12 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
 from ntagen.drive.supervisor import Guard, Supervisor
-from ntagen.errors import DeviceError, LimitError
+from ntagen.errors import DeviceError, InputError, LimitError
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
-from ntagen.plan.actions import Plan, Push, Roll
+from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.plan.certify import certify
 from ntagen.plan.rank import Candidate, reserve_of
 from ntagen.plan.synthesise import Synthesis, Synthesiser
@@ -101,6 +101,8 @@ class Controller:
         supervisor: Supervisor | None = None,
         agree: Callable[[str], None] = lambda _: None,
     ) -> None:
+        if scene.breath is not None:
+            raise InputError("the driver does not drive through moving regions yet")
         self._settings = settings
         self._journal = journal
         self._supervisor = supervisor or Supervisor()
@@ -109,7 +111,7 @@ class Controller:
         self._learner = Learner(scene, settings, self._needle, journal)
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
-        self._moves: deque[tuple[Push | Roll, Pose]] = deque()
+        self._moves: deque[tuple[Action, Pose]] = deque()
         self._reviewed_mm = 0.0
         self._rest: Plan | None = None
         self._predicted: Pose = scene.needle.tip
@@ -402,12 +404,12 @@ class Controller:
         self._follow(synthesis.scene, best.plan)
         self._reviewed_mm = self._needle.depth_mm
 
-    def _act(self, action: Push | Roll) -> None:
+    def _act(self, action: Action) -> None:
         """Makes a move, at whose end the tip is predicted."""
         if isinstance(action, Roll):
             self._is_short = False
             self._needle.roll(action.angle_rad)
-        else:
+        elif isinstance(action, Push):
             self._push(action.length_mm, self._predicted)
 
     def _push(self, length_mm: float, predicted: Pose) -> None:

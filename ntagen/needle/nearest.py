@@ -92,7 +92,7 @@ def _enters_bound_at(arc: Arc, shape: Shape) -> float | None:
     count = max(1, math.ceil(arc.length_mm / _SAMPLE_MM))
     along = np.linspace(0.0, arc.length_mm, count + 1)
     owners = np.zeros(count + 1, dtype=np.intp)
-    touched = np.flatnonzero(shape.distance_mm(_places([arc], owners, along)) <= 0.0)
+    touched = np.flatnonzero(shape.distance_mm(places_on([arc], owners, along)) <= 0.0)
     return float(along[touched[0]]) if len(touched) else None
 
 

@@ -173,7 +173,7 @@ class Timeline:
     def shaft_nearest(self, shape: Shape, motion: Motion) -> Nearest:
         """The least distance of tip and shaft to a moving shape, and at which depth that is.
 
-        It is never too great, and too small by `TOLERANCE_MM` or a hundredth of it, if that is more.
+        Never too great; too small by `TOLERANCE_MM` or a hundredth of it, whichever is more.
         """
         arcs = [stage.arc for stage in self._stages]
         fields = self._boxes(motion)

@@ -19,6 +19,7 @@ from ntagen.nsl import build_devices
 from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, Placed
+from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus, times, unit
 from ntagen.parameters import Given
@@ -82,7 +83,8 @@ class _Builder:
         self._draft = draft
         self._reporter = reporter
         self._report = reporter.report
-        self._regions = Regions(draft, reporter)
+        self._motions = MotionBuilder(draft, reporter)
+        self._regions = Regions(draft, reporter, self._motions)
 
     def scene(self) -> Scene | None:
         """The scene, or None after an error."""
@@ -95,6 +97,7 @@ class _Builder:
             self._reporter.obeys(rules.query(name, query.value or ""), query.span)
         resolution = self._resolution()
         spheres = self._regions.spheres(needle)
+        breath = None if limits is None else self._motions.breath(limits)
         # The next rules compute squares, which are infinite for absurdly large values.
         if self._check_range(resolution or 1, tip, needle, limits, spheres):
             if tip is not None:
@@ -119,6 +122,7 @@ class _Builder:
             queries=tuple(
                 NamedQuery(name, query.value or "") for name, query in draft.queries.items()
             ),
+            breath=breath,
         )
 
     # ------------------------------------------------------------------------------ what must be
@@ -379,6 +383,8 @@ class _Builder:
             reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
             # A half-space has no end; only its point is in the model.
             extent = 0.0 if isinstance(region.shape, HalfSpace) else region.shape.reach_mm()
+            if region.motion is not None:
+                extent += region.motion.reach_mm
             yield f"`{region.name}`", reach + extent, sphere.place
 
 

@@ -14,12 +14,13 @@ from ntagen import rules
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.draft import Draft, DraftRegion
 from ntagen.nsl.images import ImageBuilder
+from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.solids import SolidBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus
 from ntagen.nsl.wording import article
 from ntagen.scene import Needle, Pose, Region, Vector
-from ntagen.shapes import Sphere, is_in, overlap, thickness_mm
+from ntagen.shapes import UPRIGHT, Shape, Sphere, is_in, overlap, thickness_mm
 
 if TYPE_CHECKING:
     from ntagen.imaging.grid import Wish
@@ -45,8 +46,9 @@ class PlacedRegion:
 class Regions:
     """Applies the rules to the regions of one draft."""
 
-    def __init__(self, draft: Draft, reporter: Reporter) -> None:
+    def __init__(self, draft: Draft, reporter: Reporter, motions: MotionBuilder) -> None:
         self._draft = draft
+        self._motions = motions
         self._reporter = reporter
         self._report = reporter.report
         self._solids = SolidBuilder(reporter)
@@ -128,7 +130,10 @@ class Regions:
     def _own(self, draft: DraftRegion) -> Region | None:
         """A region with its own geometry; it is made once, since others may lie around it."""
         if draft.name not in self._made:
-            self._made[draft.name] = self._sphere(draft)
+            made = self._sphere(draft)
+            if made is not None:
+                made = replace(made, motion=self._motions.motion(draft))
+            self._made[draft.name] = made
         return self._made[draft.name]
 
     def _sphere(self, draft: DraftRegion) -> Region | None:
@@ -179,7 +184,9 @@ class Regions:
             draft.margin.span,
         ):
             return None
-        return Region(draft.name, draft.kind, shape, region.name)
+        # A shell moves with what it lies around.
+        motion = region.motion if draft.moves is None else self._motions.motion(draft)
+        return Region(draft.name, draft.kind, shape, region.name, motion)
 
     def _critical_inside(self, draft: DraftRegion) -> DraftRegion | None:
         """The critical region that a detection region is written around."""
@@ -238,7 +245,9 @@ class Regions:
     def _check_safe(self, safe: PlacedRegion, other: PlacedRegion) -> None:
         """A safe region should not reach into what plans avoid; a shell around it is no matter."""
         one, two = safe.region, other.region
-        if two.kind == "detection" or not overlap(one.shape, two.shape):
+        if two.kind == "detection":
+            return
+        if not any(overlap(a, b) for a, b in _together(one, two)):
             return
         self._report(
             "safe-overlaps",
@@ -254,6 +263,8 @@ class Regions:
         offset = minus(region.center_mm, tip.position_mm)
         ahead = dot(offset, tip.heading)
         reach_mm = region.shape.reach_mm()
+        if region.motion is not None:
+            reach_mm += region.motion.reach_mm
         if ahead + reach_mm < 0.0:
             self._report(
                 "target-behind-needle",
@@ -261,7 +272,7 @@ class Regions:
                 f"`{region.name}` lies {-ahead - reach_mm:.3g} mm behind the needle's tip",
                 hint="move it along the heading, or turn the heading round",
             )
-        elif is_in(region.shape, tip.position_mm):
+        elif is_in(_placed(region, 0.0), tip.position_mm):
             self._report(
                 "tip-in-target",
                 span,
@@ -274,10 +285,11 @@ class Regions:
         A region may reach into a target, as a vessel at the surface of a tumour does.
         """
         inner, outer = target.region, other.region
-        if not overlap(inner.shape, outer.shape):
+        if not any(overlap(a, b) for a, b in _together(inner, outer)):
             return
         notes = (f"the {outer.kind} region is at {other.place.place}",)
-        if thickness_mm(outer.shape, inner.shape) >= 0.0:
+        # A target that moves out of it can be reached then.
+        if all(thickness_mm(b, a) >= 0.0 for a, b in _together(inner, outer)):
             self._report(
                 "target-in-critical",
                 target.place,
@@ -285,7 +297,7 @@ class Regions:
                 hint="move one of the two, or make the target larger",
                 notes=notes,
             )
-        elif is_in(outer.shape, inner.center_mm):
+        elif all(is_in(b, a.center_mm) for a, b in _together(inner, outer)):
             self._report(
                 "target-overlaps",
                 target.place,
@@ -297,7 +309,7 @@ class Regions:
     def _check_start(self, tip: Pose, other: PlacedRegion) -> None:
         """The tip must not start in a critical region, and should not in a detection region."""
         region = other.region
-        if not is_in(region.shape, tip.position_mm):
+        if not is_in(_placed(region, 0.0), tip.position_mm):
             return
         self._report(
             "tip-in-critical" if region.kind == "critical" else "tip-in-detection",
@@ -315,3 +327,26 @@ def _corners(region: Region) -> Iterator[Vector]:
             for z in (low[2], high[2]):
                 if math.isfinite(x) and math.isfinite(y) and math.isfinite(z):
                     yield (x, y, z)
+
+
+_MOMENTS: Final = 16
+"""How regions that move lie to each other is looked at so often in a period."""
+
+
+def _together(one: Region, other: Region) -> Iterator[tuple[Shape, Shape]]:
+    """The shapes of two regions at moments of the breath; once if they keep their places."""
+    if one.motion == other.motion:
+        yield one.shape, other.shape
+        return
+    moving = one.motion or other.motion
+    period_s = 1.0 if moving is None else moving.period_s
+    for moment in range(_MOMENTS):
+        time_s = moment * period_s / _MOMENTS
+        yield _placed(one, time_s), _placed(other, time_s)
+
+
+def _placed(region: Region, time_s: float) -> Shape:
+    """The shape of a region where it is at a time of the breath."""
+    if region.motion is None:
+        return region.shape
+    return region.shape.placed(UPRIGHT, region.motion.at_mm(time_s))

@@ -7,6 +7,8 @@ it to the draft.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from ntagen.nsl import tree
@@ -15,6 +17,7 @@ from ntagen.nsl.draft import Draft, DraftRegion, Placed
 from ntagen.nsl.driving import DriverResolver, is_choice
 from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.image_content import ImageResolver
+from ntagen.nsl.moves import MovesResolver
 from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, SPEED, TIME
 from ntagen.nsl.solids import EXTENTS, SolidResolver
 from ntagen.nsl.wording import article
@@ -45,12 +48,19 @@ FREE: Final = "free"
 class ContentResolver:
     """Adds single statements to a draft."""
 
-    def __init__(self, reporter: Reporter, evaluator: Evaluator, driver: DriverResolver) -> None:
+    def __init__(
+        self,
+        reporter: Reporter,
+        evaluator: Evaluator,
+        driver: DriverResolver,
+        folders: Sequence[str],
+    ) -> None:
         self._reporter = reporter
         self._evaluator = evaluator
         self._driver = driver
         self._solids = SolidResolver(evaluator)
         self._images = ImageResolver(reporter, evaluator)
+        self._moves = MovesResolver(reporter, evaluator, folders)
 
     def add(
         self, statement: tree.Statement, scope: Scope, draft: Draft, *, is_in_loop: bool
@@ -65,6 +75,8 @@ class ContentResolver:
                 self._setting(statement, scope, draft)
             case tree.Roll():
                 self._roll(statement, scope, draft)
+            case tree.Wait() | tree.Gate():
+                self._moves.rest(statement, scope, draft)
             case tree.Choice():
                 self._choice(statement, draft)
             case tree.Parameter():
@@ -90,6 +102,8 @@ class ContentResolver:
             draft.has_gaps = True
             draft.broken_names.add(statement.name.identifier.text)
             return
+        if statement.moves is not None:
+            region = replace(region, moves=self._moves.moves(statement.moves, name, scope))
         if is_in_loop and not statement.name.indices:
             self._reporter.report(
                 "name-without-index",

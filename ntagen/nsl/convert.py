@@ -45,8 +45,8 @@ class TreeBuilder:
                 return tree.Include(span, self._text(parts[0]))
             case "region":
                 return self._region(node, span)
-            case "roll":
-                return self._roll(parts, span)
+            case "roll" | "wait" | "gate":
+                return self._moving(keyword, parts, span)
             case "tissue" | "safety":
                 return tree.Choice(span, keyword, self._identifier(parts[0]))
             case "resolution" | "transform":
@@ -81,10 +81,34 @@ class TreeBuilder:
 
     def _region(self, node: lark.Tree[lark.Token], span: Span) -> tree.Region:
         """A region with its shape."""
-        kind, name, shape = node.children
+        kind, name, shape, *rest = node.children
         keyword = cast("RegionKind", str(kind))
         shape = cast("lark.Tree[lark.Token]", shape)
-        return tree.Region(span, keyword, self._region_name(name), self._shape(shape))
+        moves = self._moves(cast("lark.Tree[lark.Token]", rest[0])) if rest else None
+        return tree.Region(span, keyword, self._region_name(name), self._shape(shape), moves)
+
+    def _moves(self, node: lark.Tree[lark.Token]) -> tree.Moves:
+        """How a region moves."""
+        span, parts = self._span(node), node.children
+        if node.data == "moves_as":
+            period = self.expression(parts[1])
+            return tree.Moves(span, period, path=self._text(parts[0]))
+        values = tuple(map(self.expression, parts))
+        if node.data == "moves_through":
+            places = tuple(zip(values[:-1:2], values[1:-1:2], strict=True))
+            return tree.Moves(span, values[-1], places=places)
+        way, towards, period, *phase = values
+        return tree.Moves(span, period, (way, towards), phase[0] if phase else None)
+
+    def _moving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
+        """How the needle rolls and waits, and when it may be pushed."""
+        if keyword == "roll":
+            return self._roll(parts, span)
+        if keyword == "gate":
+            return tree.Gate(span, self.expression(parts[0]), self.expression(parts[1]))
+        limits = [cast("lark.Tree[lark.Token]", part) for part in parts[1:]]
+        at_most = self.expression(limits[0].children[0]) if limits else None
+        return tree.Wait(span, self.expression(parts[0]), at_most)
 
     def _shape(
         self, node: lark.Tree[lark.Token]

@@ -174,6 +174,14 @@ KINDS: Final = _kinds(
     ("N108", "matrix-degenerate", "error", "A matrix of a file may only turn and move."),
     ("N109", "transform-missing", "error", "Imaging space needs a place in the needle's frame."),
     ("N110", "clause-misused", "error", "A region from such a file has no such clause."),
+    # Motions.
+    ("N120", "period-wrong", "error", "A motion repeats itself after some time."),
+    ("N121", "periods-differ", "error", "All regions move with one breath."),
+    ("N122", "motion-table-wrong", "error", "A table of a motion has times and displacements."),
+    ("N123", "motion-times-wrong", "error", "The times of a table increase within the period."),
+    ("N124", "gate-never-open", "error", "The gate must be open long enough for a push."),
+    ("N125", "nothing-moves", "error", "Waits and gates are about regions that move."),
+    ("N126", "wait-wrong", "error", "A wait takes some time, and waits can be counted."),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

@@ -35,6 +35,19 @@ class DraftSolid:
     turn: tuple[Placed[float], Placed[Vector]] | None = None
 
 
+@dataclass
+class DraftMoves:
+    """How a region moves: on a way, or through the places of a table."""
+
+    span: Span
+    period: Placed[float]
+    way: Placed[float] | None = None
+    towards: Placed[Vector] | None = None
+    phase: Placed[float] | None = None
+    is_table: bool = False
+    table: list[tuple[Placed[float], Placed[Vector]]] = field(default_factory=list)
+
+
 @dataclass(frozen=True, slots=True)
 class DraftImage:
     """A shape from a file.
@@ -94,6 +107,7 @@ class DraftRegion:
     solid: DraftSolid | None = None
     image: DraftImage | None = None
     made: Shape | None = None
+    moves: DraftMoves | None = None
 
     @property
     def margin(self) -> Placed[float]:
@@ -115,6 +129,10 @@ class Draft:
     roll_distance: Placed[float] | None = None
     choices: dict[str, str] = field(default_factory=dict)
     is_bevel_free: bool = False
+    wait: Placed[float] | None = None
+    max_pauses: Placed[int] | None = None
+    gate: tuple[Placed[float], Placed[float]] | None = None
+    gate_span: Span | None = None
     resolution: Placed[float] | None = None
     regions: dict[str, DraftRegion] = field(default_factory=dict)
     target_count: int = 0

@@ -37,7 +37,7 @@ _COMMENT_GAP: Final = 3
 _NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
 _NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
 _OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "RPAR", "RSQB"})
-_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT"}) | {
+_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT", "MOVES"}) | {
     *("BOX", "SIZE", "TURNED", "CAPSULE", "CYLINDER", "ELLIPSOID", "RADII", "HALFSPACE", "TOWARDS"),
     *("MESH", "SEGMENTATION", "MARKUPS", "SEGMENT", "POINT", "LABEL", "GRID"),
 }

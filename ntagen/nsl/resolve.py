@@ -38,6 +38,8 @@ _ONCE: Final = frozenset(
         "needle",
         "motion",
         "roll",
+        "wait",
+        "push",
         "resolution",
         "transform",
         "drive",
@@ -69,7 +71,7 @@ class _Resolver:
         self._folders = [os.path.realpath(folder) for folder in folders]
         self._evaluator = Evaluator(reporter)
         self._driver = DriverResolver(reporter, self._evaluator)
-        self._content = ContentResolver(reporter, self._evaluator, self._driver)
+        self._content = ContentResolver(reporter, self._evaluator, self._driver, self._folders)
         self._draft: Draft | None = None
         self._open_files: list[str] = []
         self._included: set[str] = set()

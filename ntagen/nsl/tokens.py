@@ -24,7 +24,8 @@ BlockKind = Literal["file", "environment", "needle", "motion", "for", "drive", "
 
 REGIONS: Final = frozenset({"target", "critical", "detection", "unexplored", "safe"})
 _NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed", "length"})
-_MOTION_ITEMS: Final = frozenset({"step", "roll"})
+_LATER_MOTION: Final = frozenset({"wait", "push"})
+_MOTION_ITEMS: Final = frozenset({"step", "roll"}) | _LATER_MOTION
 _BODY_ITEMS: Final = REGIONS | {
     "tissue",
     "resolution",
@@ -71,7 +72,10 @@ _SOLID_WORDS: Final = SOLIDS | {
     *("segment", "point", "label", "grid"),
 }
 
-RESERVED: Final = KEYWORDS | _OTHER_WORDS
+_MOVES_WORDS: Final = frozenset({"moves", "along", "every", "phase", "through", "after", "as"})
+_MOTION_WORDS: Final = _LATER_MOTION | {"only", "while", "phase", "between", "and"}
+
+RESERVED: Final = (KEYWORDS | _OTHER_WORDS) - _LATER_MOTION
 """All words that cannot be names because of the grammar."""
 
 BLOCKS: Final[dict[str, BlockKind]] = {
@@ -189,35 +193,76 @@ def _lex(
 
 
 def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
-    """The items, with the words of later shapes as names wherever they are none of these shapes.
+    """The items, with the words of later statements as names wherever they are none of these.
 
-    They are words only in a region, from the shape's word on, which is the first thing behind the
-    region's name; not in parentheses, and not where a value must begin.
+    The words of later shapes are words only in a region, from the shape's word on, which is the
+    first thing behind the region's name; those of a motion from `moves` on; and those of waits and
+    gates only in the braces of `motion`. All of them not in parentheses, and not where a value must
+    begin.
     """
     named: list[Token | Comment] = []
-    awaited, depth, is_solid, expects_value = "", 0, False, False
+    words = _Words()
     for item in items:
-        if not isinstance(item, Token):
-            named.append(item)
-            continue
-        depth += {"LPAR": 1, "LSQB": 1, "RPAR": -1, "RSQB": -1}.get(item.type, 0)
-        if item.type == "REGION_KIND":
-            awaited, depth, is_solid = "name", 0, False
-        elif item.type == "BRACE" or (item.text in KEYWORDS and item.text != "radius"):
-            awaited, is_solid = "", False
-        elif awaited == "name":
-            awaited = "shape"
-        elif awaited == "shape" and depth == 0 and item.type != "RSQB":
-            awaited, is_solid = "", item.text in SOLIDS
-        is_word = is_solid and depth == 0 and not expects_value
-        if item.text in _SOLID_WORDS and not is_word:
-            item = Token("NAME", item.text, item.span, item.line)
-        expects_value = item.type in ("SIGN", "SCALE", "RADIUS") or item.type in _SOLID_TERMINALS
+        if isinstance(item, Token):
+            item = words.named(item)
         named.append(item)
     return named
 
 
-_SOLID_TERMINALS: Final = frozenset(word.upper() for word in _SOLID_WORDS)
+class _Words:
+    """Knows which words are words of a statement at a place, going from token to token."""
+
+    def __init__(self) -> None:
+        self._awaited = ""
+        self._depth = 0
+        self._is_region = False
+        self._is_solid = False
+        self._is_moving = False
+        self._motion = ""
+        self._expects_value = False
+
+    def named(self, item: Token) -> Token:
+        """The next token, perhaps as a name."""
+        self._depth += {"LPAR": 1, "LSQB": 1, "RPAR": -1, "RSQB": -1}.get(item.type, 0)
+        self._enter(item)
+        is_free = self._depth == 0 and not self._expects_value
+        if item.text == "moves" and self._is_region and is_free and not self._awaited:
+            self._is_solid, self._is_moving = False, True
+        is_word = is_free and (
+            (self._is_solid and item.text in _SOLID_WORDS)
+            or (self._is_moving and item.text in _MOVES_WORDS)
+            or (self._motion == "in" and item.text in _MOTION_WORDS)
+        )
+        if item.text in _LATER_WORDS and not is_word:
+            item = Token("NAME", item.text, item.span, item.line)
+        # In a gate, `phase` is followed by another word.
+        is_gate = self._motion == "in" and item.type == "PHASE"
+        self._expects_value = item.type in _BEFORE_VALUE and not is_gate
+        return item
+
+    def _enter(self, item: Token) -> None:
+        """Notes where regions, shapes and the braces of `motion` begin and end."""
+        if item.type == "REGION_KIND":
+            self._awaited, self._depth = "name", 0
+            self._is_region, self._is_solid, self._is_moving = True, False, False
+        elif item.type == "BRACE" or (item.text in RESERVED & KEYWORDS and item.text != "radius"):
+            self._awaited = ""
+            self._is_region = self._is_solid = self._is_moving = False
+            if item.type == "BRACE":
+                self._motion = "in" if self._motion == "before" and item.text == "{" else ""
+                self._depth = 0
+            elif item.type == "MOTION":
+                self._motion = "before"
+        elif self._awaited == "name":
+            self._awaited = "shape"
+        elif self._awaited == "shape" and self._depth == 0 and item.type != "RSQB":
+            self._awaited, self._is_solid = "", item.text in SOLIDS
+
+
+_LATER_WORDS: Final = _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
+_BEFORE_VALUE: Final = frozenset(
+    word.upper() for word in (_SOLID_WORDS | _MOVES_WORDS) - {"moves"}
+) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "BETWEEN", "AND"}
 
 
 def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:

@@ -166,6 +166,27 @@ class Around:
 
 
 @dataclass(frozen=True, slots=True)
+class Moves:
+    """How a region moves: ``moves 12 mm along +z every 4 s phase 90 deg``, or through places.
+
+    Attributes:
+        span: Its words.
+        period: After this time it begins again.
+        way: Of a sinusoid, how far it goes, and in which direction.
+        phase: Of a sinusoid, by how much it is ahead.
+        places: Of a list, each displacement and its time.
+        path: Of a file, its path without the quotes.
+    """
+
+    span: Span
+    period: Expression
+    way: tuple[Expression, Expression] | None = None
+    phase: Expression | None = None
+    places: tuple[tuple[Expression, Expression], ...] = ()
+    path: Identifier | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Region:
     """A region of any kind."""
 
@@ -173,6 +194,7 @@ class Region:
     keyword: RegionKind
     name: RegionName
     shape: Sphere | Solid | Image | Around
+    moves: Moves | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,6 +244,26 @@ class Roll:
     at_most: tuple[Expression, ...]
     at_least: tuple[Expression, ...]
     keyword: Literal["roll"] = "roll"
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """``wait 0.5 s at most 2 times``."""
+
+    span: Span
+    length: Expression
+    at_most: Expression | None
+    keyword: Literal["wait"] = "wait"
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """``push only while phase between 200 deg and 340 deg``."""
+
+    span: Span
+    first: Expression
+    last: Expression
+    keyword: Literal["push"] = "push"
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,6 +401,8 @@ Statement = (
     | Query
     | Setting
     | Roll
+    | Wait
+    | Gate
     | Choice
     | Resolution
     | Transform

@@ -58,6 +58,9 @@ FORMS: Final = {
     "speed": "write for example `speed 1 mm/s`",
     "length": "write for example `length 150 mm`",
     "step": "write for example `step 2 s`",
+    "wait": "write for example `wait 0.5 s at most 2 times`",
+    "push": "write for example `push only while phase between 200 deg and 340 deg`",
+    "moves": "write for example `moves 12 mm along +z every 4 s phase 90 deg`",
     "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
     "tissue": "write `tissue static`",
     "resolution": "write for example `resolution 1000 per mm`",
@@ -90,9 +93,10 @@ def form_of(first: Token) -> str | None:
 
 
 def solid_in(words: Sequence[Token]) -> Token:
-    """The word of a shape besides the sphere in a statement; without one the first word."""
+    """The word of a motion in a statement, or of a shape besides the sphere; else the first."""
+    moves = (word for word in words if word.type == "MOVES")
     solids = (word for word in words if word.text in SOLIDS and word.type != "NAME")
-    return next(solids, words[0])
+    return next(moves, next(solids, words[0]))
 
 
 def describe(terminals: set[str]) -> str:

@@ -45,6 +45,11 @@ _MOST_LISTED: Final = 600
 _NARROW_MM: Final = 1.0
 """Less clearance than this is little: it is about what a phantom's needle errs in 20 mm."""
 
+_MOST_PAUSES: Final = 4
+
+_MOST_IN_TIME: Final = 200
+"""Where regions move, at most so many plans are listed: certificates in time take 10 ms each."""
+
 MOST_WHEN_NARROW: Final = 20_000
 """All plans are also listed in more sequences than usual, if the best plan is that near."""
 
@@ -106,11 +111,10 @@ class BestPlanSynthesiser:
             if known.is_narrow and is_listed:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
-                return self.engine(scene)
+                return self._listed(scene)
             if not known.candidates:
-                return replace(self.engine, max_plans=min(_MOST_TRIED, self.engine.max_plans))(
-                    scene
-                )
+                most = _MOST_TRIED if scene.breath is None else _MOST_IN_TIME
+                return replace(self.engine, max_plans=min(most, self.engine.max_plans))(scene)
         return Synthesis(
             scene=scene,
             model_xml=first.model_xml,
@@ -123,6 +127,14 @@ class BestPlanSynthesiser:
             # Without any plan nothing is left out.
             is_complete=not first.plans,
         )
+
+    def _listed(self, scene: Scene) -> Synthesis:
+        """All plans; where the needle may wait they are too many, so only the first ones."""
+        if scene.breath is None:
+            return self.engine(scene)
+        few = replace(self.engine, max_plans=min(self.engine.max_plans, _MOST_IN_TIME))
+        listed = few(scene)
+        return replace(listed, is_complete=listed.found < few.max_plans)
 
     def one(self, scene: Scene, *, keeps_strategy: bool = False) -> Listing:
         """At most one plan of a scene, whether it holds or not."""
@@ -259,7 +271,7 @@ class _Known:
 
 
 def sequences(scene: Scene) -> float:
-    """About how many sequences of rolls there are: each roll anywhere, by any angle.
+    """About how many sequences of rolls there are: each roll anywhere, by any angle; pauses too.
 
     It counts the steps that lead straight through the last target.
     """
@@ -270,7 +282,10 @@ def sequences(scene: Scene) -> float:
     steps = max(1.0, reach_mm / step_length_mm(scene))
     angles = max(1, len(scene.limits.roll_angles_rad))
     bevels = angles + 1 if scene.limits.free_bevel else 1
-    return float(bevels * (steps * angles) ** scene.limits.max_rolls)
+    # A plan with many rolls and pauses can be one of more than a number holds.
+    waits = 1.0 if scene.breath is None else scene.breath.period_s / scene.breath.wait_s
+    pauses = 0 if scene.breath is None else min(scene.breath.max_pauses, _MOST_PAUSES)
+    return float(bevels * (steps * angles) ** scene.limits.max_rolls) * (steps * waits) ** pauses
 
 
 def _gates(scene: Scene) -> list[Region]:

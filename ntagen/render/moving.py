@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Final
 
 from ntagen import rules
@@ -116,7 +115,7 @@ def moving(scene: Scene, places: dict[int, int], frame: Matrix) -> Moving | None
         return None
     unit_s = rules.common_time(breath.period_s, scene.limits.step_s, breath.wait_s)
     period, push, wait = (
-        round(Fraction(time_s).limit_denominator(rules.TIMES_PER_S) / unit_s)
+        round(rules.rounded_time(time_s) / unit_s)
         for time_s in (breath.period_s, scene.limits.step_s, breath.wait_s)
     )
     gate_from, gate_width = _gate(breath, period, push)
