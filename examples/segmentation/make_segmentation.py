@@ -66,7 +66,7 @@ def labels() -> np.ndarray:
     z = np.linspace(-34.0, 34.0, 41)
     vessel = np.stack([4.0 * np.sin(z / 9.0) - 1.0, 3.0 + 4.0 * np.cos(z / 14.0), z], axis=1)
     found[tube(seen, vessel, 3.2)] = SEGMENTS["vessel"]
-    offset = (seen - np.array([2.0, 28.0, 2.0])) / np.array([6.5, 5.5, 6.0])
+    offset = (seen - np.array([2.0, 29.0, 2.0])) / np.array([8.5, 7.5, 8.0])
     bumps = 1.0 + 0.12 * np.sin(4.0 * seen[..., 0] / 6.0) * np.cos(5.0 * seen[..., 2] / 6.0)
     found[np.linalg.norm(offset, axis=-1) <= bumps] = SEGMENTS["tumor"]
     return found

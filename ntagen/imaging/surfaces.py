@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 _ERROR_RATIO: Final = 0.1
 """The points of the surface are farther than the surface by this share of a step, at most."""
 
+_LEVELS: Final = (24.0, 6.0, 1.5, 0.0)
+"""Distances in steps: what is farther away than one of them is asked of ever fewer points."""
+
 _MOST_POINTS: Final = 3_000_000
 _MOST_PAIRS: Final = 2_000_000
 _SHIFTS: Final = ((1.37e-6, 2.71e-6), (-3.11e-6, 1.93e-6), (5.3e-6, -4.1e-6), (-7.7e-6, -6.1e-6))
@@ -124,24 +127,25 @@ def _distances(mesh: Mesh, grid: Grid) -> tuple[float, Points]:
     """
     import numpy as np
 
-    excess, cuts = _cuts(mesh, grid)
-    coarse = 6.0 * max(grid.steps_mm)
-    far = _cuts_for(mesh, grid, math.sqrt(2.0 * excess * coarse), excess)
+    excess = _excess(mesh, grid)
     places = np.stack(np.meshgrid(*map(grid.places, range(3)), indexing="ij"), axis=-1)
     places = places.reshape(-1, 3)
-    away = _nearest(_points(mesh, far), places)
-    is_near = away < coarse + excess
-    away[is_near] = _nearest(_points(mesh, cuts), places[is_near])
+    away, open_ = np.full(len(places), np.inf), np.arange(len(places))
+    for steps in _LEVELS:
+        least = steps * max(grid.steps_mm)
+        cuts = _cuts_for(mesh, grid, max(excess, math.sqrt(2.0 * excess * least)), excess)
+        away[open_] = _nearest(_points(mesh, cuts), places[open_])
+        open_ = open_[away[open_] < least + excess]
     return excess, away.reshape(grid.counts)
 
 
-def _cuts(mesh: Mesh, grid: Grid) -> tuple[float, NDArray[np.int64]]:
-    """How much farther than the surface the points are, at most, and how fine triangles are cut."""
+def _excess(mesh: Mesh, grid: Grid) -> float:
+    """How much farther than the surface its points may be, so that there are not too many."""
     excess = _ERROR_RATIO * min(grid.steps_mm)
     while True:
         cuts = _cuts_for(mesh, grid, excess, excess)
         if ((cuts + 1) * (cuts + 2) // 2).sum() <= _MOST_POINTS or (cuts == 1).all():
-            return excess, cuts
+            return excess
         excess *= 1.3
 
 

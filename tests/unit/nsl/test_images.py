@@ -481,6 +481,26 @@ def test_a_mistake_gets_one_message(name: str, tmp_path: Path) -> None:
     assert found.line == 4
 
 
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("target T1 sphere (2, -20, 4) mm radius 1 mm", "N076"),
+        ('unexplored U1 mesh "m.obj" in LPS mm grid 1 mm', "N080"),
+    ],
+)
+def test_what_lies_in_a_mesh_is_seen(line: str, code: str, tmp_path: Path) -> None:
+    """A target in a rib is an error; a tip in something unexplored is a warning."""
+    mesh()(tmp_path)
+    if code == "N076":
+        assert mistake(tmp_path, MESH, line).code == code
+        return
+    frame = anatomy.FRAME.replace(
+        "0, 0 mm), (0, 1, 0, 0 mm), (0, 0, 1, 0", "0, -2 mm), (0, 1, 0, 20 mm), (0, 0, 1, -4"
+    )
+    task = nsl.loads_task(environment(line, frame=frame), str(tmp_path / "e.nsl"))
+    assert [warning.code for warning in task.warnings] == [code]
+
+
 FRAMES: dict[str, tuple[str, str, str]] = {
     "scaled": (anatomy.FRAME.replace("(1, 0", "(1.01, 0"), "N108", "scales"),
     "mirrored": (anatomy.FRAME.replace("(1, 0", "(-1, 0"), "N108", "mirrors"),
