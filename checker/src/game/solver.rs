@@ -136,6 +136,11 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
+    /// Whether a guide says where to explore first.
+    pub(in crate::game) fn has_guide(&self) -> bool {
+        self.exploration.waiting.guide().is_some()
+    }
+
     /// Solves the game.
     ///
     /// # Errors
@@ -156,7 +161,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 break;
             }
             match self.next(turn, extent, watch)? {
-                Next::Expand(node) => self.expand(node)?,
+                Next::Expand(node) => {
+                    self.expand(node)?;
+                    let finds_losses = self.graph.symbolic.tuning().losing_untimed;
+                    if extent == Extent::Verdict && self.has_guide() && finds_losses {
+                        self.note_if_lost(node);
+                    }
+                }
                 Next::Compute => continue,
                 Next::Nothing => break,
                 Next::Stopped(reason) => return Ok(Solution::Stopped(reason)),
@@ -183,8 +194,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         let is_computed = is_dry || explored >= self.agenda.next_computation;
         if is_computed {
             // A guide waits for no computation: what it seeks next depends on what is won.
-            let is_delayed = self.graph.symbolic.tuning().delayed_zones
-                && self.exploration.waiting.guide().is_none();
+            let is_delayed = self.graph.symbolic.tuning().delayed_zones && !self.has_guide();
             self.agenda.next_computation = if is_delayed {
                 explored + explored / BETWEEN_COMPUTATIONS
             } else {

@@ -34,6 +34,9 @@ pub(crate) const RULES: [(Rule, Forced); 3] = [
     (Rule::Neutral, Forced::Neutral),
 ];
 
+/// No good guide, but one that changes the order.
+const GUIDE: &str = "v0";
+
 /// Networks with a goal, what is to be kept, and a seed.
 pub(crate) fn seeded_games() -> impl Strategy<Value = (Network, Formula, Formula, u64)> {
     (
@@ -117,6 +120,16 @@ fn compare(
                     expected,
                     tally,
                     || format!("{text}{query}\n{forced:?} {nodes:?} without strategy"),
+                )?;
+                let guided = Options {
+                    guide: Some(GUIDE.to_owned()),
+                    ..quick
+                };
+                compare::check(
+                    &try_ask(&mut model, &query, &guided),
+                    expected,
+                    tally,
+                    || format!("{text}{query}\n{forced:?} {nodes:?} with a guide"),
                 )?;
                 let answer = try_ask(&mut model, &query, &options);
                 compare::check(&answer, expected, tally, || {

@@ -16,6 +16,11 @@
 //! may be lost.
 //!
 //! As the graph grows, more nodes are lost, and each lost node stays lost.
+//!
+//! All of this is computed again when the graph has doubled. With a guide, that is too late: it
+//! leads on into a part of the game that one answer of the evader has just decided. So after each
+//! expansion, the new node and its predecessors are asked, as long as they turn out to be lost. This
+//! finds the same nodes but for those that lead to each other on cycles.
 
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, NONE};
@@ -44,7 +49,8 @@ impl Solver<'_, '_, '_> {
                 } = self.graph.edges[edge as usize];
                 edge = next_in;
                 let is_useful = self.seeker.owns(controllable)
-                    || self.may_stop(source) && !self.may_escape(source, &may_be_won);
+                    || self.may_stop(source)
+                        && !self.may_escape(source, |node| !may_be_won[node as usize]);
                 if is_useful
                     && !self.is_decided(source)
                     && !std::mem::replace(&mut may_be_won[source as usize], true)
@@ -68,6 +74,44 @@ impl Solver<'_, '_, '_> {
         is_open
     }
 
+    /// Notes that an expanded node is lost, if it is, and which of those before it are lost then.
+    pub(in crate::game) fn note_if_lost(&mut self, node: u32) {
+        let mut asked = vec![node];
+        while let Some(node) = asked.pop() {
+            if self.is_lost(node) || self.leads_to_a_win(node) {
+                continue;
+            }
+            let may_win = &mut self.exploration.may_win;
+            may_win.resize(self.graph.nodes.len().max(may_win.len()), true);
+            may_win[node as usize] = false;
+            let mut edge = self.graph.nodes[node as usize].first_in;
+            while edge != NONE {
+                let Edge {
+                    source, next_in, ..
+                } = self.graph.edges[edge as usize];
+                asked.push(source);
+                edge = next_in;
+            }
+        }
+    }
+
+    /// Whether a node is known to be lost.
+    fn is_lost(&self, node: u32) -> bool {
+        !self.may_win(node)
+            || self.is_decided(node) && matches!(self.won.win[node as usize], Win::Nothing)
+    }
+
+    /// Whether a node may be won, as far as it and its successors tell.
+    fn leads_to_a_win(&self, node: u32) -> bool {
+        let is_lost = |node| self.is_lost(node);
+        let is_forced = || self.may_stop(node) && !self.may_escape(node, is_lost);
+        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        self.may_win_here(node)
+            || edges.any(|edge| {
+                !is_lost(edge.target) && (self.seeker.owns(edge.controllable) || is_forced())
+            })
+    }
+
     /// Whether a node might be won at the last computation, or is newer than it.
     pub(in crate::game) fn may_win(&self, node: u32) -> bool {
         self.exploration
@@ -88,14 +132,14 @@ impl Solver<'_, '_, '_> {
 
     /// Whether the evader has a move that is possible everywhere in a node and leads to one that
     /// cannot be won, or may leave the move to the environment.
-    fn may_escape(&self, node: u32, may_be_won: &[bool]) -> bool {
+    fn may_escape(&self, node: u32, is_lost: impl Fn(u32) -> bool) -> bool {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         edges.any(|edge| {
             let is_own = self.seeker.owns(edge.controllable);
             edge.is_total
                 && !edge.is_leg
                 && (is_own && self.seeker == Player::Environment && self.forced == Forced::Neutral
-                    || !is_own && !may_be_won[edge.target as usize])
+                    || !is_own && is_lost(edge.target))
         })
     }
 

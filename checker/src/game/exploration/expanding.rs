@@ -90,6 +90,22 @@ impl Solver<'_, '_, '_> {
         if node == 0 || !self.graph.symbolic.tuning().relevance {
             return true;
         }
+        let Some(source) = self.open_predecessor(node) else {
+            return false;
+        };
+        // What lies behind a decided node is not relevant either, if this is the only way there.
+        let mut before = source;
+        while self.has_guide() && before != 0 && self.has_one_predecessor(before) {
+            match self.open_predecessor(before) {
+                Some(source) => before = source,
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// A predecessor of which more may be won.
+    fn open_predecessor(&self, node: u32) -> Option<u32> {
         let mut edge = self.graph.nodes[node as usize].first_in;
         while edge != NONE {
             let Edge {
@@ -97,18 +113,23 @@ impl Solver<'_, '_, '_> {
             } = self.graph.edges[edge as usize];
             let may_win = self.may_win(source);
             if may_win && !matches!(self.won.win[source as usize], Win::Everything) {
-                return true;
+                return Some(source);
             }
             edge = next_in;
         }
-        false
+        None
+    }
+
+    fn has_one_predecessor(&self, node: u32) -> bool {
+        let edge = self.graph.nodes[node as usize].first_in;
+        edge != NONE && self.graph.edges[edge as usize].next_in == NONE
     }
 
     /// What the parts do when a node was updated and is not won as a whole.
     pub(in crate::game) fn on_update(&mut self, node: u32) {
         if !self.exploration.schedule.is_running {
             self.choose(node);
-            if self.exploration.waiting.guide().is_some() {
+            if self.has_guide() {
                 // Zones are computed later, and the guide must not lead away from here meanwhile.
                 self.note_spoilers(node);
             }

@@ -27,7 +27,8 @@ impl Solver<'_, '_, '_> {
             if let Some(next) = self.next_by_prospects(turn, watch)? {
                 return Ok(next);
             }
-            if !self.may_win_untimed(has_reserve) {
+            let is_lost = !self.may_win(0) && !self.may_seeker_win();
+            if is_lost || !self.may_win_untimed(has_reserve) {
                 return Ok(Next::Nothing);
             }
         }
