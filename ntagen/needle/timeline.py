@@ -29,6 +29,8 @@ _RATIO: Final = 0.01
 """A distance of a shaft may also be too small by this part of it."""
 
 _FIRST_MM: Final = 4.0
+_BOUND_PIECE_MM: Final = 0.01
+"""Half of the shortest stretch that is looked at where distances are bounds, as for fields."""
 
 _Array = NDArray[np.float64]
 
@@ -121,7 +123,7 @@ class Timeline:
             middles, halves, owners = middles[is_open], 0.5 * halves[is_open], owners[is_open]
             middles = np.concatenate([middles - halves, middles + halves])
             halves, owners = np.tile(halves, 2), np.tile(owners, 2)
-        return Nearest(best_mm - TOLERANCE_MM - shape.error_mm, self.depth_mm(best_s))
+        return Nearest(best_mm - TOLERANCE_MM - shape.excess_mm, self.depth_mm(best_s))
 
     def tip_enters(self, shape: Shape, motion: Motion, since_s: float) -> float | None:
         """When the tip is first in a moving shape, not before a time; None if it never is.
@@ -152,6 +154,10 @@ class Timeline:
             times, owners = np.array([time_s]), np.array([number])
             return float(self._tip_distances(shape, motion, times, owners)[0])
 
+        # A distance that is a bound may change faster than the place, by its error.
+        is_bound = shape.error_mm > TOLERANCE_MM
+        slack_mm = shape.error_mm if is_bound else 0.0
+        least_mm = _BOUND_PIECE_MM if is_bound else 0.5 * TOLERANCE_MM
         start_s, end_s = stretch
         if away_mm(start_s) <= 0.0:
             return start_s
@@ -159,9 +165,9 @@ class Timeline:
         while waiting:
             at_s, half_s = waiting.pop()
             found_mm = away_mm(at_s)
-            if found_mm > half_s * speed_mm_per_s:
+            if found_mm > half_s * speed_mm_per_s + slack_mm:
                 continue
-            if half_s * speed_mm_per_s <= 0.5 * TOLERANCE_MM:
+            if half_s * speed_mm_per_s <= least_mm:
                 if found_mm <= 0.0:
                     return at_s
                 continue
@@ -206,7 +212,7 @@ class Timeline:
             sizes = fields[:, 1] + speed_mm_per_s * fields[:, 3]
             fields = _halved(fields[sizes > 0.5 * TOLERANCE_MM], speed_mm_per_s)
         tolerance_mm = max(TOLERANCE_MM, _RATIO * best_mm)
-        return Nearest(best_mm - tolerance_mm - shape.error_mm, best_at_mm)
+        return Nearest(best_mm - tolerance_mm - shape.excess_mm, best_at_mm)
 
     @property
     def _tip_speeds(self) -> _Array:

@@ -105,7 +105,8 @@ class Regions:
         for region in map(self._own, targets):
             if region is None:
                 return
-            ends = _corners(region)
+            moved_mm = 0.0 if region.motion is None else region.motion.reach_mm
+            ends = _corners(replace(region, shape=region.shape.grown(moved_mm)))
             depths += [dot(minus(end, needle.tip.position_mm), needle.tip.heading) for end in ends]
         self._depth_mm = max(0.0, *depths, 0.0) + _FIELD_MARGIN_MM
 
@@ -125,6 +126,10 @@ class Regions:
         depth_mm = math.inf if draft.kind == "target" else self._depth_mm
         space = Workspace(tip.position_mm, tip.heading, needle.length_mm, depth_mm)
         margin_mm = _FIELD_MARGIN_MM + max((0.0, *margins))
+        motion = self._motions.motion(draft)
+        if motion is not None:
+            # Seen from a shape that moves, the needle is farther around.
+            margin_mm += motion.reach_mm
         return Wish(space, margin_mm, is_inner=draft.kind == "target")
 
     def _own(self, draft: DraftRegion) -> Region | None:

@@ -14,6 +14,8 @@ from ntagen.errors import InputError
 from ntagen.imaging.grid import Wish, Workspace
 from ntagen.imaging.meshes import checked
 from ntagen.imaging.surfaces import field_of_mesh
+from ntagen.motion import Motion
+from ntagen.needle.timeline import Timeline
 from ntagen.plan.synthesise import EngineSynthesiser
 from ntagen.render import fields, render
 from ntagen.render.frame import model_frame
@@ -160,3 +162,20 @@ def test_lines_of_samples_are_made_once() -> None:
     render(scene)
     render(scene)
     assert fields._lines.cache_info().misses == 1
+
+
+def test_a_tip_enters_a_field_that_moves_when_dense_samples_say_so() -> None:
+    """A distance that is a bound may change faster than the place; no entry is passed over."""
+    field = block((0.0, -30.0, -10.0), 12.0, is_inner=True)
+    motion = Motion(4.0, (0.0, 0.0, 8.0))
+    tip = ONE_ROLL.needle.tip
+    line = Timeline(tip, 30.0, 1.0, 0.0)
+    line.push(tip, 40.0)
+    times = np.linspace(0.0, 40.0, 40_001)
+    angles = times / 30.0
+    tips = np.stack([0.0 * angles, -30.0 * np.sin(angles), -30.0 * (1.0 - np.cos(angles))], axis=1)
+    moved = 4.0 * (1.0 - np.cos(2.0 * np.pi * times / 4.0))
+    inside = field.distance_mm(tips - moved[:, None] * np.array([0.0, 0.0, 1.0])) <= 0.0
+    expected = float(times[np.argmax(inside)])
+    assert inside.any()
+    assert line.tip_enters(field, motion, 0.0) == pytest.approx(expected, abs=0.02)

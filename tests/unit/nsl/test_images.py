@@ -173,6 +173,30 @@ def test_segments_are_found_by_their_names(tmp_path: Path) -> None:
     assert dot.criticals[0].shape.volume_mm3() == pytest.approx(3.0)
 
 
+def test_segments_in_layers_are_found(tmp_path: Path) -> None:
+    """Segments that overlap have a layer each, as in files of Slicer."""
+    layers = np.stack([VOXELS == 1, VOXELS == 7]).astype(np.uint8)
+    path = tmp_path / "s.seg.nrrd"
+    anatomy.write_nrrd(path, layers, segments=[("tumor", 1), ("dot", 1)])
+    data = path.read_bytes().replace(b"space directions: ", b"space directions: none ")
+    data = data.replace(b"kinds: ", b"kinds: list ").replace(b"1_Layer:=0", b"1_Layer:=1")
+    path.write_bytes(data)
+    line = 'critical C1 segmentation "s.seg.nrrd" segment "{}" grid 1 mm'
+    for name, volume in (("tumor", 4 * 6 * 4), ("dot", 1)):
+        scene = load(tmp_path, line.format(name))
+        assert scene.criticals[0].shape.volume_mm3() == pytest.approx(volume)
+
+
+def test_a_mesh_that_moves_has_a_larger_grid(tmp_path: Path) -> None:
+    mesh()(tmp_path)
+    rest = load(tmp_path, MESH).criticals[0].shape
+    moving = load(tmp_path, MESH + " moves 6 mm along +z every 4 s").criticals[0]
+    assert isinstance(rest, Field)
+    assert isinstance(moving.shape, Field)
+    assert moving.motion is not None
+    assert moving.shape.extent_mm[2] == pytest.approx(rest.extent_mm[2] + 12.0)
+
+
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("name", ["s.nii", "s.nii.gz"])
 def test_nifti_is_in_ras(name: str, mirrored: bool, tmp_path: Path) -> None:
