@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.errors import DeviceError, Halted, InputError, NtagenError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 DEVICES: Final = "ntagen.devices"
 """The group of what moves a needle."""
@@ -24,14 +26,21 @@ TRACKERS: Final = "ntagen.trackers"
 """The group of what measures one."""
 
 
+def _entry_points(group: str) -> list[EntryPoint]:
+    """All plugins of a group. What reads the metadata of packages takes long to import."""
+    from importlib.metadata import entry_points
+
+    return list(entry_points(group=group))
+
+
 def names(group: str) -> tuple[str, ...]:
     """The names of all plugins of a group, sorted."""
-    return tuple(sorted({point.name for point in entry_points(group=group)}))
+    return tuple(sorted({point.name for point in _entry_points(group)}))
 
 
 def described(group: str) -> str:
     """All plugins of a group with their packages, for messages."""
-    points = sorted(entry_points(group=group), key=lambda point: point.name)
+    points = sorted(_entry_points(group), key=lambda point: point.name)
     return ", ".join(f"{point.name} ({package(point)})" for point in points) or "none"
 
 
@@ -46,7 +55,8 @@ def find(group: str, name: str) -> EntryPoint:
     Raises:
         InputError: There is none, or there are several.
     """
-    found = list({point.value: point for point in entry_points(group=group, name=name)}.values())
+    named = {point.value: point for point in _entry_points(group) if point.name == name}
+    found = list(named.values())
     if not found:
         raise InputError(
             f"no plugin '{name}' is installed\nhint: installed are: {described(group)}"

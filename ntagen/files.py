@@ -25,11 +25,11 @@ import re
 import secrets
 import stat
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, BinaryIO, Final, Literal
 
 from ntagen.errors import InputError
+from ntagen.values import dataclass
 
 MODEL_BYTES: Final = 256 * 2**20
 """The largest model or file of queries, as in the engine."""

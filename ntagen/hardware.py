@@ -6,10 +6,10 @@ The rooms of the devices make the connections; here are only the descriptions.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 from ntagen.errors import InputError
 from ntagen.rules import Breach
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,15 +6,15 @@ An environment (``.nsl``) is turned into a UPPAAL model first; the engine reads 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ntagen import checker
 from ntagen.checker import Model, OverflowRule
-from ntagen.checker.strategy import Strategy
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
+    from ntagen.checker.strategy import Strategy
     from ntagen.nsl import Task
 
 

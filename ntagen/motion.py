@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from ntagen.shapes import Vector
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

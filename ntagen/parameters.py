@@ -12,11 +12,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final, Literal
 
 from ntagen.rules import Breach
 from ntagen.units import BYTES_PER, MM_PER, N_PER, N_PER_MM, RAD_PER, RAD_PER_S, S_PER
+from ntagen.values import dataclass
 
 Kind = Literal[
     "length",

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
 from ntagen.units import deg_from_rad
+from ntagen.values import dataclass
 
 LARGEST_UNITS: Final = 2**28
 """The largest absolute value that a scene may put into the model, in units. The model adds and

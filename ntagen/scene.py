@@ -20,13 +20,14 @@ Each value is checked by the rules of `ntagen.rules` when it is made; a wrong on
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.motion import Breath, Motion
 from ntagen.shapes import Shape, Sphere
+from ntagen.values import dataclass
 
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""

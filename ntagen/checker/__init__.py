@@ -3,8 +3,13 @@
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types. It
 works for any model and knows nothing of needles. `model` loads a model; `facts`, `picture` and
 `states` show what is in it. Queries have answers (`answer`) with runs (`runs`), strategies
-(`strategy`, `machine`) and plays against them (`play`).
+(`strategy`, `machine`) and plays against them (`play`). What only some answers need is imported
+when it is used.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from ntagen.checker.answer import Answer, Extreme, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
@@ -28,7 +33,9 @@ from ntagen.checker.options import (
     TraceWanted,
 )
 from ntagen.checker.query_form import QueryForm, form_of
-from ntagen.checker.states import Simulation, SymbolicState
+
+if TYPE_CHECKING:
+    from ntagen.checker.states import Simulation, SymbolicState
 
 __all__ = [
     "HEURISTICS",
@@ -59,3 +66,11 @@ __all__ = [
     "load",
     "load_file",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in ("Simulation", "SymbolicState"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from ntagen.checker import states
+
+    return getattr(states, name)

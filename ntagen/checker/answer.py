@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ntagen import _checker
 from ntagen.checker.edges import EdgeEntry, EnginePlan, step_of
 from ntagen.checker.errors import rejecting
-from ntagen.checker.machine import Machine
-from ntagen.checker.runs import Run, runs_of
-from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
+from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from ntagen.checker.machine import Machine
+    from ntagen.checker.runs import Run
+    from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 
@@ -121,6 +123,8 @@ class Answer:
         Empty without a trace, with ``trace=False``, and if no exact times were found (the end of
         `trace_text` says why).
         """
+        from ntagen.checker.runs import runs_of
+
         traces = self.trace_json()
         return () if traces is None else runs_of(json.loads(traces))
 
@@ -148,6 +152,8 @@ class Answer:
     @property
     def strategy(self) -> Strategy | None:
         """The strategy of the player who wins; ``None`` if none was asked for or found."""
+        from ntagen.checker.strategy import Strategy
+
         raw = _checker.Strategy.of_answer(self._raw)
         return None if raw is None else Strategy(raw, *self._rules)
 
@@ -157,6 +163,8 @@ class Answer:
 
         ``None`` if no strategy was asked for or found.
         """
+        from ntagen.checker.machine import Machine
+
         text = self._raw.strategy_json()
         return None if text is None or self.strategy is not None else Machine.from_json(text)
 

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ntagen.checker.picture.diagram import BranchPoint, Diagram, Edge, Location
+from ntagen.checker.queries import Query as Query
+from ntagen.checker.queries import queries_from as queries_from
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,22 +129,6 @@ class StateSize:
 
 
 @dataclass(frozen=True, slots=True)
-class Query:
-    """A query of a file.
-
-    Attributes:
-        text: Its formula.
-        comment: The comment of the query.
-        expect: The verdict that the file states, the number that ``sup`` or ``inf`` should give, or
-            ``None``.
-    """
-
-    text: str
-    comment: str
-    expect: str | float | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class ScalarSet:
     """A scalar set.
 
@@ -214,11 +200,6 @@ class Facts:
             state=StateSize(**found["state"]),
             queries=queries_from(found["queries"]),
         )
-
-
-def queries_from(entries: list[dict[str, Any]]) -> tuple[Query, ...]:
-    """The values of the engine's list of queries."""
-    return tuple(Query(**entry) for entry in entries)
 
 
 def _template(entry: dict[str, Any]) -> Template:

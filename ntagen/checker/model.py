@@ -7,31 +7,32 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ntagen import _checker
 from ntagen.checker.answer import Answer
 from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
-from ntagen.checker.facts import (
-    Channel,
-    Clock,
-    Facts,
-    Process,
-    Query,
-    ScalarSet,
-    StateSize,
-    Template,
-    Variable,
-    queries_from,
-)
 from ntagen.checker.options import CodeEngine, Options, by_keywords
+from ntagen.checker.queries import Query, queries_from
 from ntagen.checker.query_form import form_of
-from ntagen.checker.runs import Choose, Run, simulated
-from ntagen.checker.states import Simulation, SymbolicState, symbolic_states
-from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
 from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file, read_pieces
+
+if TYPE_CHECKING:
+    from ntagen.checker.facts import (
+        Channel,
+        Clock,
+        Facts,
+        Process,
+        ScalarSet,
+        StateSize,
+        Template,
+        Variable,
+    )
+    from ntagen.checker.runs import Choose, Run
+    from ntagen.checker.states import Simulation, SymbolicState
+    from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
 OverflowRule = Literal["wrap", "error"]
 
@@ -82,6 +83,8 @@ class Model:
     def facts(self) -> Facts:
         """The description of the model as one value."""
         if self._facts is None:
+            from ntagen.checker.facts import Facts
+
             self._facts = Facts.from_object(json.loads(self.facts_json()))
         return self._facts
 
@@ -264,6 +267,8 @@ class Model:
             RejectedError: The file is not a strategy, or does not fit the model.
             OSError: The file cannot be read.
         """
+        from ntagen.checker.strategy import Strategy
+
         data = read_file(os.fspath(path), EVIDENCE_BYTES)
         with rejecting():
             raw = _checker.Strategy.read(self._raw, os.fspath(path), data)
@@ -289,6 +294,8 @@ class Model:
         Raises:
             RejectedError: The text is none of these, or does not belong to this model.
         """
+        from ntagen.checker.strategy import Verification
+
         with rejecting():
             holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
         return Verification(holds, tuple(lines))
@@ -310,6 +317,8 @@ class Model:
             IndexError: `choose` returns a choice that is not possible.
             ModelError: The model has a run-time error.
         """
+        from ntagen.checker.runs import simulated
+
         with failing():
             return simulated(_checker.walk_exactly(self._raw), steps, seed, choose)
 
@@ -340,6 +349,8 @@ class Model:
             ModelError: The model fails in a state.
             KeyboardInterrupt: The user interrupted.
         """
+        from ntagen.checker.states import symbolic_states
+
         if any(one is not None and one < 0 for one in (limit, timeout_s, memory_bytes)):
             raise ValueError("a limit cannot be negative")
         with failing():
@@ -362,6 +373,8 @@ class Model:
         Raises:
             ModelError: The initial state cannot be computed.
         """
+        from ntagen.checker.states import Simulation
+
         with failing():
             return Simulation(_checker.simulate(self._raw, engine), self._edge_table())
 

@@ -10,11 +10,13 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Concatenate, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Concatenate, Literal, ParamSpec, TypeVar
 
-from ntagen.checker.strategy import ForcedRule, PriorityRule
+from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from ntagen.checker.strategy import ForcedRule, PriorityRule
 
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]

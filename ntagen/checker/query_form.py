@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen import _checker
+from ntagen.values import dataclass
 
 _GAMES: Final = ("control", "control_t*", "E<> control")
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.asked import Asked
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer

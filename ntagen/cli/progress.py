@@ -6,9 +6,9 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from ntagen.cli.terminal import echo
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,7 +70,8 @@ def opened_steppers(
         InputError: Axes, speeds or settings do not fit the controller.
         DeviceError: It is not ready to move.
     """
-    from ntagen.drive.real import overrun_mm, require_overrun
+    from ntagen.drive.fitting import overrun_mm
+    from ntagen.drive.real import require_overrun
     from ntagen.grbl.actuator import GrblActuator
     from ntagen.grbl.port import SerialPort
 
@@ -109,8 +110,9 @@ def opened_plugin(
         InputError: The settings do not fit the device.
         DeviceError: The plugin fails.
     """
+    from ntagen.drive.fitting import overrun_mm
     from ntagen.drive.plugin import open_device
-    from ntagen.drive.real import overrun_mm, require_overrun
+    from ntagen.drive.real import require_overrun
 
     with open_device(name, argument, speeds_for(needle, settings)) as actuator:
         ramp_mm_per_s2 = actuator.ramp_mm_per_s2

@@ -6,16 +6,17 @@ The command line wins over the file, and the file over the defaults. Each value 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Final
 
 from ntagen.drive.needles import Chosen, choose
 from ntagen.drive.reliance import with_default_margins
 from ntagen.drive.settings import STEERING, Settings, value_of, with_values
 from ntagen.errors import InputError
-from ntagen.needle.virtual import Errors
+from ntagen.needle.errors import Errors
 from ntagen.parameters import NEEDLE, PARAMETERS, Given, Parameter, Value
 from ntagen.scene import Scene
+from ntagen.values import dataclass
 
 COMMAND_LINE: Final = "command line"
 """The origin of a value that stands on the command line."""

@@ -22,11 +22,11 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
+from ntagen.values import dataclass
 
 _OVERSHOOT: Final = 1.166
 """The mean excess over the bound when it is passed, in standard deviations (Siegmund)."""

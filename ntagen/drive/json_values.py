@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-import msgspec
-
 Value = TypeVar("Value")
 
 
@@ -20,6 +18,9 @@ def value_from_json(document: object, kind: type[Value]) -> Value:
         ValueError: An entry is missing, is not known, or is of another kind.
         InputError: The value does not obey its own rules.
     """
+    # Only replays and resumed runs read values.
+    import msgspec
+
     try:
         value = msgspec.convert(document, kind)
     except (msgspec.ValidationError, RecursionError) as error:
@@ -31,4 +32,6 @@ def value_from_json(document: object, kind: type[Value]) -> Value:
 
 
 def _plain(value: object) -> object:
+    import msgspec
+
     return msgspec.json.decode(msgspec.json.encode(value))

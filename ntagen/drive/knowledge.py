@@ -16,10 +16,11 @@ same path for ever. No learned region is put over a channel that was cut safely,
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ntagen.drive.settings import Settings
+from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.errors import InputError
 from ntagen.needle.contact import Contact, ball_of
 from ntagen.needle.kinematics import Arc
@@ -49,23 +50,6 @@ _OUTSIDE_MM = 0.1
 def position_unsure_mm(settings: Settings) -> float:
     """How far the tip may be from where it seems to be, when a force is explained, in mm."""
     return min(_EXPLAINED_MM, _SURELY_KNOWN_MM + settings.priors.noise_mm)
-
-
-def shells_of(critical: Region, detections: Iterable[Region]) -> tuple[Region, ...]:
-    """The detection regions of a critical region: written around it, or containing it."""
-    return tuple(
-        shell
-        for shell in detections
-        if shell.around == critical.name or thickness_mm(shell.shape, critical.shape) >= 0.0
-    )
-
-
-def sensing_margin_mm(critical: Region, detections: Iterable[Region], otherwise_mm: float) -> float:
-    """The distance at which a critical region is felt: the depth of its thinnest shell."""
-    return min(
-        (thickness_mm(shell.shape, critical.shape) for shell in shells_of(critical, detections)),
-        default=otherwise_mm,
-    )
 
 
 def obstacles_of(scene: Scene, otherwise_mm: float) -> tuple[Obstacle, ...]:

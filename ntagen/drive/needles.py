@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
-from typing import Any, Final
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.drive.real import overrun_mm
+from ntagen.drive.fitting import overrun_mm, settings_for, settings_for_phantom
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import Maker, phantom, settings_for, settings_for_phantom, virtual
-from ntagen.drive.stepped import stepped
 from ntagen.errors import InputError
 from ntagen.extensions import DEVICES, described, names
-from ntagen.needle.phantom_parameters import PhantomParameters
-from ntagen.needle.virtual import Errors
+from ntagen.needle.errors import Errors
 from ntagen.plan.rank import ROBUST_RANKING
 from ntagen.scene import Scene
+from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from ntagen.drive.simulate import Maker
+    from ntagen.needle.phantom_parameters import PhantomParameters
 
 NAMES: Final = ("virtual", "phantom", "grbl+sim")
 """The simulated needles; the last is a phantom behind an emulated stepper controller."""
@@ -36,20 +38,31 @@ class Chosen:
 
     Attributes:
         name: Its name.
-        make: Makes it; None for a real needle.
         errors: The errors of the virtual needle.
         parameters: The parameters of the phantom needle; None for another one.
     """
 
     name: str
-    make: Maker | None
     errors: Errors
     parameters: PhantomParameters | None = None
 
     @property
     def is_real(self) -> bool:
         """Whether it is no simulation."""
-        return self.make is None
+        return self.name not in NAMES
+
+    @property
+    def make(self) -> Maker | None:
+        """Makes it; None for a real needle. What it takes is imported now."""
+        if self.is_real:
+            return None
+        from ntagen.drive.simulate import phantom, virtual
+        from ntagen.drive.stepped import stepped
+
+        if self.parameters is None:
+            return virtual(self.errors)
+        make = phantom(self.parameters)
+        return make if self.name == "phantom" else stepped(make)
 
     def usual(self, settings: Settings, scene: Scene) -> Settings:
         """The settings with which this needle is driven if nobody says otherwise."""
@@ -103,17 +116,17 @@ def choose(name: str, errors: Errors) -> Chosen:
     """
     kind, _, _ = name.partition(":")
     if kind == REAL:
-        return Chosen(name, None, errors)
+        return Chosen(name, errors)
     if name not in NAMES:
         if kind in names(DEVICES):
-            return Chosen(name, None, errors)
+            return Chosen(name, errors)
         raise InputError(
             f"there is no needle '{name}'\n"
             f"hint: choose from {', '.join(sorted(NAMES))}, grbl:PORT; installed plugins: "
             f"{described(DEVICES)}"
         )
     if name != "virtual":
-        parameters = PhantomParameters()
-        make = phantom(parameters)
-        return Chosen(name, make if name == "phantom" else stepped(make), errors, parameters)
-    return Chosen(name, virtual(errors), errors)
+        from ntagen.needle.phantom_parameters import PhantomParameters
+
+        return Chosen(name, errors, PhantomParameters())
+    return Chosen(name, errors)

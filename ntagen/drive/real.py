@@ -23,20 +23,6 @@ from ntagen.scene import Scene
 
 _SMALL_MM: Final = 1e-9
 
-_REACTION_S: Final = 0.07
-"""From a sample to the stop byte at most 20 ms; and GRBL has computed 50 ms of motion ahead."""
-
-_SLOWEST_RAMP_MM_PER_S2: Final = 10.0
-"""The acceleration that GRBL has if nobody sets another one."""
-
-
-def overrun_mm(
-    speed_mm_per_s: float, acceleration_mm_per_s2: float = _SLOWEST_RAMP_MM_PER_S2
-) -> float:
-    """How far a needle goes on after it was seen that it must stop: reaction, then v²/2a."""
-    v = speed_mm_per_s
-    return v * _REACTION_S + v * v / (2.0 * acceleration_mm_per_s2)
-
 
 def require_overrun(settings: Settings, needs_mm: float) -> None:
     """Refuses settings that count on a shorter overrun than the device has.

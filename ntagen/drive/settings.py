@@ -11,15 +11,16 @@ import dataclasses
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Final
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
-from ntagen.needle.estimate import Priors
+from ntagen.needle.priors import Priors
 from ntagen.parameters import NEEDLE, PARAMETERS, Value
 from ntagen.plan.rank import DEFAULT_RANKING, parse_ranking
 from ntagen.plan.synthesise import Margins
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,12 @@ import gc
 import importlib
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, Device, Sensor
-from ntagen.drive.force import fitting_spacing_mm
-from ntagen.drive.knowledge import obstacles_of, sensing_margin_mm, told
+from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
@@ -28,12 +27,6 @@ from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
 from ntagen.scene import Needle, Pose, Scene
 
 _NO_REGION_MM: Final = 1e9
-
-_DRIFT_RATIO: Final = 1.4
-"""The change of a fluctuation over 10 mm, relative to its standard deviation."""
-
-_TURN_MM: Final = 20.0
-"""The drift of the bend plane over 10 mm, as a length at the rate at which it turns."""
 
 
 class Simulated(Device, Protocol):
@@ -149,62 +142,6 @@ def simulate(
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
     )
-
-
-def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -> Settings:
-    """The settings that fit the virtual needle and the scene, as after a calibration.
-
-    The priors are at least the needle's errors. The sensing margin is that of the thinnest shell in
-    the scene. If the driver does not know all regions, pushes become so short that it feels a
-    region before it can pierce it.
-
-    Raises:
-        InputError: No push is short enough for that.
-    """
-    priors = replace(
-        settings.priors,
-        roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
-        noise_mm=max(settings.priors.noise_mm, errors.noise_mm),
-    )
-    otherwise_mm = settings.sensing_margin_mm
-    margins_mm = (
-        sensing_margin_mm(region, scene.detections, otherwise_mm) for region in scene.criticals
-    )
-    margin_mm = min([otherwise_mm, *margins_mm])
-    settings = replace(settings, priors=priors, sensing_margin_mm=margin_mm)
-    if known == "all" or not settings.force_sensing:
-        return settings
-    return settings.with_spacing(fitting_spacing_mm(settings, margin_mm, scene.needle.length_mm))
-
-
-def settings_for_phantom(
-    settings: Settings,
-    parameters: PhantomParameters,
-    scene: Scene,
-    known: str,
-) -> Settings:
-    """The settings that fit a phantom needle and the scene, as after a calibration.
-
-    The drifts were chosen on phantom runs, so that predictions 10 and 20 mm ahead err as much as
-    the estimator says (`tests/benchmarks/predictions.py`). If rolls are compensated, the spread of
-    the friction is left of the lag.
-
-    Raises:
-        InputError: No push is short enough to feel a hidden region before it is pierced.
-    """
-    sensing, torsion, shape = parameters.sensing, parameters.torsion, parameters.shape
-    turn_drift_rad = _DRIFT_RATIO * shape.turn_rad.std + _TURN_MM * shape.turn_rad_per_mm
-    spread_rad = torsion.lag_rad * torsion.spread_ratio
-    priors = replace(
-        settings.priors,
-        noise_mm=math.hypot(sensing.noise_mm, sensing.step_mm),
-        distortion_mm=sensing.distortion_mm.std,
-        curvature_drift=_DRIFT_RATIO * shape.curvature.std,
-        turn_drift_rad=turn_drift_rad,
-        lag_rad=math.hypot(spread_rad, torsion.lag_rad - settings.compensated_lag_rad),
-    )
-    calibrated = replace(settings, priors=priors, force_noise_n=sensing.noise_n)
-    return settings_for(calibrated, Errors(), scene, known)
 
 
 def synthesiser_for(

@@ -17,10 +17,10 @@ Cost: constant time for every function; the distance to a point is a closed form
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from ntagen.needle.vectors import add, combine, cross, distance, dot, scale, subtract, unit
 from ntagen.scene import Pose, Vector
+from ntagen.values import dataclass
 
 _TURN_RAD = 2.0 * math.pi
 _BISECTIONS = 60

@@ -3,30 +3,31 @@
 A signed distance changes by no more than the way along the path. So a piece of the path comes no
 nearer than the distance of its middle minus half of its length. Pieces that cannot hold the nearest
 place are dropped, and the others halved. For spheres there are closed forms
-(`ntagen.needle.kinematics`).
+(`ntagen.needle.kinematics`), and numpy is imported for other shapes only.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Final
 
 from ntagen.needle.kinematics import Arc, Nearest
 from ntagen.needle.path import nearest_on
 from ntagen.scene import Vector
 from ntagen.shapes import Shape, Sphere
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    _Array = NDArray[np.float64]
+
 TOLERANCE_MM: Final = 1e-3
 """A distance to a shape that is no sphere is at most this much too small, and never too great."""
 
 _FIRST_PIECE_MM: Final = 4.0
 _SAMPLE_MM: Final = 0.02
-
-_Array = NDArray[np.float64]
 
 
 def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
@@ -43,6 +44,8 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
     if isinstance(shape, Sphere):
         found = nearest_on(tuple(arcs), entry_mm, shape.middle_mm)
         return Nearest(found.distance_mm - shape.radius_mm, found.at_mm)
+    import numpy as np
+
     best_mm, best_at_mm = shape.distance_at_mm(entry_mm), 0.0
     pieces, halves, owners, offsets = _pieces(arcs)
     while len(pieces):
@@ -89,6 +92,8 @@ def enters_at(arc: Arc, shape: Shape) -> float | None:
 
 def _enters_bound_at(arc: Arc, shape: Shape) -> float | None:
     """The same for a shape whose distance is a bound, which may change faster than the place."""
+    import numpy as np
+
     count = max(1, math.ceil(arc.length_mm / _SAMPLE_MM))
     along = np.linspace(0.0, arc.length_mm, count + 1)
     owners = np.zeros(count + 1, dtype=np.intp)
@@ -98,6 +103,8 @@ def _enters_bound_at(arc: Arc, shape: Shape) -> float | None:
 
 def _pieces(arcs: Sequence[Arc]) -> tuple[_Array, _Array, NDArray[np.intp], _Array]:
     """The middles of pieces, from the start of their arcs; half lengths, arcs and their starts."""
+    import numpy as np
+
     middles, halves, owners, offsets = [], [], [], []
     start_mm = 0.0
     for number, arc in enumerate(arcs):
@@ -113,6 +120,8 @@ def _pieces(arcs: Sequence[Arc]) -> tuple[_Array, _Array, NDArray[np.intp], _Arr
 
 def places_on(arcs: Sequence[Arc], owners: NDArray[np.intp], along: _Array) -> _Array:
     """The places at some lengths along their arcs, as in `ntagen.needle.kinematics.push`."""
+    import numpy as np
+
     starts = np.array([arc.start.position_mm for arc in arcs])[owners]
     headings = np.array([arc.start.heading for arc in arcs])[owners]
     bevels = np.array([arc.start.bevel for arc in arcs])[owners]

@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ntagen.needle.kinematics import Arc, Nearest, circle_center, roll
 from ntagen.scene import Pose, Vector
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     import numpy as np

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+
+from ntagen.values import dataclass
 
 _LAG_DEPTH_MM = 100.0
 """The depth for which `Priors.lag_rad` is given."""

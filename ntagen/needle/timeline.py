@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -24,6 +23,7 @@ from ntagen.needle.kinematics import Arc, Nearest
 from ntagen.needle.nearest import TOLERANCE_MM, places_on
 from ntagen.scene import Pose, Vector
 from ntagen.shapes import Shape
+from ntagen.values import dataclass
 
 _RATIO: Final = 0.01
 """A distance of a shaft may also be too small by this part of it."""

@@ -12,13 +12,14 @@ It never reads a clock or waits: motions take simulated time on the clock that i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from ntagen.errors import DeviceError
-from ntagen.needle.kinematics import Arc, orthonormal, roll
+from ntagen.needle.errors import Errors as Errors
+from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.nearest import nearest_to
 from ntagen.needle.path import Path
@@ -63,29 +64,6 @@ class Obstacle:
     def depth_in_margin_mm(self, point_mm: Vector) -> float:
         """How deep a point lies in the margin; 0 outside."""
         return max(0.0, self.margin_mm - self.region.distance_mm(point_mm))
-
-
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """The errors of the virtual needle.
-
-    Attributes:
-        noise_mm: The standard deviation of each coordinate of a measured position.
-        roll_rad: The standard deviation of each roll.
-        radius_mm: The true radius of the motion circle; None if it is that of the scene.
-        bevel_rad: The angle about the heading from the bevel of the scene to the true one.
-    """
-
-    noise_mm: float = 0.0
-    roll_rad: float = 0.0
-    radius_mm: float | None = None
-    bevel_rad: float = 0.0
-
-    def true_needle(self, needle: Needle) -> Needle:
-        """The true needle, if this is the one that the scene describes."""
-        tip = orthonormal(roll(needle.tip, self.bevel_rad)) if self.bevel_rad else needle.tip
-        radius_mm = needle.radius_mm if self.radius_mm is None else self.radius_mm
-        return replace(needle, tip=tip, radius_mm=radius_mm)
 
 
 class VirtualNeedle:

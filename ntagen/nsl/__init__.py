@@ -17,7 +17,6 @@ or a `SourceError`, nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
@@ -25,6 +24,7 @@ from ntagen.nsl.diagnostics import Diagnostic, Reporter, SourceError
 from ntagen.nsl.source import Source
 from ntagen.parameters import Given
 from ntagen.scene import Scene
+from ntagen.values import dataclass
 
 __all__ = [
     "Diagnostic",

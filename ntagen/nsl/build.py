@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Literal, cast
 
 from ntagen import rules
@@ -36,6 +36,7 @@ from ntagen.scene import (
 )
 from ntagen.shapes import HalfSpace
 from ntagen.units import deg_from_rad, rad_from_deg
+from ntagen.values import dataclass
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
 DEFAULT_HEADING: Final[Vector] = (0.0, -1.0, 0.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from ntagen import rules
@@ -21,6 +21,7 @@ from ntagen.nsl.vectors import dot, minus
 from ntagen.nsl.wording import article
 from ntagen.scene import Needle, Pose, Region, Vector
 from ntagen.shapes import UPRIGHT, Shape, Sphere, is_in, overlap, thickness_mm
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.imaging.grid import Wish

@@ -11,13 +11,13 @@ fix it. After an error no scene is made; after a warning it is.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 from ntagen.errors import InputError
 from ntagen.nsl.source import Span
 from ntagen.rules import Breach
+from ntagen.values import dataclass
 
 Severity = Literal["error", "warning"]
 

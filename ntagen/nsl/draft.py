@@ -5,7 +5,7 @@ A value with a mistake is None, and the mistake is reported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
 
 from ntagen.nsl.source import Span
@@ -13,6 +13,7 @@ from ntagen.nsl.tree import ImageForm, SolidForm
 from ntagen.parameters import Given
 from ntagen.scene import RegionKind, Vector
 from ntagen.shapes import Shape
+from ntagen.values import dataclass
 
 T = TypeVar("T")
 

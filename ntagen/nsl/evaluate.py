@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from ntagen.nsl import tree
@@ -27,6 +27,7 @@ from ntagen.nsl.quantity import (
     scalar,
 )
 from ntagen.nsl.source import Span
+from ntagen.values import dataclass
 
 CONSTANTS: Final = {
     "pi": scalar(math.pi),

@@ -7,7 +7,6 @@ import io
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -21,6 +20,7 @@ from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, TIME
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import times, unit
 from ntagen.scene import Limits, Vector
+from ntagen.values import dataclass
 
 COLUMNS: Final = ("time_s", "x_mm", "y_mm", "z_mm")
 """The columns of a file with a motion."""

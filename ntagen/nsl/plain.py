@@ -7,9 +7,9 @@ and every mistake.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final, cast
 
 from ntagen.nsl import tree
@@ -17,6 +17,7 @@ from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source, Span
 from ntagen.nsl.tokens import REGIONS, RESERVED, Token
 from ntagen.scene import RegionKind
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,18 +50,24 @@ _HEAD: Final = re.compile(
     re.MULTILINE,
 )
 _BODIES: Final = {
-    "sphere": re.compile(rf"{_VECTOR}[ \t]+radius[ \t]+{_VALUE}"),
-    "around": re.compile(rf"{_NAME}[ \t]+margin[ \t]+{_VALUE}"),
-    "box": re.compile(rf"{_VECTOR}[ \t]+size{_S}{_VECTOR}{_TURNED}"),
-    "capsule": re.compile(
+    "sphere": rf"{_VECTOR}[ \t]+radius[ \t]+{_VALUE}",
+    "around": rf"{_NAME}[ \t]+margin[ \t]+{_VALUE}",
+    "box": rf"{_VECTOR}[ \t]+size{_S}{_VECTOR}{_TURNED}",
+    "capsule": (
         rf"{_VECTOR}[ \t]+to{_S}{_VECTOR}[ \t]+radius[ \t]+{_VALUE}(?:[ \t]+to[ \t]+{_VALUE})?"
     ),
-    "cylinder": re.compile(rf"{_VECTOR}[ \t]+to{_S}{_VECTOR}[ \t]+radius[ \t]+{_VALUE}"),
-    "ellipsoid": re.compile(rf"{_VECTOR}[ \t]+radii{_S}{_VECTOR}{_TURNED}"),
-    "halfspace": re.compile(rf"{_VECTOR}[ \t]+towards[ \t]+{_SIDE}"),
+    "cylinder": rf"{_VECTOR}[ \t]+to{_S}{_VECTOR}[ \t]+radius[ \t]+{_VALUE}",
+    "ellipsoid": rf"{_VECTOR}[ \t]+radii{_S}{_VECTOR}{_TURNED}",
+    "halfspace": rf"{_VECTOR}[ \t]+towards[ \t]+{_SIDE}",
 }
 _TAIL: Final = re.compile(_NEXT)
 _VECTOR_GROUPS, _VALUE_GROUPS = 9, 3
+
+
+@functools.cache
+def _body(word: str) -> re.Pattern[str]:
+    """The pattern of what follows the word of a shape; few files need all of them."""
+    return re.compile(_BODIES[word])
 
 
 def plain_regions(source: Source) -> Iterator[PlainRegion]:
@@ -71,7 +78,7 @@ def plain_regions(source: Source) -> Iterator[PlainRegion]:
         return
     line, counted = 1, 0
     for head in _HEAD.finditer(text):
-        body = _BODIES[head[3]].match(text, head.end())
+        body = _body(head[3]).match(text, head.end())
         if body is None or head[2] in RESERVED or _TAIL.match(text, body.end()) is None:
             continue
         shape = _Reader(source, body).shape(head[3], head.start(3))

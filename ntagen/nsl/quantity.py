@@ -9,10 +9,11 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from typing import Final
 
 from ntagen.units import BYTES_PER, MM_PER, N_PER, RAD_PER, S_PER
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-from dataclasses import dataclass
 
 from ntagen.files import read_file
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
 from ntagen.nsl.source import MAX_SOURCE_BYTES, Source, Span
+from ntagen.values import dataclass
 
 
 def read_source(path: str, reporter: Reporter, included_at: Span | None = None) -> Source | None:

@@ -8,9 +8,11 @@ shown.
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Final, NamedTuple
+
+from ntagen.values import dataclass
 
 MAX_SOURCE_BYTES: Final = 1024 * 1024
 """Larger files are refused: 10,000 regions, one on each line, take about 0.6 MB."""

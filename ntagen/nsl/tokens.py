@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import functools
 import sys
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Literal, cast
 
 from ntagen.cache import cache_folder
 from ntagen.nsl.source import Source, Span
 from ntagen.parameters import BY_WORDS
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     import lark
@@ -123,7 +124,8 @@ def grammar() -> lark.Lark:
 
     Computing its tables takes longer than all other work on a file (about 80 ms). So lark stores
     them in the user's cache folder; it computes them again if the grammar or lark has changed, or
-    if the folder cannot be used.
+    if the folder cannot be used. Each grammar has a file of its own, so that two versions of this
+    program do not compute them again and again.
     """
     import lark
 
@@ -135,15 +137,16 @@ def grammar() -> lark.Lark:
         start=["statement", "outside"],
         propagate_positions=True,
         maybe_placeholders=False,
-        cache=_cache_file() or False,
+        cache=_cache_file(text) or False,
     )
 
 
-def _cache_file() -> str | None:
-    """The file with the grammar's tables; None if there is no cache folder."""
+def _cache_file(text: str) -> str | None:
+    """The file with the tables of a grammar; None if there is no cache folder."""
     folder = cache_folder()
     version = f"{sys.version_info[0]}.{sys.version_info[1]}"
-    return None if folder is None else str(folder / f"nsl-grammar-{version}.tables")
+    name = f"nsl-grammar-{version}-{zlib.crc32(text.encode()):08x}.tables"
+    return None if folder is None else str(folder / name)
 
 
 def tokenise(source: Source, known: Iterable[tuple[int, int, Token]] = ()) -> list[Token | Comment]:

@@ -6,11 +6,11 @@ only the syntax has been checked.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 from ntagen.nsl.source import Source, Span
 from ntagen.scene import RegionKind
+from ntagen.values import dataclass
 
 # ------------------------------------------------------------------------------------ expressions
 

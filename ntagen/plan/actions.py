@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from ntagen.needle.kinematics import Arc, push, roll
 from ntagen.scene import Limits, Needle, Pose
 from ntagen.units import deg_from_rad
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,6 @@ this file).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from ntagen.motion import Breath
 from ntagen.needle.kinematics import Arc
@@ -27,6 +26,7 @@ from ntagen.plan.actions import Plan
 from ntagen.plan.moving import arrivals_in_time, center_at_mm, nearest_in_time, timeline
 from ntagen.scene import Region, RegionKind, Scene, Vector
 from ntagen.shapes import Sphere
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,20 +9,26 @@ the breath.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from ntagen.motion import Breath, Motion
 from ntagen.needle.kinematics import Nearest, roll
 from ntagen.needle.nearest import nearest_to
-from ntagen.needle.timeline import Timeline
 from ntagen.needle.vectors import add
 from ntagen.plan.actions import Plan, Push, Wait
 from ntagen.scene import Needle, Region, Vector
+
+if TYPE_CHECKING:
+    from ntagen.needle.timeline import Timeline
 
 _STILL = Motion(1.0)
 
 
 def timeline(plan: Plan, needle: Needle, breath: Breath) -> tuple[Timeline, bool]:
     """The plan on the clock of the breath, and whether it pushes only while the gate is open."""
+    # It takes numpy, which still scenes do not need.
+    from ntagen.needle.timeline import Timeline
+
     line = Timeline(needle.tip, needle.radius_mm, needle.speed_mm_per_s, breath.clock_s)
     keeps_gate, pose = True, needle.tip
     for action in plan.actions:

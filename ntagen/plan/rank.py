@@ -13,13 +13,13 @@ and then it is often too late for another one.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen.errors import InputError
 from ntagen.plan.actions import Plan
 from ntagen.plan.certify import Certificate, certify
 from ntagen.scene import Scene
+from ntagen.values import dataclass
 
 USEFUL_CLEARANCE_MM: Final = 5.0
 """More clearance is not better: this is twice the error of a needle in a phantom (2 to 3 mm)."""

@@ -8,7 +8,7 @@ its steps, and with integers. Such a plan is refused; if no plan is left, there 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final, Protocol
 
 from ntagen.errors import LimitError, ModelError
@@ -17,6 +17,7 @@ from ntagen.plan.certify import Certificate
 from ntagen.plan.extract import extract, leads_to_target
 from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified, rank
 from ntagen.scene import Scene
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker import Model

@@ -14,7 +14,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen.errors import InputError
@@ -22,6 +21,7 @@ from ntagen.render.fixed_point import fixed_point
 from ntagen.rules import LARGEST_UNITS, table_fits
 from ntagen.scene import Region
 from ntagen.shapes import SAMPLES_PER_MM, Field
+from ntagen.values import dataclass
 
 _PLACE_UNITS: Final = 2
 _IN_A_LINE: Final = 24

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen import rules
@@ -21,6 +20,7 @@ from ntagen.render.frame import Matrix, turned
 from ntagen.render.solids import FORMS
 from ntagen.scene import Region, Scene
 from ntagen.shapes import HalfSpace, Sphere
+from ntagen.values import dataclass
 
 MOST_ROWS: Final = 240
 """There are at most so many rows of displacements."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.scene import Scene
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

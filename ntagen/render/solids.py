@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from ntagen.errors import InputError
@@ -19,6 +19,7 @@ from ntagen.render.frame import Matrix
 from ntagen.rules import units_of
 from ntagen.scene import Region, Vector
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
+from ntagen.values import dataclass
 
 DIRECTION_UNITS: Final = 2**28
 """The units of a direction's components: at most half of one is lost, 2e-9."""

@@ -13,7 +13,6 @@ The templates have the text and the arithmetic; this module makes every decision
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ntagen import rules
 from ntagen.errors import InputError
@@ -24,6 +23,7 @@ from ntagen.render.solids import Solids, solids
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import Sphere
 from ntagen.units import deg_from_rad
+from ntagen.values import dataclass
 
 MIN_ACTIONS = 10
 """The number of log entries in the paper (`MAX_ACT_COUNT`); there are more only if more rolls are

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from ntagen.shapes.shape import (
@@ -19,6 +19,7 @@ from ntagen.shapes.shape import (
     own_points,
     turned,
 )
+from ntagen.values import dataclass
 
 _LEAST_RATIO: Final = 1e-10
 """A point is moved away from the planes of symmetry by this share of the least radius."""

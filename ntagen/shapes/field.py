@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 from ntagen.shapes.shape import (
@@ -33,6 +33,7 @@ from ntagen.shapes.shape import (
     own_points,
     turned,
 )
+from ntagen.values import dataclass
 
 SAMPLES_PER_MM: Final = 1000
 """The unit of a sample, which is an integer of 32 bits."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ntagen.shapes.shape import Axes, Bounds, Points, Shape, Vector, along, around, moved
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from ntagen.shapes.shape import (
     UPRIGHT,
@@ -18,6 +18,7 @@ from ntagen.shapes.shape import (
     own_points,
     turned,
 )
+from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)

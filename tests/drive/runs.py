@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from ntagen.drive.fitting import settings_for
 from ntagen.drive.records import Record
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import Result, settings_for, simulate
+from ntagen.drive.simulate import Result, simulate
 from ntagen.needle.virtual import Errors
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Scene

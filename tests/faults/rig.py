@@ -14,12 +14,12 @@ from typing import TypeVar
 
 from ntagen.drive.configure import Configuration, configure
 from ntagen.drive.device import Sensor
-from ntagen.drive.knowledge import sensing_margin_mm
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.operator import Operator
 from ntagen.drive.outcome import Driven
 from ntagen.drive.real import drive
 from ntagen.drive.records import Ended, Journal, Journals
+from ntagen.drive.shells import sensing_margin_mm
 from ntagen.drive.simulate import Simulated, simulate, synthesiser_for
 from ntagen.drive.stepped import Stepped
 from ntagen.grbl.emulator import Emulator

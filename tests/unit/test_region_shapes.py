@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from ntagen import nsl
-from ntagen.drive.knowledge import Knowledge, sensing_margin_mm, shells_of, told
+from ntagen.drive.knowledge import Knowledge, told
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings
+from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.drive.supervisor import Guard
 from ntagen.drive.viewing import show_scene
 from ntagen.errors import InputError

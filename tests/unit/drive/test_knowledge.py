@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ntagen.drive.knowledge import Knowledge, sensing_margin_mm, shells_of, told
+from ntagen.drive.knowledge import Knowledge, told
 from ntagen.drive.settings import Settings
+from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.errors import InputError
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.vectors import distance

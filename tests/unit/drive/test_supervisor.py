@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from ntagen.drive.configure import configure
+from ntagen.drive.fitting import overrun_mm
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.outcome import Driven
 from ntagen.drive.reading import read_log
-from ntagen.drive.real import drive, overrun_mm, require_overrun
+from ntagen.drive.real import drive, require_overrun
 from ntagen.drive.records import Command, CutShort, Ended, Journals, Measured, Transition
 from ntagen.drive.replay import replay
 from ntagen.drive.settings import Settings
