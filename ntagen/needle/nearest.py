@@ -2,7 +2,7 @@
 
 A signed distance changes by no more than the way along the path. So a piece of the path comes no
 nearer than the distance of its middle minus half of its length. Pieces that cannot hold the nearest
-place are dropped, and the others halved. For spheres there are closed forms
+place are dropped, and the others cut. For spheres there are closed forms
 (`ntagen.needle.kinematics`), and numpy is imported for other shapes only.
 """
 
@@ -27,6 +27,9 @@ TOLERANCE_MM: Final = 1e-3
 """A distance to a shape that is no sphere is at most this much too small, and never too great."""
 
 _FIRST_PIECE_MM: Final = 4.0
+_PARTS: Final = 8
+"""A piece is cut into so many: fewer rounds cost less than more places in each."""
+
 _SAMPLE_MM: Final = 0.02
 
 
@@ -48,6 +51,7 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
 
     best_mm, best_at_mm = shape.distance_at_mm(entry_mm), 0.0
     pieces, halves, owners, offsets = _pieces(arcs)
+    places = (2.0 * np.arange(_PARTS) + 1.0) / _PARTS - 1.0
     while len(pieces):
         distances = shape.distance_mm(places_on(arcs, owners, pieces))
         least = int(np.argmin(distances))
@@ -55,10 +59,9 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
             best_mm = float(distances[least])
             best_at_mm = float(offsets[least] + pieces[least])
         is_open = distances - halves < best_mm - TOLERANCE_MM
-        pieces, halves = pieces[is_open], 0.5 * halves[is_open]
-        pieces = np.concatenate([pieces - halves, pieces + halves])
-        halves = np.concatenate([halves, halves])
-        owners, offsets = np.tile(owners[is_open], 2), np.tile(offsets[is_open], 2)
+        pieces = (pieces[is_open, None] + halves[is_open, None] * places).ravel()
+        halves = np.repeat(halves[is_open] / _PARTS, _PARTS)
+        owners, offsets = np.repeat(owners[is_open], _PARTS), np.repeat(offsets[is_open], _PARTS)
     return Nearest(best_mm - TOLERANCE_MM - shape.excess_mm, best_at_mm)
 
 
