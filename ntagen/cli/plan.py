@@ -97,7 +97,7 @@ def command(
     good as the last one), plans (as in the file of -o), is_final.
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
-    from ntagen.drive.simulate import synthesiser_for
+    from ntagen.drive.engine import engine_for
     from ntagen.nsl import load_task
     from ntagen.plan.anytime import best_plans
     from ntagen.plan.rank import parse_ranking
@@ -110,7 +110,7 @@ def command(
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
     settings = settings if criteria is None else replace(settings, ranking=criteria)
-    engine = replace(synthesiser_for(settings).inner.engine, ranking=settings.ranking)
+    engine = replace(engine_for(settings), ranking=settings.ranking)
     shown: Best | None = None
     for best in best_plans(
         task.scene, engine, clock=time.monotonic, count=count, budget_s=budget_s

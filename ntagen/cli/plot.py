@@ -114,7 +114,7 @@ def _of_scene(
     source: Path, shown: int, ranking: tuple[str, ...], include: tuple[Path, ...]
 ) -> Picture:
     from ntagen.drive.configure import configure
-    from ntagen.drive.simulate import synthesiser_for
+    from ntagen.drive.engine import engine_for
     from ntagen.nsl import load_task
     from ntagen.plan.anytime import synthesis_within
     from ntagen.plan.best_plan import MOST_WHEN_NARROW, sequences
@@ -124,7 +124,7 @@ def _of_scene(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
-    engine = synthesiser_for(settings).inner.engine
+    engine = engine_for(settings)
     engine = replace(engine, ranking=ranking or settings.ranking)
     if shown == 0:
         return picture_of_plans(task.scene, None, shown)

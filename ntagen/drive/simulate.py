@@ -12,6 +12,7 @@ from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, Device, Sensor
+from ntagen.drive.engine import engine_for
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
@@ -23,7 +24,7 @@ from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.plan.best_plan import BestPlanSynthesiser
-from ntagen.plan.synthesise import EngineSynthesiser, Synthesis, Synthesiser
+from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Needle, Pose, Scene
 
 _NO_REGION_MM: Final = 1e9
@@ -152,15 +153,7 @@ def synthesiser_for(
 ) -> TimedSynthesiser:
     """The synthesiser with the margins, the ranking and the budgets of the settings."""
     _load()
-    engine = EngineSynthesiser(
-        margins=settings.margins,
-        ranking=settings.ranking,
-        max_plans=settings.max_plans,
-        timeout_s=settings.engine_time_s,
-        memory_bytes=settings.engine_memory_bytes,
-        keeps_strategy=keeps_strategy,
-        listen=listen,
-    )
+    engine = engine_for(settings, listen, keeps_strategy=keeps_strategy)
     return TimedSynthesiser(BestPlanSynthesiser(engine))
 
 
