@@ -52,7 +52,7 @@ def models(entries: int) -> dict[str, str]:
     side = round(entries ** (1 / 3))
     rows, last = entries // 4, side - 1
     forms = {
-        "cube": (f"[{side}]" * 3, [side] * 3, f"T[i % {side}][{last}][{last}]"),
+        "cube": (f"[{side}]" * 3, [side] * 3, f"T[{last} - i % {side}][{last}][{last}]"),
         "index type": (f"[int[0, {entries - 1}]]", [entries], f"T[{entries - 1} - i]"),
         "rows of 4": (f"[{rows}][4]", [rows, 4], f"T[{rows - 1} - i][3]"),
     }
