@@ -5,7 +5,7 @@ It contains:
 * metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
 * attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
   (the true scene and its source), and for each synthesis ``rebuild-0001/scene.json``,
-  ``…/model.xml``, ``…/plans.json``, ``…/strategy.json.gz``;
+  ``…/model.xml`` (``…/model.xml.gz`` if it is large), ``…/plans.json``, ``…/strategy.json.gz``;
 * one channel ``/ntagen/…`` for each kind of record (`ntagen.drive.messages`), and the channels for
   viewers (`ntagen.drive.viewing`).
 
@@ -31,7 +31,7 @@ from mcap_protobuf.schema import register_schema
 
 from ntagen.drive.messages import KINDS, encode, message_class
 from ntagen.drive.records import Ended, JournalError, Learned, Record, Transition
-from ntagen.drive.scene_json import scene_from_json, scene_to_json
+from ntagen.drive.scene_json import samples_in, scene_from_json, scene_to_json
 from ntagen.drive.states import ABORTS, Event
 from ntagen.drive.viewing import (
     TOPICS,
@@ -56,6 +56,9 @@ STRATEGY: Final = "strategy.json.gz"
 
 _PLANS_LOGGED: Final = 200
 """At most this many plans of a synthesis are attached, the best first."""
+
+_LARGE_BYTES: Final = 2**20
+"""A model with more is packed: ``model.xml.gz``."""
 
 _ALARMS: Final = frozenset(event.value for event in (Event.FORCE, Event.DEVIATION, *ABORTS))
 
@@ -92,6 +95,7 @@ class Log:
         self._channels = {
             kind: self._channel(topic_of(kind), message_class(kind)) for kind in KINDS
         }
+        self._samples: dict[str, str] = {}
         self._actual = scene_from_json(attachments[ACTUAL]) if ACTUAL in attachments else None
         self._shaft: Shaft | None = None
         self._views = {topic: self._channel(topic, kind) for topic, kind in TOPICS.items()}
@@ -108,7 +112,9 @@ class Log:
 
     def started(self, scene: Scene) -> None:
         """Writes the a-priori scene."""
-        self._attach(SCENE, scene_to_json(scene).encode())
+        text = scene_to_json(scene)
+        self._samples = samples_in(text)
+        self._attach(SCENE, text.encode())
         for topic, message in show_scene(scene):
             self._show(topic, message)
         if self._actual is not None:
@@ -128,8 +134,15 @@ class Log:
         folder = f"rebuild-{number:04d}"
         best = synthesis.candidates[:_PLANS_LOGGED]
         plans = document(synthesis.scene, best, synthesis.ranking, synthesis.margins)
-        self._attach(f"{folder}/scene.json", scene_to_json(synthesis.scene).encode())
-        self._attach(f"{folder}/model.xml", synthesis.model_xml.encode(), "application/xml")
+        scene = scene_to_json(synthesis.scene, self._samples)
+        self._attach(f"{folder}/scene.json", scene.encode())
+        model = synthesis.model_xml.encode()
+        if len(model) < _LARGE_BYTES:
+            self._attach(f"{folder}/model.xml", model, "application/xml")
+        else:
+            # Tables of distances make models of megabytes.
+            packed = gzip.compress(model, compresslevel=1, mtime=0)
+            self._attach(f"{folder}/model.xml.gz", packed, "application/gzip")
         self._attach(f"{folder}/plans.json", json.dumps(plans).encode())
         if synthesis.strategy_json:
             # The strategy of the paper's task is 0.6 MB of JSON, and 40 KB packed.

@@ -28,7 +28,7 @@ from mcap.stream_reader import StreamReader
 from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, SCENE
 from ntagen.drive.messages import PACKAGE, decode
 from ntagen.drive.records import Record
-from ntagen.drive.scene_json import scene_from_json
+from ntagen.drive.scene_json import samples_in, scene_from_json
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
 from ntagen.files import open_file
@@ -97,10 +97,19 @@ class RunLog:
             raise InputError("the log has no settings of a run") from error
         return Settings.from_json(document)
 
+    def scene_of(self, number: int) -> Scene:
+        """The scene of a synthesis.
+
+        Raises:
+            InputError: The log has none.
+        """
+        return self._scene(f"rebuild-{number:04d}/scene.json")
+
     def _scene(self, name: str) -> Scene:
         if name not in self.attachments:
             raise InputError("the log has no scene\nhint: it was cut off before the run began")
-        return scene_from_json(self.attachments[name])
+        known = samples_in(self.attachments[SCENE]) if SCENE in self.attachments else {}
+        return scene_from_json(self.attachments[name], known)
 
 
 def read_log(path: Path) -> RunLog:

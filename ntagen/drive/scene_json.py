@@ -1,14 +1,19 @@
-"""A scene as exact JSON, for the log of a run."""
+"""A scene as exact JSON, for the log of a run.
+
+The samples of shapes from files are large, and many scenes of a log have the same ones. A shape
+names its samples by a digest, and each text has those that the first scene of the log has not.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Mapping
 from typing import Any, Final, cast
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
-from ntagen.imaging.store import from_entry, to_entry
+from ntagen.imaging.store import digest_of, from_entry, to_entry
 from ntagen.scene import Region, Scene
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
 
@@ -29,20 +34,43 @@ _SHAPES: Final[dict[str, type[Shape]]] = {
 """The shapes besides the sphere, which is written as centre and radius, as in earlier logs."""
 
 
-def scene_to_json(scene: Scene) -> str:
-    """The scene as a JSON text; floats keep all their digits."""
+def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
+    """The scene as a JSON text; floats keep all their digits.
+
+    Args:
+        scene: The scene.
+        known: Samples that are elsewhere, as `samples_in` gives them; they are left out.
+    """
+    samples: dict[str, str] = {}
     entries = dataclasses.asdict(scene)
     for kind in _KINDS:
         regions: tuple[Region, ...] = getattr(scene, kind)
-        entries[kind] = [_from_region(region) for region in regions]
+        entries[kind] = [_from_region(region, samples) for region in regions]
     for kind in _LATER_KINDS:
         if not entries[kind]:
             del entries[kind]
-    return json.dumps({"version": VERSION, "scene": entries}, indent=1)
+    document: dict[str, object] = {"version": VERSION, "scene": entries}
+    missing = {digest: text for digest, text in samples.items() if digest not in (known or {})}
+    if missing:
+        document["samples"] = missing
+    return json.dumps(document, indent=1)
 
 
-def scene_from_json(text: str | bytes) -> Scene:
+def samples_in(text: str | bytes) -> dict[str, str]:
+    """The samples in such a text by their digests; none if it is not one."""
+    try:
+        found = json.loads(text).get("samples", {})
+    except (AttributeError, ValueError, RecursionError):
+        return {}
+    return dict(found) if isinstance(found, dict) else {}
+
+
+def scene_from_json(text: str | bytes, known: Mapping[str, str] | None = None) -> Scene:
     """The scene of such a text.
+
+    Args:
+        text: The text.
+        known: Samples that it leaves out.
 
     Raises:
         InputError: The text is not a scene, or the scene breaks the rules.
@@ -55,7 +83,10 @@ def scene_from_json(text: str | bytes) -> Scene:
                 f"only version {VERSION}"
             )
         entries = {kind: [] for kind in _LATER_KINDS} | document["scene"]
-        regions = {kind: tuple(map(_to_region, entries[kind])) for kind in _KINDS}
+        samples = {**(known or {}), **document.get("samples", {})}
+        regions = {
+            kind: tuple(_to_region(entry, samples) for entry in entries[kind]) for kind in _KINDS
+        }
         rest = value_from_json(entries | {kind: [] for kind in _KINDS}, Scene)
         return dataclasses.replace(rest, **cast("Any", regions))
     except (AttributeError, KeyError, TypeError, ValueError, RecursionError) as error:
@@ -84,27 +115,35 @@ class _Solid:
     around: str | None = None
 
 
-def _from_region(region: Region) -> dict[str, object]:
+def _from_region(region: Region, samples: dict[str, str]) -> dict[str, object]:
     shape, around = region.shape, region.around
     if isinstance(shape, Sphere):
         ball = _Ball(region.name, region.kind, shape.middle_mm, shape.radius_mm, around)
         return dataclasses.asdict(ball)
     if isinstance(shape, Field):
-        entry = _Solid(region.name, region.kind, "field", to_entry(shape), around)
-        return dataclasses.asdict(entry)
+        values = to_entry(shape)
+        digest = digest_of(shape.samples)
+        samples[digest] = values["samples"]
+        values["samples"] = digest
+        entry = dataclasses.asdict(_Solid(region.name, region.kind, "field", values, around))
+        return entry
     form = next(form for form, kind in _SHAPES.items() if type(shape) is kind)
     measures = dataclasses.asdict(cast("Any", shape))
     return dataclasses.asdict(_Solid(region.name, region.kind, form, measures, around))
 
 
-def _to_region(entry: dict[str, object]) -> Region:
+def _to_region(entry: dict[str, object], samples: Mapping[str, str]) -> Region:
     if "form" not in entry:
         ball = value_from_json(entry, _Ball)
         sphere = Sphere(ball.center_mm, ball.radius_mm)
         return Region(ball.name, cast("Any", ball.kind), sphere, ball.around)
     solid = value_from_json(entry, _Solid)
     if solid.form == "field":
-        shape: Shape = from_entry(solid.shape)
+        digest = str(solid.shape["samples"])
+        field = from_entry({**solid.shape, "samples": samples[digest]})
+        if digest_of(field.samples) != digest:
+            raise ValueError("the samples of a shape are damaged")
+        shape: Shape = field
     else:
         shape = value_from_json(solid.shape, _SHAPES[solid.form])
     return Region(solid.name, cast("Any", solid.kind), shape, solid.around)

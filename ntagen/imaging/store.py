@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import dataclasses
+import functools
 import hashlib
 import json
 import zlib
@@ -44,8 +45,20 @@ def kept(key: object, make: Callable[[], Field]) -> Field:
 def to_entry(field: Field) -> dict[str, Any]:
     """A field as JSON has it: its samples are compressed, and written with letters and digits."""
     entry = dataclasses.asdict(field)
-    entry["samples"] = base64.b64encode(zlib.compress(field.samples, 6)).decode("ascii")
+    entry["samples"] = _packed(field.samples)
     return entry
+
+
+@functools.lru_cache(maxsize=32)
+def _packed(samples: bytes) -> str:
+    """Compressed samples; a driver writes the same ones again and again."""
+    return base64.b64encode(zlib.compress(samples, 6)).decode("ascii")
+
+
+@functools.lru_cache(maxsize=32)
+def digest_of(samples: bytes) -> str:
+    """A name for samples that no others have."""
+    return hashlib.sha256(samples).hexdigest()
 
 
 def from_entry(entry: dict[str, Any]) -> Field:

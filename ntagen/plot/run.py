@@ -8,7 +8,6 @@ from typing import Final
 
 from ntagen.drive.reading import RunLog
 from ntagen.drive.records import Ended, Measured, Synthesised, Truth
-from ntagen.drive.scene_json import scene_from_json
 from ntagen.errors import InputError
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
@@ -86,8 +85,9 @@ def _outcome(ended: Ended) -> str:
 
 def _last_scene(log: RunLog) -> Scene:
     """The scene that the driver knew at the last synthesis."""
-    scenes = sorted(name for name in log.attachments if name.endswith("/scene.json"))
-    return scene_from_json(log.attachments[scenes[-1]]) if scenes else log.scene
+    names = (name for name in log.attachments if name.endswith("/scene.json"))
+    numbers = sorted(int(name.removeprefix("rebuild-").partition("/")[0]) for name in names)
+    return log.scene_of(numbers[-1]) if numbers else log.scene
 
 
 def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
@@ -96,7 +96,7 @@ def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
     for number in reversed(numbers):
         folder = f"rebuild-{number:04d}"
         if f"{folder}/plans.json" in log.attachments:
-            scene = scene_from_json(log.attachments.get(f"{folder}/scene.json", b""))
+            scene = log.scene_of(number)
             try:
                 items = json.loads(log.attachments[f"{folder}/plans.json"])["plans"][:shown]
                 return [plan_from_json(item["actions"]) for item in items], scene.needle

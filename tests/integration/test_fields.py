@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ntagen import checker
-from ntagen.drive.scene_json import scene_from_json, scene_to_json
+from ntagen.drive.scene_json import samples_in, scene_from_json, scene_to_json
 from ntagen.errors import InputError
 from ntagen.imaging.grid import Wish, Workspace
 from ntagen.imaging.meshes import checked
@@ -151,9 +151,15 @@ def test_a_turned_scene_has_the_same_plans(axis: tuple[float, float, float]) -> 
 def test_logs_have_fields_exactly() -> None:
     scene = ONE_ROLL.with_regions(Region("C", "critical", block((0.0, -28.0, -3.0), 5.0)))
     assert scene_from_json(scene_to_json(scene)) == scene
-    broken = scene_to_json(scene).replace('"samples": "', '"samples": "AAAA')
-    with pytest.raises(InputError):
-        scene_from_json(broken)
+    shell = scene.with_regions(Region("D", "detection", scene.criticals[0].shape.grown(1.0)))
+    text = scene_to_json(scene)
+    assert len(scene_to_json(shell)) < len(text) + 3000, "the samples are there twice"
+    rest = scene_to_json(shell, samples_in(text))
+    assert len(rest) < 10_000
+    assert scene_from_json(rest, samples_in(text)) == shell
+    for broken in (rest, text.replace(': "eJ', ': "eJAA')):
+        with pytest.raises(InputError):
+            scene_from_json(broken)
 
 
 def test_lines_of_samples_are_made_once() -> None:
