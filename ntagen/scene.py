@@ -26,7 +26,7 @@ from typing import Literal
 from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.motion import Breath, Motion
-from ntagen.shapes import Shape, Sphere
+from ntagen.shapes import UPRIGHT, Shape, Sphere
 from ntagen.values import dataclass
 
 Vector = tuple[float, float, float]
@@ -96,6 +96,13 @@ class Region:
             return self.shape.distance_at_mm(point_mm)
         x, y, z = (a - b for a, b in zip(point_mm, self.motion.at_mm(clock_s), strict=True))
         return self.shape.distance_at_mm((x, y, z))
+
+    def at(self, clock_s: float) -> Region:
+        """The same region where it is at a time of the breath, and keeping still."""
+        if self.motion is None:
+            return self
+        shape = self.shape.placed(UPRIGHT, self.motion.at_mm(clock_s))
+        return replace(self, shape=shape, motion=None)
 
     def grown(self, by_mm: float) -> Region:
         """The same region, larger on all sides by a length."""

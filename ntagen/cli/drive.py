@@ -82,6 +82,14 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="The critical regions that the driver knows at the start. It must feel the others.",
 )
 @click.option(
+    "--breath-phase",
+    "breath_phase_deg",
+    metavar="DEG",
+    type=click.FloatRange(0.0, 360.0),
+    help="The phase of the breath at the start, if regions move: from 0 to 360 degrees; by default "
+    "0. A simulation moves its regions by the same clock.",
+)
+@click.option(
     "--log",
     "log_path",
     metavar="RUN.mcap",
@@ -106,6 +114,7 @@ def command(
     tracker: str | None,
     registration: str | None,
     known: str,
+    breath_phase_deg: float | None,
     log_path: Path | None,
     as_json: bool,
     quiet: bool,
@@ -146,6 +155,7 @@ def command(
     task = load_task(environment, include=include)
     for warning in task.warnings:
         echo(warning.render(), err=True)
+    task = _breathing(task, breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
     _say_idle(configuration)
@@ -173,6 +183,18 @@ def command(
     if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
         return TERMINATED
     return _exit_code(result.ended.outcome)
+
+
+def _breathing(task: Task, phase_deg: float | None) -> Task:
+    """The task with another phase of the breath at the start."""
+    breath = task.scene.breath
+    if phase_deg is None:
+        return task
+    if breath is None:
+        say_idle({"breath_phase_deg": "--breath-phase"}, "where no region moves")
+        return task
+    clock_s = phase_deg / 360.0 * breath.period_s
+    return replace(task, scene=task.scene.at_clock(clock_s))
 
 
 def _say_idle(configuration: Configuration) -> None:

@@ -117,7 +117,7 @@ def _of_scene(
     from ntagen.drive.engine import engine_for
     from ntagen.nsl import load_task
     from ntagen.plan.anytime import synthesis_within
-    from ntagen.plan.best_plan import MOST_WHEN_NARROW, sequences
+    from ntagen.plan.best_plan import MOST_WHEN_NARROW, BestPlanSynthesiser, sequences
     from ntagen.plot.run import picture_of_plans
 
     task = load_task(source, include=include)
@@ -128,6 +128,9 @@ def _of_scene(
     engine = replace(engine, ranking=ranking or settings.ranking)
     if shown == 0:
         return picture_of_plans(task.scene, None, shown)
+    if task.scene.breath is not None:
+        # Waits make so many plans that a list has no end; the best one is asked for, as in drives.
+        return picture_of_plans(task.scene, BestPlanSynthesiser(engine)(task.scene), shown)
     if sequences(task.scene) <= MOST_WHEN_NARROW:
         # All plans are listed, since some are to be shown beside the best one.
         return picture_of_plans(task.scene, engine(task.scene), shown)

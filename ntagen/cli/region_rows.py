@@ -10,10 +10,12 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from ntagen.motion import Motion
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.nearest import nearest_to
 from ntagen.scene import Pose, Region, Scene
 from ntagen.shapes import Field, Vector
+from ntagen.units import deg_from_rad
 
 _MM3_PER_CM3: Final = 1000.0
 
@@ -31,6 +33,7 @@ def region_facts(scene: Scene) -> list[dict[str, object]]:
             "high_mm": [_finite(part) for part in region.shape.bounds_mm()[1]],
             "from_straight_way_mm": _away_mm(region, way),
             "error_mm": region.shape.error_mm,
+            **({} if region.motion is None else {"moves": _motion(region.motion)}),
         }
         for region in scene.regions
     ]
@@ -58,8 +61,21 @@ def region_rows(scene: Scene, most: int) -> Iterator[str]:
     for region in regions:
         if isinstance(region.shape, Field):
             yield f"{' '.join(region.name.split())}: {_exactness(region.shape)}"
+    for region in regions:
+        if region.motion is not None:
+            yield f"{' '.join(region.name.split())}: at rest above; {_motion(region.motion)}"
     if len(scene.regions) > most:
         yield f"… {len(scene.regions) - most} more (all of them: --json)"
+
+
+def _motion(motion: Motion) -> str:
+    """How a region moves, in words."""
+    every = f"every {motion.period_s:g} s, at most {motion.speed_mm_per_s:.3g} mm/s"
+    if motion.table:
+        return f"moves up to {motion.reach_mm:.3g} mm, by a table, {every}"
+    way = ", ".join(f"{part:.3g}" for part in motion.way_mm)
+    phase_deg = deg_from_rad(motion.phase_rad)
+    return f"moves by ({way}) mm and back {every}; phase {phase_deg:.4g} deg"
 
 
 def _exactness(shape: Field) -> str:

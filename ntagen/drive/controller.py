@@ -39,6 +39,7 @@ from ntagen.drive.deviation import DeviationMonitor, require_explained
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
 from ntagen.drive.learning import Learner
+from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import moves_of, pieces
 from ntagen.drive.planning import Lack, Planner
 from ntagen.drive.records import (
@@ -57,12 +58,12 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
 from ntagen.drive.supervisor import Guard, Supervisor
-from ntagen.errors import DeviceError, InputError, LimitError
+from ntagen.errors import DeviceError, LimitError
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
-from ntagen.plan.actions import Action, Plan, Push, Roll
+from ntagen.plan.actions import Action, Plan, Push, Roll, Wait
 from ntagen.plan.certify import certify
 from ntagen.plan.rank import Candidate, reserve_of
 from ntagen.plan.synthesise import Synthesis, Synthesiser
@@ -101,8 +102,6 @@ class Controller:
         supervisor: Supervisor | None = None,
         agree: Callable[[str], None] = lambda _: None,
     ) -> None:
-        if scene.breath is not None:
-            raise InputError("the driver does not drive through moving regions yet")
         self._settings = settings
         self._journal = journal
         self._supervisor = supervisor or Supervisor()
@@ -114,6 +113,7 @@ class Controller:
         self._moves: deque[tuple[Action, Pose]] = deque()
         self._reviewed_mm = 0.0
         self._rest: Plan | None = None
+        self._pace = Pace(scene)
         self._predicted: Pose = scene.needle.tip
         self._is_short = False
         self._short_in_row = 0
@@ -275,10 +275,13 @@ class Controller:
         """Makes the first moves of the plan, or the free push if there is none."""
         goal_mm = self._settings.initial_push_mm
         while self._moves and not self._is_short:
-            action, self._predicted = self._moves.popleft()
+            action, self._predicted = self._moves[0]
+            if not self._keep_pace(action):
+                break
+            self._moves.popleft()
             self._planner.require_time()
             self._act(action)
-            if isinstance(action, Roll):
+            if not isinstance(action, Push):
                 continue
             measurement = self._needle.measure()
             if self._learner.feels(measurement):
@@ -291,7 +294,10 @@ class Controller:
     def _execute(self) -> Event:
         if not self._moves:
             return Event.PLAN_DONE
-        action, self._predicted = self._moves.popleft()
+        action, self._predicted = self._moves[0]
+        if not self._keep_pace(action):
+            return Event.OUT_OF_STEP
+        self._moves.popleft()
         self._act(action)
         return Event.ACTED
 
@@ -323,7 +329,8 @@ class Controller:
         last = targets[-1]
         if self._learner.knowledge.visited < len(targets) - 1:
             return False
-        if last.distance_mm(measurement.position_mm) > 0.0:
+        # A target that moves may leave the tip again before the driver has looked.
+        if last.motion is not None or last.distance_mm(measurement.position_mm) > 0.0:
             return False
         return is_surely_in(last, self._needle.glance(), self._settings.margins.depth_mm)
 
@@ -338,7 +345,7 @@ class Controller:
             return Event.AS_PREDICTED
         self._reviewed_mm = depth_mm
         estimate = self._needle.glance()
-        scene = self._learner.knowledge.scene(estimate.tip, estimate.radius_mm, depth_mm)
+        scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
         rest = Plan.of(action for action, _ in self._moves)
         certificate = certify(rest, scene)
         if not self._settings.margins.allow(certificate):
@@ -352,6 +359,7 @@ class Controller:
     def _follow(self, scene: Scene, plan: Plan) -> None:
         """Makes this the plan to follow, from the pose in the scene."""
         self._moves = deque(moves_of(scene, plan.actions, self._settings.spacing_mm))
+        self._pace = Pace(scene)
         self._deviation.begin()
 
     def _stop(self) -> Event:
@@ -390,9 +398,13 @@ class Controller:
     def _here(self) -> Scene:
         """The known scene with the needle where it is."""
         known, depth_mm = self._needle.known, self._needle.depth_mm
-        return self._learner.knowledge.scene(known.tip, known.radius_mm, depth_mm)
+        return self._learner.scene(known.tip, known.radius_mm, depth_mm)
 
     def _first_push_is_free(self) -> bool:
+        breath = self._learner.a_priori.breath
+        if breath is not None and breath.gate is not None:
+            # Without a plan, nobody knows when the gate is open.
+            return False
         return is_free(self._here(), self._settings.initial_push_mm, self._settings.priors)
 
     def _adopt(self, synthesis: Synthesis) -> None:
@@ -404,12 +416,27 @@ class Controller:
         self._follow(synthesis.scene, best.plan)
         self._reviewed_mm = self._needle.depth_mm
 
+    def _keep_pace(self, action: Action) -> bool:
+        """Waits until the breath is where the plan expects it; whether that is not too late."""
+        if self._learner.a_priori.breath is None:
+            return True
+        wait_s = self._pace.wait_s(action, self._learner.clock_now_s())
+        if wait_s is None:
+            return False
+        if wait_s > 0.0:
+            self._needle.wait(wait_s)
+        self._pace.begin(action)
+        return True
+
     def _act(self, action: Action) -> None:
         """Makes a move, at whose end the tip is predicted."""
         if isinstance(action, Roll):
             self._is_short = False
             self._needle.roll(action.angle_rad)
-        elif isinstance(action, Push):
+        elif isinstance(action, Wait):
+            self._is_short = False
+            self._needle.wait(max(0.0, action.seconds - self._pace.late_s))
+        else:
             self._push(action.length_mm, self._predicted)
 
     def _push(self, length_mm: float, predicted: Pose) -> None:
@@ -417,7 +444,8 @@ class Controller:
         settings, depth_mm = self._settings, self._needle.depth_mm
         end_mm = predicted.position_mm
         expected_n = self._learner.expected_force_n(depth_mm + length_mm, end_mm)
-        regions = self._learner.a_priori.criticals
+        clock_s = self._learner.clock_s(self._needle.seen_s)
+        regions = tuple(one.at(clock_s) for one in self._learner.a_priori.criticals)
         way = (self._needle.path.tip.position_mm, end_mm)
         with self._supervisor.guarding(Guard.of(settings, way, regions, expected_n)):
             self._is_short = not self._needle.push(length_mm)

@@ -12,9 +12,10 @@ A device whose motions take real time is watched during them: it calls its `watc
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Protocol, runtime_checkable
 
 from ntagen.errors import DeviceError
 from ntagen.errors import Halted as Halted  # Users of the protocol need it.
@@ -96,6 +97,33 @@ class LiveSensor(Sensor, Protocol):
         """
 
 
+@runtime_checkable
+class Waiting(Protocol):
+    """What can rest for a time by itself: a simulation, whose clock only goes on with motions."""
+
+    def wait(self, seconds: float) -> None:
+        """Rests where it is.
+
+        Raises:
+            DeviceError: That is impossible.
+        """
+
+
+def rest(actuator: Actuator, seconds: float) -> None:
+    """Lets an actuator rest for a time on its clock.
+
+    One in real time is watched meanwhile, if it is watched in motions.
+    """
+    if isinstance(actuator, Waiting):
+        actuator.wait(seconds)
+        return
+    watch: Watch = getattr(actuator, "watch", lambda: None)
+    until_s = actuator.now_s() + seconds
+    while (left_s := until_s - actuator.now_s()) > 0.0:
+        watch()
+        time.sleep(min(left_s, WATCH_S))
+
+
 class Device(Actuator, Sensor, Protocol):
     """A needle that can be moved, with its sensor."""
 
@@ -127,6 +155,10 @@ class Assembly:
     def pull(self, length_mm: float) -> None:
         """See `Actuator.pull`."""
         self.actuator.pull(length_mm)
+
+    def wait(self, seconds: float) -> None:
+        """See `rest`."""
+        rest(self.actuator, seconds)
 
     def stop(self) -> None:
         """See `Actuator.stop`."""

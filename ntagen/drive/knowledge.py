@@ -59,8 +59,9 @@ def obstacles_of(scene: Scene, otherwise_mm: float) -> tuple[Obstacle, ...]:
         scene: The actual scene.
         otherwise_mm: The distance for a region without a shell.
     """
+    clock_s = 0.0 if scene.breath is None else scene.breath.clock_s
     return tuple(
-        Obstacle(region, sensing_margin_mm(region, scene.detections, otherwise_mm))
+        Obstacle(region, sensing_margin_mm(region, scene.detections, otherwise_mm), clock_s)
         for region in scene.criticals
     )
 
@@ -112,8 +113,12 @@ class Knowledge:
     contacts: int = 0
     felt: tuple[tuple[str, tuple[Contact, ...]], ...] = ()
 
-    def scene(self, tip: Pose, radius_mm: float, depth_mm: float = 0.0) -> Scene:
+    def scene(
+        self, tip: Pose, radius_mm: float, depth_mm: float = 0.0, clock_s: float = 0.0
+    ) -> Scene:
         """The known scene, for a needle with this pose and radius, inserted to this depth.
+
+        The clock is that of the breath, if regions move.
 
         A shell in which the tip already lies gets smaller: a plan may leave it, but not lead deeper
         into it.
@@ -125,12 +130,12 @@ class Knowledge:
             detections=tuple(
                 smaller
                 for shell in scene.detections
-                if (smaller := _without(shell, tip.position_mm)) is not None
+                if (smaller := _without(shell, tip.position_mm, clock_s)) is not None
             ),
         )
-        return scene.with_targets(scene.targets[self.visited :])
+        return scene.with_targets(scene.targets[self.visited :]).at_clock(clock_s)
 
-    def expected_force_n(self, tip_mm: Vector, settings: Settings) -> float:
+    def expected_force_n(self, tip_mm: Vector, settings: Settings, clock_s: float = 0.0) -> float:
         """The force that the known regions explain when the tip is here.
 
         Only regions that the driver was given count: where a learned one lies is a guess.
@@ -141,7 +146,7 @@ class Knowledge:
             (
                 gain * max(0.0, self._reach_mm(region, settings) + unsure_mm - away_mm)
                 for region in self.a_priori.criticals
-                if (away_mm := region.distance_mm(tip_mm)) > 0.0
+                if (away_mm := region.distance_at_mm(tip_mm, clock_s)) > 0.0
             ),
             default=0.0,
         )
@@ -162,6 +167,7 @@ class Knowledge:
         radius_mm: float,
         channels: tuple[Arc, ...] = (),
         unsure_mm: float = _EXPLAINED_MM,
+        clock_s: float = 0.0,
     ) -> Knowledge:
         """The knowledge after the force rose.
 
@@ -172,11 +178,12 @@ class Knowledge:
             channels: What was cut before without a rise: the safe region of the paper. No learned
                 region is put over it.
             unsure_mm: A contact this near to the shell of a known region is explained by it.
+            clock_s: The time of the breath.
         """
         contacts = self.contacts + 1
-        felt = self._felt(tip, margin_mm, unsure_mm)
+        felt = self._felt(tip, margin_mm, unsure_mm, clock_s)
         if felt is not None:
-            learned = self._with_wider_shell(felt, tip, margin_mm)
+            learned = self._with_wider_shell(felt, tip, margin_mm, clock_s)
         else:
             contact = Contact(tip.position_mm, tip.heading)
             center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
@@ -187,23 +194,25 @@ class Knowledge:
             )
         return replace(self, learned=learned, contacts=contacts)
 
-    def _felt(self, tip: Pose, margin_mm: float, unsure_mm: float) -> Region | None:
+    def _felt(self, tip: Pose, margin_mm: float, unsure_mm: float, clock_s: float) -> Region | None:
         """The a-priori critical region that explains a contact, if there is one."""
         for region in self.a_priori.criticals:
             shells = shells_of(region, self.a_priori.detections + self.learned)
-            if region.distance_mm(tip.position_mm) <= (
+            if region.distance_at_mm(tip.position_mm, clock_s) <= (
                 _felt_at_mm(region, shells, margin_mm) + unsure_mm
             ):
                 return region
         return None
 
-    def _with_wider_shell(self, felt: Region, tip: Pose, margin_mm: float) -> tuple[Region, ...]:
+    def _with_wider_shell(
+        self, felt: Region, tip: Pose, margin_mm: float, clock_s: float
+    ) -> tuple[Region, ...]:
         """Makes the shell of a known region wider: it was felt farther away than expected."""
         shells = shells_of(felt, self.a_priori.detections + self.learned)
         reach_mm = _felt_at_mm(felt, shells, margin_mm)
-        reach_mm = max(reach_mm, felt.distance_mm(tip.position_mm)) + _GROWTH_MM
+        reach_mm = max(reach_mm, felt.distance_at_mm(tip.position_mm, clock_s)) + _GROWTH_MM
         name = f"{felt.name} felt"
-        shell = Region(name, "detection", felt.shape.grown(reach_mm), felt.name)
+        shell = Region(name, "detection", felt.shape.grown(reach_mm), felt.name, felt.motion)
         return (*(region for region in self.learned if region.name != name), shell)
 
     def _with_ball(
@@ -297,9 +306,9 @@ def _joined(
     return None if _covers(around, channels) else _Felt(around, contacts)
 
 
-def _without(shell: Region, point_mm: Vector) -> Region | None:
+def _without(shell: Region, point_mm: Vector, clock_s: float) -> Region | None:
     """A shell without a point: smaller on all sides if it contains it; None if nothing is left."""
-    by_mm = shell.distance_mm(point_mm) - _OUTSIDE_MM
+    by_mm = shell.distance_at_mm(point_mm, clock_s) - _OUTSIDE_MM
     if by_mm >= 0.0:
         return shell
     shape = shell.shape.grown(by_mm)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from ntagen.drive.force import ForceMonitor, Rise
 from ntagen.drive.knowledge import Knowledge, position_unsure_mm
-from ntagen.drive.records import Forgotten, Journal, Learned, Visited
+from ntagen.drive.records import Breathed, Forgotten, Journal, Learned, Visited
 from ntagen.drive.settings import Settings
 from ntagen.drive.steering import Steering
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
-from ntagen.scene import Scene, Vector
+from ntagen.scene import Pose, Scene, Vector
 
 
 class Learner:
@@ -34,11 +34,32 @@ class Learner:
         self._journal = journal
         self._force = ForceMonitor(settings, scene.needle.length_mm)
         self._rise: Rise | None = None
+        self._started_s = 0.0
 
     @property
     def a_priori(self) -> Scene:
         """What was known at the start."""
         return self.knowledge.a_priori
+
+    def clock_s(self, at_s: float) -> float:
+        """The time of the breath at a time of the device; 0 where nothing moves."""
+        breath = self.a_priori.breath
+        if breath is None:
+            return 0.0
+        return (breath.clock_s + at_s - self._started_s) % breath.period_s
+
+    def clock_now_s(self) -> float:
+        """The time of the breath now; it is recorded, since decisions depend on it."""
+        if self.a_priori.breath is None:
+            return 0.0
+        now_s = self._needle.now_s()
+        clock_s = self.clock_s(now_s)
+        self._journal.record(Breathed(now_s, clock_s))
+        return clock_s
+
+    def scene(self, tip: Pose, radius_mm: float, depth_mm: float) -> Scene:
+        """The known scene now; see `Knowledge.scene`."""
+        return self.knowledge.scene(tip, radius_mm, depth_mm, self.clock_now_s())
 
     @property
     def has_visited_all(self) -> bool:
@@ -46,7 +67,8 @@ class Learner:
         return self.knowledge.visited == len(self.a_priori.targets)
 
     def arm(self, measurement: Measurement) -> None:
-        """Takes the measurement before anything moves."""
+        """Takes the measurement before anything moves; the clock of the breath begins."""
+        self._started_s = measurement.time_s
         if self._settings.force_sensing:
             tip_mm = self.a_priori.needle.tip.position_mm
             self._force.note(0.0, measurement.force_n, self._explained_n(tip_mm))
@@ -56,7 +78,8 @@ class Learner:
         return self._force.expected_n(depth_mm) + self._explained_n(tip_mm)
 
     def _explained_n(self, tip_mm: Vector) -> float:
-        return self.knowledge.expected_force_n(tip_mm, self._settings)
+        clock_s = self.clock_s(self._needle.seen_s)
+        return self.knowledge.expected_force_n(tip_mm, self._settings, clock_s)
 
     def feels(self, measurement: Measurement) -> bool:
         """Whether the force rises more than plain insertion and known regions explain."""
@@ -82,6 +105,7 @@ class Learner:
             self._settings.learned_radius_mm,
             self._needle.channels,
             position_unsure_mm(self._settings),
+            self.clock_s(self._needle.seen_s),
         )
         for region in self.knowledge.learned:
             if region not in before:
@@ -99,7 +123,7 @@ class Learner:
             is_last = self.knowledge.visited == len(targets) - 1
             if is_last and not last_too:
                 return
-            if target.distance_mm(position_mm) > 0.0:
+            if target.distance_at_mm(position_mm, self.clock_s(self._needle.seen_s)) > 0.0:
                 return
             self.knowledge = self.knowledge.visiting()
             self._journal.record(Visited(self._needle.now_s(), target.name))

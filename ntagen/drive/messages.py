@@ -40,6 +40,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Relied,
     records.Forgotten,
     records.CutShort,
+    records.Breathed,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

@@ -16,7 +16,7 @@ from ntagen.drive.steering import Steering
 from ntagen.errors import LimitError
 from ntagen.plan.actions import Plan, Roll
 from ntagen.plan.synthesise import Synthesis, Synthesiser
-from ntagen.scene import Pose
+from ntagen.scene import Pose, Scene
 
 _NO_REGION_MM: Final = 1e9
 
@@ -101,7 +101,7 @@ class Planner:
             depth_mm: Its depth.
             rest: The rest of a plan, which is a choice too.
         """
-        scene = self._learner.knowledge.scene(tip, self._needle.known.radius_mm, depth_mm)
+        scene = self._learner.scene(tip, self._needle.known.radius_mm, depth_mm)
         self._listen()
         whole = self._synthesise(scene)
         if rest is not None:
@@ -148,11 +148,18 @@ class Planner:
         kept = tuple(
             candidate
             for candidate in synthesis.candidates
-            if self._seconds(candidate.plan, speed_mm_per_s) <= left_s
+            if self._seconds(candidate.plan, synthesis.scene) <= left_s
         )
         return replace(synthesis, candidates=kept)
 
-    def _seconds(self, plan: Plan, speed_mm_per_s: float) -> float:
-        """How long a plan takes: its pushes and its rolls."""
+    def _seconds(self, plan: Plan, scene: Scene) -> float:
+        """How long a plan takes: its pushes, its rolls and its waits.
+
+        After a roll, it may be a period until the breath is where the plan expects it.
+        """
+        speed_mm_per_s = scene.needle.speed_mm_per_s
+        if scene.breath is not None:
+            periods_s = scene.breath.period_s * plan.roll_count
+            return plan.length_mm / speed_mm_per_s + periods_s + plan.waits_s
         rolls_rad = sum(abs(one.angle_rad) for one in plan.actions if isinstance(one, Roll))
         return plan.length_mm / speed_mm_per_s + rolls_rad / self._settings.roll_rad_per_s

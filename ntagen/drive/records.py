@@ -47,7 +47,7 @@ class Transition(Record):
 
 @dataclass(frozen=True, slots=True)
 class Command(Record):
-    """A command to the device: ``push`` or ``pull`` with mm, ``roll`` with rad, or ``stop``."""
+    """A command: ``push`` or ``pull`` with mm, ``roll`` with rad, ``wait`` with s, or ``stop``."""
 
     kind: str
     value: float
@@ -227,6 +227,17 @@ class CutShort(Record):
 
     made_mm: float
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Breathed(Record):
+    """A time of the breath counted for a decision; only runs with moving regions have it.
+
+    Attributes:
+        clock_s: The time on the clock of the breath, within its period.
+    """
+
+    clock_s: float
 
 
 class Journal(Protocol):

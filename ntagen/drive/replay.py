@@ -132,6 +132,10 @@ class _Stage:
         """Does nothing: the device does not move."""
         self._repeat_failure()
 
+    def wait(self, seconds: float) -> None:
+        """Does nothing: the time is that of the log."""
+        self._repeat_failure()
+
     def stop(self) -> None:
         """Does nothing: the device does not move."""
 

@@ -14,6 +14,7 @@ from typing import Any, Final, cast
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
 from ntagen.imaging.store import digest_of, from_entry, to_entry
+from ntagen.motion import Motion
 from ntagen.scene import Region, Scene
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
 
@@ -49,6 +50,8 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
     for kind in _LATER_KINDS:
         if not entries[kind]:
             del entries[kind]
+    if scene.breath is None:
+        del entries["breath"]
     document: dict[str, object] = {"version": VERSION, "scene": entries}
     missing = {digest: text for digest, text in samples.items() if digest not in (known or {})}
     if missing:
@@ -82,7 +85,7 @@ def scene_from_json(text: str | bytes, known: Mapping[str, str] | None = None) -
                 f"the scene of the run has version {document['version']!r}, but this ntagen reads "
                 f"only version {VERSION}"
             )
-        entries = {kind: [] for kind in _LATER_KINDS} | document["scene"]
+        entries = {kind: [] for kind in _LATER_KINDS} | {"breath": None} | document["scene"]
         samples = {**(known or {}), **document.get("samples", {})}
         regions = {
             kind: tuple(_to_region(entry, samples) for entry in entries[kind]) for kind in _KINDS
@@ -116,6 +119,14 @@ class _Solid:
 
 
 def _from_region(region: Region, samples: dict[str, str]) -> dict[str, object]:
+    """A region's entry; only that of one that moves has a motion."""
+    entry = _from_shape(region, samples)
+    if region.motion is not None:
+        entry["motion"] = dataclasses.asdict(region.motion)
+    return entry
+
+
+def _from_shape(region: Region, samples: dict[str, str]) -> dict[str, object]:
     shape, around = region.shape, region.around
     if isinstance(shape, Sphere):
         ball = _Ball(region.name, region.kind, shape.middle_mm, shape.radius_mm, around)
@@ -133,6 +144,13 @@ def _from_region(region: Region, samples: dict[str, str]) -> dict[str, object]:
 
 
 def _to_region(entry: dict[str, object], samples: Mapping[str, str]) -> Region:
+    if "motion" not in entry:
+        return _to_still(entry, samples)
+    still = _to_still({name: value for name, value in entry.items() if name != "motion"}, samples)
+    return dataclasses.replace(still, motion=value_from_json(entry["motion"], Motion))
+
+
+def _to_still(entry: dict[str, object], samples: Mapping[str, str]) -> Region:
     if "form" not in entry:
         ball = value_from_json(entry, _Ball)
         sphere = Sphere(ball.center_mm, ball.radius_mm)

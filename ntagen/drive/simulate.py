@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Actuator, Assembly, Device, Sensor
+from ntagen.drive.device import Actuator, Assembly, Device, Sensor, Waiting
 from ntagen.drive.engine import engine_for
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
@@ -19,6 +19,7 @@ from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Tru
 from ntagen.drive.settings import Settings
 from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
+from ntagen.errors import InputError
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -117,6 +118,11 @@ def simulate(
     errors = errors or Errors()
     true_needle = errors.true_needle(scene.needle)
     needle = (make or virtual(errors))(true_needle, obstacles, seed)
+    if scene.breath is not None and not isinstance(needle, Waiting):
+        raise InputError(
+            "this simulated needle cannot wait for regions that move\n"
+            "hint: use --needle virtual or --needle phantom"
+        )
     sensor = needle if sense is None else sense(needle)
     actuator: Actuator = needle
     if settings.compensated_lag_rad > 0.0:
@@ -136,10 +142,11 @@ def simulate(
     ended = controller.run()
     last = scene.targets[-1]
     tip_mm = needle.true_tip.position_mm
+    clock_s = 0.0 if scene.breath is None else scene.breath.clock_s
     return Result(
         ended=ended,
         clearance_mm=needle.true_clearance_mm(),
-        target_distance_mm=last.distance_mm(tip_mm),
+        target_distance_mm=last.distance_at_mm(tip_mm, clock_s + needle.now_s()),
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
     )

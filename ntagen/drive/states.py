@@ -70,6 +70,7 @@ class Event(Enum):
     NO_TIME_LEFT = "no strategy that ends in time"
     ACTED = "acted"
     PLAN_DONE = "plan done"
+    OUT_OF_STEP = "out of step with the breath"
     AS_PREDICTED = "as predicted"
     DEVIATION = "deviation"
     PLAN_FAILS = "the plan no longer holds"
@@ -118,6 +119,7 @@ _WORKFLOW: Final = {
     (State.SYNTHESISE, Event.NO_TIME_LEFT): State.NO_TIME_LEFT,
     (State.EXECUTE, Event.ACTED): State.MONITOR,
     (State.EXECUTE, Event.PLAN_DONE): State.ESTIMATE,
+    (State.EXECUTE, Event.OUT_OF_STEP): State.ESTIMATE,
     (State.MONITOR, Event.AS_PREDICTED): State.EXECUTE,
     (State.MONITOR, Event.DEVIATION): State.STOP,
     (State.MONITOR, Event.FORCE): State.STOP,

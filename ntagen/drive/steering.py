@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from ntagen.drive.device import Device, Halted, require_finite
+from ntagen.drive.device import Device, Halted, require_finite, rest
 from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
@@ -57,6 +57,7 @@ class Steering:
         # Whether the channel is longer than it was at the last pull.
         self._has_grown = False
         self.path = Path(needle.tip)
+        self.seen_s = 0.0
         self.estimate: Estimate | None = None
 
     @property
@@ -139,6 +140,11 @@ class Steering:
             self.pull(min(last_mm, self.path.depth_mm - depth_mm))
         self.undo_roll()
 
+    def wait(self, seconds: float) -> None:
+        """Rests for a time where the needle is."""
+        self._command("wait", seconds)
+        rest(self._device, seconds)
+
     def measure(self) -> Measurement:
         """Measures the needle now.
 
@@ -149,6 +155,7 @@ class Steering:
         require_finite(measurement)
         self._reach.require(measurement)
         self._estimator.measure(measurement)
+        self.seen_s = measurement.time_s
         self._journal.record(
             Measured(
                 time_s=measurement.time_s,

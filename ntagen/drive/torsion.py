@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ntagen.drive.device import Actuator, Halted
+from ntagen.drive.device import Actuator, Halted, rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +76,10 @@ class Compensated:
         """See `Actuator.pull`."""
         self._actuator.pull(length_mm)
         self._depth_mm = max(0.0, self._depth_mm - length_mm)
+
+    def wait(self, seconds: float) -> None:
+        """See `ntagen.drive.device.rest`."""
+        rest(self._actuator, seconds)
 
     def stop(self) -> None:
         """See `Actuator.stop`."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ntagen.needle.breathing import BreathWitness
 from ntagen.needle.kinematics import Arc, push, roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -127,7 +128,10 @@ class PhantomNeedle:
         self._reentered_mm = 0.0
         self._is_back = False
         self._direction = 1.0
-        self._sweep = Sweep([o.region for o in obstacles], needle.tip.position_mm)
+        still = [o.region for o in obstacles if o.region.motion is None]
+        self._sweep = Sweep(still, needle.tip.position_mm)
+        self._witness = BreathWitness(obstacles)
+        self._moves = len(still) < len(obstacles)
         self._sensor = PhantomSensor(
             self._parameters.sensing, self._tissue, sensor, clock, reports_pose=reports_pose
         )
@@ -149,8 +153,24 @@ class PhantomNeedle:
         while left_mm > _NOTHING_MM:
             step_mm = self._step(left_mm)
             left_mm -= step_mm
-            self._clock.advance(step_mm / self._needle.speed_mm_per_s)
+            self._pass(step_mm / self._needle.speed_mm_per_s)
             self._show()
+
+    def wait(self, seconds: float) -> None:
+        """Rests for a time.
+
+        Raises:
+            DeviceError: It is negative or not finite.
+        """
+        require_possible(seconds >= 0.0, "wait", seconds)
+        self._pass(seconds)
+        self._show()
+
+    def _pass(self, seconds: float) -> None:
+        """Lets time pass, in which regions move."""
+        self._clock.advance(seconds)
+        if self._moves:
+            self._witness.note([piece.arc() for piece in self._pieces], self._clock.now_s())
 
     def roll(self, angle_rad: float) -> None:
         """Turns the base; the tip turns only as far as the friction of the shaft lets it.
@@ -161,7 +181,7 @@ class PhantomNeedle:
         require_possible(math.isfinite(angle_rad), "roll", angle_rad)
         self._base_rad += angle_rad
         self._slip()
-        self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
+        self._pass(abs(angle_rad) / ROLL_RAD_PER_S)
         self._show()
 
     def roll_on(self, angle_rad: float) -> None:
@@ -198,7 +218,7 @@ class PhantomNeedle:
             left_mm -= moved_mm
             self._depth_mm = max(0.0, self._depth_mm - moved_mm) if self._pieces else 0.0
             self._slip()
-            self._clock.advance(moved_mm / speed_mm_per_s)
+            self._pass(moved_mm / speed_mm_per_s)
             self._show()
         # The base goes on when the tip is out already.
         self._clock.advance(max(0.0, left_mm) / speed_mm_per_s)
@@ -253,7 +273,7 @@ class PhantomNeedle:
         Infinite without critical regions, negative if one was pierced. It comes from dense sampling
         (`ntagen.needle.sweep`): never too great, too small by 0.02 mm at most.
         """
-        return self._sweep.clearance_mm()
+        return min(self._witness.clearance_mm(), self._sweep.clearance_mm())
 
     # Motion.
 
@@ -383,6 +403,6 @@ class PhantomNeedle:
             return friction_n
         # An old channel is open: there is nothing to cut.
         cutting_n = 0.0 if self._ahead else self._tissue.cutting_n(self._depth_mm)
-        near = (o.depth_in_margin_mm(position_mm) for o in self._obstacles)
+        near = (o.depth_in_margin_mm(position_mm, self._clock.now_s()) for o in self._obstacles)
         rise_n = self._parameters.forces.region_n_per_mm * max(near, default=0.0)
         return friction_n + cutting_n + rise_n

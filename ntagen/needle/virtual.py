@@ -52,18 +52,26 @@ class SimulatedClock:
 
 @dataclass(frozen=True, slots=True)
 class Obstacle:
-    """An actual critical region, and the distance from its surface at which it is felt."""
+    """An actual critical region, and the distance from its surface at which it is felt.
+
+    Attributes:
+        region: The region.
+        margin_mm: The distance.
+        clock_s: The time of the breath when the needle's clock is at 0.
+    """
 
     region: Region
     margin_mm: float
+    clock_s: float = 0.0
 
-    def force_n(self, point_mm: Vector) -> float:
-        """The force on a tip at a point."""
-        return FORCE_N_PER_MM * self.depth_in_margin_mm(point_mm)
+    def force_n(self, point_mm: Vector, now_s: float = 0.0) -> float:
+        """The force on a tip at a point, at a time of the needle's clock."""
+        return FORCE_N_PER_MM * self.depth_in_margin_mm(point_mm, now_s)
 
-    def depth_in_margin_mm(self, point_mm: Vector) -> float:
+    def depth_in_margin_mm(self, point_mm: Vector, now_s: float = 0.0) -> float:
         """How deep a point lies in the margin; 0 outside."""
-        return max(0.0, self.margin_mm - self.region.distance_mm(point_mm))
+        away_mm = self.region.distance_at_mm(point_mm, self.clock_s + now_s)
+        return max(0.0, self.margin_mm - away_mm)
 
 
 class VirtualNeedle:
@@ -99,6 +107,9 @@ class VirtualNeedle:
         self._roll_errors = np.random.default_rng(rolls)
         self._path = Path(needle.tip)
         self._left: list[Arc] = []
+        from ntagen.needle.breathing import BreathWitness  # It needs the obstacles of this module.
+
+        self._witness = BreathWitness(obstacles)
 
     def now_s(self) -> float:
         """Simulated seconds."""
@@ -112,7 +123,21 @@ class VirtualNeedle:
         """
         require_possible(length_mm >= 0.0, "push", length_mm)
         self._path = self._path.push(self._needle.radius_mm, length_mm)
-        self._clock.advance(length_mm / self._needle.speed_mm_per_s)
+        self._pass(length_mm / self._needle.speed_mm_per_s)
+
+    def wait(self, seconds: float) -> None:
+        """Rests for a time.
+
+        Raises:
+            DeviceError: It is negative or not finite.
+        """
+        require_possible(seconds >= 0.0, "wait", seconds)
+        self._pass(seconds)
+
+    def _pass(self, seconds: float) -> None:
+        """Lets time pass, in which regions move."""
+        self._clock.advance(seconds)
+        self._witness.note(self._path.arcs, self._clock.now_s())
 
     def roll(self, angle_rad: float) -> None:
         """Turns the shaft; the tip turns by the same angle plus the roll error.
@@ -142,7 +167,7 @@ class VirtualNeedle:
         before, self._path = self._path.arcs, self._path.pull(length_mm)
         # The arc in which the tip is now was left in part: all of it was cut.
         self._left += before[max(0, len(self._path.arcs) - 1) :]
-        self._clock.advance(length_mm / (PULL_SPEED_RATIO * self._needle.speed_mm_per_s))
+        self._pass(length_mm / (PULL_SPEED_RATIO * self._needle.speed_mm_per_s))
 
     def stop(self) -> None:
         """Does nothing: the needle stands still between commands."""
@@ -156,7 +181,10 @@ class VirtualNeedle:
         return Measurement(
             time_s=self._clock.now_s(),
             position_mm=(x, y, z),
-            force_n=max((o.force_n(tip.position_mm) for o in self._obstacles), default=0.0),
+            force_n=max(
+                (o.force_n(tip.position_mm, self._clock.now_s()) for o in self._obstacles),
+                default=0.0,
+            ),
             heading=tip.heading if self._reports_pose else None,
             bevel=tip.bevel if self._reports_pose else None,
         )
@@ -177,17 +205,16 @@ class VirtualNeedle:
         Infinite without critical regions, negative if one was pierced.
         """
         entry_mm = self._needle.tip.position_mm
-        return min(
-            (
-                nearest_to(self.pierced, entry_mm, o.region.shape).distance_mm
-                for o in self._obstacles
-            ),
-            default=math.inf,
+        still = (
+            nearest_to(self.pierced, entry_mm, o.region.shape).distance_mm
+            for o in self._obstacles
+            if o.region.motion is None
         )
+        return min(self._witness.clearance_mm(), min(still, default=math.inf))
 
     def _turn(self, angle_rad: float, error_rad: float) -> None:
         self._path = self._path.roll(angle_rad + error_rad)
-        self._clock.advance(abs(angle_rad) / ROLL_RAD_PER_S)
+        self._pass(abs(angle_rad) / ROLL_RAD_PER_S)
 
 
 def require_possible(possible: bool, command: str, value: float) -> None:

@@ -206,7 +206,9 @@ def _clearances(
 def clearance(arcs: tuple[Arc, ...], entry_mm: Vector, region: Region) -> Clearance:
     """The smallest distance of a chain of arcs to a region; it begins at `entry_mm`."""
     nearest = nearest_to(arcs, entry_mm, region.shape)
-    return Clearance(region.name, region.kind, nearest.distance_mm, nearest.at_mm)
+    # Wherever a moving region is: no time is given.
+    reach_mm = 0.0 if region.motion is None else region.motion.reach_mm
+    return Clearance(region.name, region.kind, nearest.distance_mm - reach_mm, nearest.at_mm)
 
 
 def _arrivals(

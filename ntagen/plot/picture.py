@@ -13,11 +13,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.scene import Region, Scene, Vector
-from ntagen.shapes import Field, Sphere, directions, outline_mm, skin
+from ntagen.shapes import UPRIGHT, Field, Sphere, directions, outline_mm, skin
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,7 +119,8 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
     for axis in range(3):
         low = min(point[axis] for point in points)
         high = max(point[axis] for point in points)
-        for region in picture.scene.regions:
+        shown = picture.scene.regions
+        for region in [*shown, *(ghost for one in shown for ghost in _ghosts(one))]:
             least, most = (bound[axis] for bound in _seen_bounds(region))
             low = min(low, least) if math.isfinite(least) else low
             high = max(high, most) if math.isfinite(most) else high
@@ -152,6 +153,8 @@ def _draw_projection(
 ) -> Any:  # noqa: ANN401
     across, depth = shown
     for region in _back_to_front(picture.scene.regions):
+        for ghost in _ghosts(region):
+            axes.add_patch(_outline(ghost, shown, _ghost_style(region)))
         axes.add_patch(_outline(region, shown, _face(region, picture)))
     for style, curves in _curves(picture):
         for curve in curves:
@@ -169,6 +172,24 @@ def _draw_projection(
     axes.grid(True, color="#e6e8ec", linewidth=0.6)
     axes.set_axisbelow(True)
     return axes
+
+
+def _ghosts(region: Region) -> list[Region]:
+    """A moving region at the two ends of its way, without its place at rest."""
+    if region.motion is None:
+        return []
+    places = [place for place in region.motion.extremes_mm() if any(place)]
+    return [replace(region, shape=region.shape.placed(UPRIGHT, place)) for place in places]
+
+
+def _ghost_style(region: Region) -> dict[str, Any]:
+    """A thin outline without a face."""
+    colour = (*_rgb(_COLOURS[region.kind]), 0.6)
+    label = f"{region.kind}, end of its way"
+    return {
+        **{"edgecolor": colour, "facecolor": "none", "linewidth": 0.7},
+        **{"linestyle": (0, (1, 1.5)), "zorder": 2, "label": label},
+    }
 
 
 def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401

@@ -18,6 +18,7 @@ from ntagen.plot.picture import Curve, Picture
 from ntagen.scene import Needle, Scene, Vector
 
 _SPACING_MM: Final = 0.5
+_LONGEST: Final = 200
 _GAP_MM: Final = 1.0
 """Tip positions farther apart than this are on different curves: the tip was pulled back."""
 
@@ -36,7 +37,7 @@ def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> P
     )
     if candidates:
         clearance = clearance_of(candidates[0].certificate)
-        caption += f"; best: {candidates[0].plan}{clearance and f', {clearance}'}"
+        caption += f"; best: {_shortened(str(candidates[0].plan))}{clearance and f', {clearance}'}"
         caption += f"\n{ranked_by(synthesis.ranking)}" if synthesis is not None else ""
     return Picture(
         scene=scene,
@@ -74,6 +75,11 @@ def curve(plan: Plan, needle: Needle) -> Curve:
     """The points of the path of a needle that follows a plan."""
     poses = sample_poses(plan.arcs(needle), _SPACING_MM)
     return [pose.position_mm for pose in poses]
+
+
+def _shortened(plan: str) -> str:
+    """A plan in words; one with very many waits is cut off."""
+    return plan if len(plan) <= _LONGEST else plan[:_LONGEST].rpartition(",")[0] + ", …"
 
 
 def _outcome(ended: Ended) -> str:
