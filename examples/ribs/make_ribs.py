@@ -13,14 +13,14 @@ import math
 from collections.abc import Iterator
 
 RIBS = 5
-SPACING_MM = 19.0
+SPACING_MM = 22.0
 HALF_WIDTH_MM = 62.0
 HALF_DEPTH_MM = 48.0
 SKIN_MM = 9.0
 SLOPE = 0.18
-RADIUS_MM = 4.2
+RADIUS_MM = 4.0
 PIECES = 6
-RISE_MM = 2.0
+RISE_MM = 1.5
 PERIOD_S = 4.0
 
 HEAD = """\
@@ -36,10 +36,10 @@ environment ribs {{
     push only while phase between 250 deg and 110 deg   // around rest, when the target is slow
     roll by 90, 180, 270 deg  at most 2 times  at least 4 mm apart
   }}
-  target    tumour  sphere (6, -62, -6) mm  radius 6 mm  moves 12 mm along -z every {period:g} s
-  critical  vessel  capsule {vessel}  radius 2.5 mm  moves 9 mm along -z every {period:g} s
+  target    tumour  sphere (6, -62, -6) mm  radius 8 mm  moves 12 mm along -z every {period:g} s
+  critical  vessel  capsule {vessel}  radius 2.5 mm  moves 8 mm along -z every {period:g} s
 """
-VESSEL = "(-12, -48, 6) mm to (14, -44, 10) mm"
+VESSEL = "(-12, -46, 12) mm to (14, -42, 15) mm"
 
 
 def place(rib: int, share: float) -> tuple[float, float, float]:

@@ -28,6 +28,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from ntagen.errors import LimitError
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.nearest import nearest_to
 from ntagen.needle.vectors import combine, distance, scale, subtract
@@ -47,8 +48,8 @@ _NARROW_MM: Final = 1.0
 
 _MOST_PAUSES: Final = 4
 
-_MOST_IN_TIME: Final = 200
-"""Where regions move, at most so many plans are listed: certificates in time take 10 ms each."""
+_MOST_STATES_IN_TIME: Final = 20_000
+"""Where regions move, a question for a better plan is given up after so many states: a second."""
 
 MOST_WHEN_NARROW: Final = 20_000
 """All plans are also listed in more sequences than usual, if the best plan is that near."""
@@ -68,6 +69,9 @@ _FIRST_RESERVE_MM: Final = 3.0
 
 _LESS_RESERVE_MM: Final = 1.5
 """The reserve that is asked for if the first one cannot be had."""
+
+_SMALL_RESERVES_MM: Final = (1.0, 0.6, 0.3, 0.0)
+"""What is asked for where regions move, until there is a plan that holds."""
 
 _GATE_RATIO: Final = 0.3
 """The radius of a place on the straight way, relative to that of the target."""
@@ -108,13 +112,14 @@ class BestPlanSynthesiser:
             known.lower_rolls()
             known.straighten()
             is_listed = sequences(scene) <= MOST_WHEN_NARROW
-            if known.is_narrow and is_listed:
+            if known.is_narrow and is_listed and scene.breath is None:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
-                return self._listed(scene)
-            if not known.candidates:
-                most = _MOST_TRIED if scene.breath is None else _MOST_IN_TIME
-                return replace(self.engine, max_plans=min(most, self.engine.max_plans))(scene)
+                return self.engine(scene)
+            if not known.candidates and scene.breath is None:
+                return replace(self.engine, max_plans=min(_MOST_TRIED, self.engine.max_plans))(
+                    scene
+                )
         return Synthesis(
             scene=scene,
             model_xml=first.model_xml,
@@ -127,14 +132,6 @@ class BestPlanSynthesiser:
             # Without any plan nothing is left out.
             is_complete=not first.plans,
         )
-
-    def _listed(self, scene: Scene) -> Synthesis:
-        """All plans; where the needle may wait they are too many, so only the first ones."""
-        if scene.breath is None:
-            return self.engine(scene)
-        few = replace(self.engine, max_plans=min(self.engine.max_plans, _MOST_IN_TIME))
-        listed = few(scene)
-        return replace(listed, is_complete=listed.found < few.max_plans)
 
     def one(self, scene: Scene, *, keeps_strategy: bool = False) -> Listing:
         """At most one plan of a scene, whether it holds or not."""
@@ -196,6 +193,11 @@ class _Known:
                 self._ask(self._scene, USEFUL_RESERVE_MM)
         elif self._worth_mm() < _LESS_RESERVE_MM:
             self._ask(self._scene, _LESS_RESERVE_MM)
+        if self._scene.breath is not None:
+            # A list of all plans would take too long.
+            for less_mm in _SMALL_RESERVES_MM:
+                if not self.candidates:
+                    self._ask(self._scene, less_mm)
 
     def _change(self, found: Candidate) -> None:
         """Adds the best plan that small changes of a plan lead to, if the model has it."""
@@ -222,7 +224,8 @@ class _Known:
     def straighten(self) -> None:
         """Lists plans along the straight way to the target, if that is free."""
         gates = _gates(self._scene)
-        if not self._counts_reserve or not gates:
+        # Where regions move, the straight way is another at each time.
+        if not self._counts_reserve or not gates or self._scene.breath is not None:
             return
         gated = self._scene.with_targets([*gates, *self._scene.targets])
         wanted = self._strict(gated, min(USEFUL_RESERVE_MM, self._worth_mm()))
@@ -235,7 +238,17 @@ class _Known:
 
     def _ask(self, scene: Scene, worth_mm: float) -> Candidate | None:
         """Asks for a plan that has this clearance or reserve; gives one that holds, or None."""
-        return self._note(self._asker.one(self._strict(scene, worth_mm)))
+        asker = self._asker
+        if scene.breath is not None:
+            # Waits make "no" dear to prove. A count of states is the same in replays.
+            few = replace(asker.engine, max_states=_MOST_STATES_IN_TIME)
+            asker = replace(asker, engine=few)
+        try:
+            return self._note(asker.one(self._strict(scene, worth_mm)))
+        except LimitError:
+            if scene.breath is None:
+                raise
+            return None
 
     def _strict(self, scene: Scene, worth_mm: float) -> Scene:
         """The scene whose plans have this clearance or reserve."""

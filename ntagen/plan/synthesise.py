@@ -152,6 +152,7 @@ class EngineSynthesiser:
         max_plans: At most this many plans are listed.
         timeout_s: The engine stops after this time.
         memory_bytes: The engine stops when its states take this much.
+        max_states: The engine stops when it has stored so many states.
         keeps_strategy: Whether a synthesis has the strategy as JSON.
         listen: Is called regularly, and raises `KeyboardInterrupt` to end a synthesis.
     """
@@ -161,6 +162,7 @@ class EngineSynthesiser:
     max_plans: int = 100_000
     timeout_s: float | None = 60.0
     memory_bytes: int | None = 2 << 30
+    max_states: int | None = None
     keeps_strategy: bool = False
     listen: Callable[[], None] = lambda: None
 
@@ -206,6 +208,7 @@ class EngineSynthesiser:
             guide=_GUIDE,
             timeout_s=self.timeout_s,
             memory_bytes=self.memory_bytes,
+            states=self.max_states,
             strategy=self.keeps_strategy,
             progress=lambda *_: self.listen(),
         )
