@@ -19,8 +19,8 @@
 //!
 //! All of this is computed again when the graph has doubled. With a guide, that is too late: it
 //! leads on into a part of the game that one answer of the evader has just decided. So after each
-//! expansion, the new node and its predecessors are asked, as long as they turn out to be lost. This
-//! finds the same nodes but for those that lead to each other on cycles.
+//! expansion, the new node and its predecessors are asked, as long as they turn out to be lost.
+//! This finds the same nodes but for those that lead to each other on cycles.
 
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, NONE};
