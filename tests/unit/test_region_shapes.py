@@ -23,8 +23,8 @@ from ntagen.needle.nearest import TOLERANCE_MM, enters_at, nearest_to
 from ntagen.needle.sweep import BOUND_MM, Sweep
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.plan.actions import Plan, Push, Roll
-from ntagen.plan.best_plan import _stricter
 from ntagen.plan.certify import certify
+from ntagen.plan.stricter import stricter as narrower
 from ntagen.plot.picture import Picture, draw
 from ntagen.scene import Region
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere, turning
@@ -154,7 +154,7 @@ def _tip_at(region: Region, away_mm: float) -> object:
 def test_scenes_with_larger_regions_keep_their_shapes() -> None:
     target = Region("T", "target", Box((0.0, -50.0, 0.0), (20.0, 8.0, 12.0), AXES))
     scene = paper(targets=(target,), criticals=tuple(map(critical, SHAPES.values())))
-    stricter = _stricter(scene, 2.0, 1.0, 1.5)
+    stricter = narrower(scene, 2.0, 1.0, 1.5)
     for one, other in zip(scene.criticals, stricter.criticals, strict=True):
         assert other.shape == one.shape.grown(2.0)
     assert stricter.targets[0].shape.depth_mm == pytest.approx(4.0 - 1.5 - 0.3)
