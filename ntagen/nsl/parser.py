@@ -159,7 +159,11 @@ class _Parser:
         )
         if is_misplaced and kind is not None:
             self._report_misplaced(words[0], kind)
-        parsed = self._parse_words(words)
+        if is_misplaced and words[0].type == "NAME":
+            # A word of other braces, which is a name here: it is reported already.
+            parsed: tree.Statement = tree.Broken(words[0].span.to(words[-1].span), keyword)
+        else:
+            parsed = self._parse_words(words)
         if keyword in BLOCKS:
             body = tuple(self._body(words, depth))
         else:
