@@ -25,6 +25,9 @@ three bits are kept free."""
 MAX_ROLLS: Final = 100
 """A plan has at most this many rolls."""
 
+LARGEST_PART: Final = 0.5
+"""The curvature is wrong by at most this part: with more, a plan would be for another needle."""
+
 PAPER_QUERIES: Final = {
     "PathExists": "E<> Checker.Final_TR_Reached",
     "ReachFinalTR": "control: A<> Checker.Final_TR_Reached",
@@ -71,6 +74,29 @@ def positive(value: float, what: str, rule: str = "radius-not-positive") -> Brea
 def not_negative(value: float, what: str, rule: str = "distance-negative") -> Breach | None:
     """A value is at least 0."""
     return None if value >= 0.0 else Breach(rule, f"{what} cannot be negative")
+
+
+def part(value: float, what: str) -> Breach | None:
+    """A part of a whole is at least 0 and at most a half."""
+    if 0.0 <= value <= LARGEST_PART:
+        return None
+    return Breach(
+        "tissue-out-of-range",
+        f"{what} must be from 0 to {LARGEST_PART:.0%}, but this is {value:.4g}",
+        "write for example `curvature 10 %`",
+    )
+
+
+def roll_error(value_rad: float) -> Breach | None:
+    """A roll goes wrong by less than a quarter of a turn."""
+    if 0.0 <= value_rad < 0.5 * math.pi:
+        return None
+    return Breach(
+        "tissue-out-of-range",
+        f"the roll error must be from 0 to less than 90 deg, but this is "
+        f"{deg_from_rad(value_rad):.4g} deg",
+        "write for example `roll 5 deg`",
+    )
 
 
 def unit_vector(vector: Sequence[float], what: str) -> Breach | None:

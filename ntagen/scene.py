@@ -208,9 +208,48 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Tissue:
-    """How the tissue answers an action of the needle."""
+    """How the tissue answers an action of the needle.
 
-    kind: Literal["static"] = "static"
+    Attributes:
+        kind: ``static`` tissue changes nothing. The ``adversarial`` one picks, at the first push
+            after the entry or a roll, how much the needle bends until the next roll, and by how
+            much that roll went wrong.
+        curvature_ratio: The curvature may be greater or smaller by this part.
+        roll_rad: A roll may be too large or too small by this angle.
+        tip_mm: How far the tip may be off for other reasons: what must not be touched is larger by
+            this length, and targets are smaller.
+    """
+
+    kind: Literal["static", "adversarial"] = "static"
+    curvature_ratio: float = 0.0
+    roll_rad: float = 0.0
+    tip_mm: float = 0.0
+
+    def __post_init__(self) -> None:
+        curvature, roll, tip = "the curvature error", "the roll error", "the tip error"
+        _require(
+            rules.finite([self.curvature_ratio], curvature)
+            or rules.part(self.curvature_ratio, curvature),
+            rules.finite([self.roll_rad], roll) or rules.roll_error(self.roll_rad),
+            rules.finite([self.tip_mm], tip) or rules.not_negative(self.tip_mm, tip),
+        )
+
+    @property
+    def is_adversarial(self) -> bool:
+        """Whether it is an opponent."""
+        return self.kind == "adversarial"
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The factors of the curvature from which it picks, the least first."""
+        x = self.curvature_ratio
+        return (1.0 - x, 1.0, 1.0 + x) if x > 0.0 else (1.0,)
+
+    @property
+    def roll_errors_rad(self) -> tuple[float, ...]:
+        """The errors of a roll from which it picks, the least first."""
+        y = self.roll_rad
+        return (-y, 0.0, y) if y > 0.0 else (0.0,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,6 +327,43 @@ class Scene:
     def avoided(self) -> tuple[Region, ...]:
         """The regions that no plan may enter: critical, detection and unexplored ones."""
         return self.criticals + self.detections + self.unexplored
+
+    @property
+    def radii_mm(self) -> tuple[float, ...]:
+        """The radii of the motion circle that the tissue may pick."""
+        return tuple(self.needle.radius_mm / factor for factor in self.tissue.factors)
+
+    def with_tip_margin(self) -> Scene:
+        """The same scene with its tip error as margins: regions to avoid larger, targets smaller.
+
+        Raises:
+            InputError: A target is not larger than the tip error.
+        """
+        by_mm = self.tissue.tip_mm
+        if by_mm <= 0.0:
+            return self
+        for target in self.targets:
+            if target.shape.depth_mm <= by_mm:
+                raise InputError(
+                    f"`{target.name}` is {target.shape.depth_mm:g} mm deep, so nothing of it "
+                    f"is left when the tip may be off by {by_mm:g} mm\n"
+                    "hint: make the target larger, or `tip` of the tissue smaller"
+                )
+        return replace(
+            self,
+            targets=tuple(region.grown(-by_mm) for region in self.targets),
+            criticals=tuple(region.grown(by_mm) for region in self.criticals),
+            detections=tuple(region.grown(by_mm) for region in self.detections),
+            unexplored=tuple(region.grown(by_mm) for region in self.unexplored),
+            tissue=replace(self.tissue, tip_mm=0.0),
+        )
+
+    def expected(self) -> Scene:
+        """The scene for plans, which are sequences: the tissue does what is expected of it.
+
+        Its tip error stays, as margins.
+        """
+        return replace(self.with_tip_margin(), tissue=Tissue())
 
     def with_needle(self, tip: Pose, radius_mm: float, inserted_mm: float = 0.0) -> Scene:
         """The same scene with a new measurement of the tip's pose and the motion circle's radius.

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli import INTERNAL_ERROR
+from ntagen.cli.against import defence_notes, is_adversarial
 from ntagen.cli.asked import Asked, is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
@@ -29,7 +30,8 @@ from ntagen.errors import InputError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model, QueryForm
+    from ntagen.checker import Answer, Model, Options, QueryForm
+    from ntagen.nsl import Task
 
 STOPPED: Final = 3
 """Exit code after a limit or a ``maybe``."""
@@ -228,6 +230,7 @@ def command(
                             strategy=is_used or strategy is not None or controller is not None,
                             folder=query.folder,
                             progress=report,
+                            **_for_defence(options, loaded.task, query),
                         ),
                     )
             except InputError as error:
@@ -245,6 +248,9 @@ def command(
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
             notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
+            if loaded.task is not None and _is_defence(loaded.task, query):
+                notes += defence_notes(answer, loaded.task, options, plans)
+                outputs.written.add("--plans")
             if as_json:
                 echo(json.dumps(_record(answer, query)))
             else:
@@ -252,6 +258,23 @@ def command(
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
     say(unwritten(outputs.wanted(), outputs.written))
     return worst
+
+
+def _is_defence(task: Task | None, query: Asked) -> bool:
+    """Whether a query asks for a strategy against a tissue that answers."""
+    from ntagen.rules import PAPER_QUERIES
+
+    text = query.text.partition("=")[2] if query.text.startswith("strategy") else query.text
+    return is_adversarial(task) and text.strip() == PAPER_QUERIES["ReachFinalTR"]
+
+
+def _for_defence(options: Options, task: Task | None, query: Asked) -> dict[str, Any]:
+    """The options of such a query: a guide, and no list of plans, which a game has not."""
+    from ntagen.plan.synthesise import GUIDE
+
+    if not _is_defence(task, query):
+        return {}
+    return {"guide": options.guide or GUIDE, "plans": "none"}
 
 
 def _criteria(text: str | None) -> tuple[str, ...]:

@@ -60,4 +60,10 @@ def relies_on(settings: Settings, scene: Scene) -> str:
     margin_mm = settings.margins.clearance_mm
     kept = f"plans stay more than {margin_mm:g} mm away" if margin_mm else "plans do not touch it"
     map_text = f"on {regions}: {kept if known == 1 else kept.replace('touch it', 'touch them')}"
-    return "; ".join([position, force, map_text if known else "on no known critical region"])
+    relied = [position, force, map_text if known else "on no known critical region"]
+    if scene.tissue.is_adversarial:
+        relied.append(
+            "plans are for the expected tissue, with the tip error as margin, and made anew when "
+            "the needle leaves them: what `ntagen check` guarantees is not driven"
+        )
+    return "; ".join(relied)

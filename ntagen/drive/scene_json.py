@@ -15,7 +15,7 @@ from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
 from ntagen.imaging.store import digest_of, from_entry, to_entry
 from ntagen.motion import Motion
-from ntagen.scene import Region, Scene
+from ntagen.scene import Region, Scene, Tissue
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, Field, HalfSpace, Shape, Sphere
 
 VERSION: Final = 1
@@ -52,6 +52,9 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
             del entries[kind]
     if scene.breath is None:
         del entries["breath"]
+    if not scene.tissue.is_adversarial:
+        # As logs have it that were written before there was another.
+        entries["tissue"] = {"kind": scene.tissue.kind}
     document: dict[str, object] = {"version": VERSION, "scene": entries}
     missing = {digest: text for digest, text in samples.items() if digest not in (known or {})}
     if missing:
@@ -86,6 +89,7 @@ def scene_from_json(text: str | bytes, known: Mapping[str, str] | None = None) -
                 f"only version {VERSION}"
             )
         entries = {kind: [] for kind in _LATER_KINDS} | {"breath": None} | document["scene"]
+        entries["tissue"] = dataclasses.asdict(Tissue()) | entries["tissue"]
         samples = {**(known or {}), **document.get("samples", {})}
         regions = {
             kind: tuple(_to_region(entry, samples) for entry in entries[kind]) for kind in _KINDS

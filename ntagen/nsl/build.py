@@ -9,7 +9,7 @@ resolution, checks regions at the ends of steps, and counts touching a region as
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final, Literal, cast
 
@@ -32,6 +32,7 @@ from ntagen.scene import (
     Region,
     RegionKind,
     Scene,
+    Tissue,
     Vector,
 )
 from ntagen.shapes import HalfSpace
@@ -77,6 +78,14 @@ def build(draft: Draft, reporter: Reporter) -> Built | None:
     return None if scene is None else Built(scene, tuple(draft.given), device, tracker)
 
 
+_TISSUE_RULES: Final[dict[str, tuple[str, Callable[[float], rules.Breach | None]]]] = {
+    "curvature": ("curvature_ratio", lambda value: rules.part(value, "the curvature error")),
+    "roll": ("roll_rad", rules.roll_error),
+    "tip": ("tip_mm", lambda value: rules.not_negative(value, "the tip error")),
+}
+"""The bounds of an adversarial tissue: their fields, and the rules for them."""
+
+
 class _Builder:
     """Applies the rules to one draft."""
 
@@ -96,6 +105,7 @@ class _Builder:
         limits = self._limits()
         for name, query in draft.queries.items():
             self._reporter.obeys(rules.query(name, query.value or ""), query.span)
+        tissue = self._tissue()
         resolution = self._resolution()
         spheres = self._regions.spheres(needle)
         breath = None if limits is None else self._motions.breath(limits)
@@ -103,6 +113,7 @@ class _Builder:
         if self._check_range(resolution or 1, tip, needle, limits, spheres):
             if tip is not None:
                 self._regions.check(tip, spheres)
+            self._check_targets(tissue, spheres)
             if needle is not None and limits is not None and resolution is not None:
                 self._check_step(needle, limits, resolution, spheres)
         if self._reporter.has_errors or needle is None or limits is None or resolution is None:
@@ -118,6 +129,7 @@ class _Builder:
             detections=_of_kind(spheres, "detection"),
             unexplored=_of_kind(spheres, "unexplored"),
             safe=_of_kind(spheres, "safe"),
+            tissue=tissue,
             resolution_per_mm=resolution,
             safety=safety,
             queries=tuple(
@@ -286,6 +298,19 @@ class _Builder:
             return None
         return round(deg_from_rad(placed.value))
 
+    def _tissue(self) -> Tissue:
+        """How the tissue behaves; static after a mistake."""
+        if self._draft.choices.get("tissue") != "adversarial":
+            return Tissue()
+        values = {}
+        for word, (field_name, rule) in _TISSUE_RULES.items():
+            placed = self._draft.tissue.get(word)
+            if placed is None or placed.value is None:
+                continue
+            if self._reporter.obeys(rule(placed.value), placed.span):
+                values[field_name] = placed.value
+        return Tissue("adversarial", **values)
+
     def _resolution(self) -> int | None:
         """Fixed-point units in a mm."""
         placed = self._draft.resolution
@@ -298,6 +323,19 @@ class _Builder:
         return round(placed.value)
 
     # -------------------------------------------------------------------------------------- rules
+
+    def _check_targets(self, tissue: Tissue, spheres: list[PlacedRegion]) -> None:
+        """Something is left of each target when the tip may be off."""
+        for one in spheres:
+            depth_mm = one.region.shape.depth_mm
+            if one.region.kind == "target" and 0.0 < depth_mm <= tissue.tip_mm:
+                self._report(
+                    "tip-error-too-large",
+                    self._draft.tissue["tip"].span,
+                    f"`{one.region.name}` is {depth_mm:g} mm deep, and the tip may be off by as "
+                    "much",
+                    hint="make the target larger, or the error smaller",
+                )
 
     def _check_step(
         self, needle: Needle, limits: Limits, resolution: int, spheres: list[PlacedRegion]

@@ -41,6 +41,13 @@ VECTORS: Final = {
 }
 """The settings of needle and motion: their dimension, and what they are."""
 
+TISSUE: Final = {
+    "curvature": (NUMBER, "the curvature error"),
+    "roll": (ANGLE, "the roll error"),
+    "tip": (LENGTH, "the tip error"),
+}
+"""The bounds of an adversarial tissue: their dimension, and what they are."""
+
 FREE: Final = "free"
 """The word for a bevel whose direction the strategy chooses; older files may use it as a name."""
 
@@ -77,8 +84,8 @@ class ContentResolver:
                 self._roll(statement, scope, draft)
             case tree.Wait() | tree.Gate():
                 self._moves.rest(statement, scope, draft)
-            case tree.Choice():
-                self._choice(statement, draft)
+            case tree.Choice() | tree.Tissue():
+                self._behaviour(statement, scope, draft)
             case tree.Parameter():
                 self._driver.parameter(statement, scope, draft)
             case tree.Axis():
@@ -249,6 +256,46 @@ class ContentResolver:
             draft.choices[statement.keyword] = statement.word.text
         else:
             draft.has_gaps = True
+
+    def _behaviour(self, statement: tree.Choice | tree.Tissue, scope: Scope, draft: Draft) -> None:
+        """What is safe, or how the tissue behaves."""
+        if isinstance(statement, tree.Choice):
+            self._choice(statement, draft)
+        else:
+            self._tissue(statement, scope, draft)
+
+    def _tissue(self, statement: tree.Tissue, scope: Scope, draft: Draft) -> None:
+        """How the tissue behaves, with the bounds of an adversarial one."""
+        if not is_choice(statement.word, "tissue", self._reporter):
+            draft.has_gaps = True
+            return
+        draft.choices["tissue"] = statement.word.text
+        if statement.word.text == "static" and statement.bounds:
+            self._reporter.report(
+                "tissue-bound-misused",
+                statement.bounds[0].word.span,
+                "static tissue has no bounds: it changes nothing",
+                hint="remove them, or write `tissue adversarial`",
+            )
+        if statement.word.text == "adversarial" and not statement.bounds:
+            self._reporter.report(
+                "tissue-bound-misused",
+                statement.span,
+                "nothing says what an adversarial tissue may do",
+                hint="write for example `tissue adversarial curvature 10 % roll 5 deg tip 0.5 mm`",
+            )
+        for bound in statement.bounds:
+            word = bound.word.text
+            if word in draft.tissue:
+                self._reporter.report(
+                    "statement-repeated",
+                    bound.word.span,
+                    f"`{word}` is written a second time",
+                    hint="remove one of the two",
+                )
+            dimension, role = TISSUE[word]
+            value = self._evaluator.number(bound.value, scope, dimension, role)
+            draft.tissue[word] = Placed(value, bound.value.span)
 
     def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
         """The fixed-point scale, as units per mm."""

@@ -48,7 +48,7 @@ class TreeBuilder:
             case "roll" | "wait" | "gate":
                 return self._moving(keyword, parts, span)
             case "tissue" | "safety":
-                return tree.Choice(span, keyword, self._identifier(parts[0]))
+                return self._behaviour(keyword, parts, span)
             case "resolution" | "transform":
                 return self._measured(keyword, parts, span)
             case "tip" | "heading" | "bevel" | "radius" | "speed" | "length" | "step":
@@ -65,6 +65,18 @@ class TreeBuilder:
         if isinstance(parts[2], str):
             return tree.Transform(span, direction, space, self._text(parts[2]), ())
         return tree.Transform(span, direction, space, None, tuple(map(self.expression, parts[2:])))
+
+    def _behaviour(
+        self, keyword: str, parts: Sequence[object], span: Span
+    ) -> tree.Tissue | tree.Choice:
+        """What is safe, or how the tissue behaves, with the bounds of an adversarial one."""
+        if keyword == "safety":
+            return tree.Choice(span, "safety", self._identifier(parts[0]))
+        bounds = tuple(
+            tree.TissueBound(self._identifier(word), self.expression(value))
+            for word, value in zip(parts[1::2], parts[2::2], strict=True)
+        )
+        return tree.Tissue(span, self._identifier(parts[0]), bounds)
 
     def _driving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
         """A setting of the driver, a device, its axis, or a tracker."""

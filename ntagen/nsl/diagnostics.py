@@ -162,6 +162,15 @@ KINDS: Final = _kinds(
     ("N089", "address-malformed", "error", "An address is a host and a port."),
     ("N090", "safe-overlaps", "warning", "A safe region has nothing critical or unexplored in it."),
     ("N091", "target-without-end", "error", "A target must end somewhere: plans lead into it."),
+    # Tissue.
+    ("N092", "tissue-out-of-range", "error", "The tissue cannot err by this much."),
+    (
+        "N093",
+        "tissue-bound-misused",
+        "error",
+        "An adversarial tissue has bounds, a static one none.",
+    ),
+    ("N094", "tip-error-too-large", "error", "Targets are larger than the error of the tip."),
     # Regions from files.
     ("N100", "package-missing", "error", "A package that reads such files is not installed."),
     ("N101", "image-malformed", "error", "The file is not what its name says."),

@@ -128,6 +128,7 @@ class Draft:
     angles: list[Placed[float]] = field(default_factory=list)
     max_rolls: Placed[int] | None = None
     roll_distance: Placed[float] | None = None
+    tissue: dict[str, Placed[float]] = field(default_factory=dict)
     choices: dict[str, str] = field(default_factory=dict)
     is_bevel_free: bool = False
     wait: Placed[float] | None = None

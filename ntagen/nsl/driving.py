@@ -36,7 +36,7 @@ _DIMENSIONS: Final[dict[Kind, Dimension]] = {
 }
 
 CHOICES: Final = {
-    "tissue": ("static",),
+    "tissue": ("static", "adversarial"),
     "safety": ("sampled", "swept"),
     "device": ("grbl",),
     "tracker": ("openigtlink",),

@@ -36,8 +36,10 @@ _COMMENT_GAP: Final = 3
 
 _NONE_AFTER: Final = frozenset({"LPAR", "LSQB", "RANGE"})
 _NONE_BEFORE: Final = frozenset({"RPAR", "RSQB", "LSQB", "COMMA", "RANGE"})
-_OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "RPAR", "RSQB"})
-_CLAUSES: Final = frozenset({"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT", "MOVES"}) | {
+_OPERAND_ENDS: Final = frozenset({"NAME", "NUMBER", "RATIO", "PERCENT", "RPAR", "RSQB"})
+_CLAUSES: Final = frozenset(
+    {"SPHERE", "AROUND", "MARGIN", "RADIUS", "AT", "MOVES", "TISSUE_PART"}
+) | {
     *("BOX", "SIZE", "TURNED", "CAPSULE", "CYLINDER", "ELLIPSOID", "RADII", "HALFSPACE", "TOWARDS"),
     *("MESH", "SEGMENTATION", "MARKUPS", "SEGMENT", "POINT", "LABEL", "GRID"),
 }

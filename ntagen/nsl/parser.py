@@ -484,7 +484,7 @@ def _accepted(parser: lark.parsers.lalr_interactive_parser.InteractiveParser) ->
 
 
 _VALUE_ENDS: Final = frozenset(
-    {"NAME", "NUMBER", "RATIO", "RPAR", "RSQB", "STRING", "TIMES", "APART"}
+    {"NAME", "NUMBER", "RATIO", "PERCENT", "RPAR", "RSQB", "STRING", "TIMES", "APART"}
 )
 _SEPARATORS: Final = frozenset({";", ","})
 

@@ -133,6 +133,7 @@ UNITS: Final[dict[str, tuple[float, Dimension]]] = {
     **{name: (factor, FORCE) for name, factor in N_PER.items()},
     **{name: (factor, DATA) for name, factor in BYTES_PER.items()},
     "steps": (1.0, STEPS),
+    "%": (0.01, NUMBER),
 }
 """Units by name: how many mm, rad, s, N, bytes or steps they are, and their dimension."""
 

@@ -76,6 +76,9 @@ _SOLID_WORDS: Final = SOLIDS | {
 _MOVES_WORDS: Final = frozenset({"moves", "along", "every", "phase", "through", "after", "as"})
 _MOTION_WORDS: Final = _LATER_MOTION | {"only", "while", "phase", "between", "and"}
 
+TISSUE_BOUNDS: Final = ("curvature", "roll", "tip")
+"""The bounds of an adversarial tissue."""
+
 RESERVED: Final = (KEYWORDS | _OTHER_WORDS) - _LATER_MOTION
 """All words that cannot be names because of the grammar."""
 
@@ -169,7 +172,7 @@ def tokenise(source: Source, known: Iterable[tuple[int, int, Token]] = ()) -> li
         begin = end
     if stray_count <= MAX_STRAY:
         _lex(source, begin, len(source.text), found, MAX_STRAY - stray_count)
-    return list(_joined(_named(found)))
+    return list(_joined(_named(_bounded(found))))
 
 
 def _lex(
@@ -268,6 +271,27 @@ _BEFORE_VALUE: Final = frozenset(
 ) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "BETWEEN", "AND"}
 
 
+def _bounded(items: Sequence[Token | Comment]) -> list[Token | Comment]:
+    """The items, with the words of bounds in the statement of the tissue as such.
+
+    They begin statements elsewhere, or are names.
+    """
+    found: list[Token | Comment] = []
+    depth, is_tissue = 0, False
+    for item in items:
+        if isinstance(item, Token):
+            depth += {"LPAR": 1, "LSQB": 1, "RPAR": -1, "RSQB": -1}.get(item.type, 0)
+            is_other = item.text in KEYWORDS and item.text not in TISSUE_BOUNDS
+            if item.text == "tissue":
+                depth, is_tissue = 0, True
+            elif is_other or item.type in ("BRACE", "QUERY"):
+                is_tissue = False
+            if is_tissue and depth == 0 and item.text in TISSUE_BOUNDS:
+                item = Token("TISSUE_PART", item.text, item.span, item.line)
+        found.append(item)
+    return found
+
+
 def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:
     """The items, with the words that begin a statement in `PHRASES` joined to one token."""
     block: BlockKind | None = None
@@ -344,6 +368,6 @@ def begins_statement(token: Token, kind: BlockKind | None) -> bool:
     """
     if token.type in ("QUERY", "PARAMETER", "AXIS"):
         return True
-    if token.type == "NAME":
+    if token.type in ("NAME", "TISSUE_PART"):
         return False  # One of the words that a setting can have.
     return token.text in KEYWORDS and (token.text != "radius" or kind == "needle")

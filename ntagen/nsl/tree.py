@@ -271,8 +271,26 @@ class Choice:
     """A property whose value is one of a few words: ``safety swept``."""
 
     span: Span
-    keyword: Literal["tissue", "safety"]
+    keyword: Literal["safety"]
     word: Identifier
+
+
+@dataclass(frozen=True, slots=True)
+class TissueBound:
+    """A bound of an adversarial tissue: ``curvature 10 %``."""
+
+    word: Identifier
+    value: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Tissue:
+    """``tissue adversarial curvature 10 % roll 5 deg tip 0.5 mm``."""
+
+    span: Span
+    word: Identifier
+    bounds: tuple[TissueBound, ...]
+    keyword: Literal["tissue"] = "tissue"
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,6 +422,7 @@ Statement = (
     | Wait
     | Gate
     | Choice
+    | Tissue
     | Resolution
     | Transform
     | Section

@@ -62,7 +62,7 @@ FORMS: Final = {
     "push": "write for example `push only while phase between 200 deg and 340 deg`",
     "moves": "write for example `moves 12 mm along +z every 4 s phase 90 deg`",
     "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
-    "tissue": "write `tissue static`",
+    "tissue": "write `tissue static` or `tissue adversarial curvature 10 % roll 5 deg`",
     "resolution": "write for example `resolution 1000 per mm`",
     "safety": "write `safety sampled` or `safety swept`",
 }
@@ -78,6 +78,8 @@ TERMINAL_WORDS: Final = {
     "STRING": "a text in quotes",
     "NAME": "a name",
     "RATIO": "a unit",
+    "PERCENT": "%",
+    "TISSUE_PART": "curvature, roll or tip",
 }
 _VALUE_TERMINALS: Final = frozenset({"NUMBER", "NAME", "LPAR", "SIGN"})
 _OPERATORS: Final = frozenset({"SIGN", "SCALE", "RATIO"})

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 STRATEGY_QUERY: Final = "control: A<> Checker.Final_TR_Reached"
 """The paper's second query; its strategy has the plans."""
 
-_GUIDE: Final = "get_miss()"
+GUIDE: Final = "get_miss()"
 """The function of the model that says by how much the tip misses the target after one more roll."""
 
 
@@ -197,7 +197,7 @@ class EngineSynthesiser:
         from ntagen import checker
         from ntagen.render import render
 
-        model_xml = render(scene, only_plans=True)
+        model_xml = render(scene.expected(), only_plans=True)
         model = checker.load(model_xml)
         # The model computes distances: if one wrapped round, the answer would be wrong.
         model.overflow = "error"
@@ -205,7 +205,7 @@ class EngineSynthesiser:
             STRATEGY_QUERY,
             plans="all",
             max_plans=self.max_plans,
-            guide=_GUIDE,
+            guide=GUIDE,
             timeout_s=self.timeout_s,
             memory_bytes=self.memory_bytes,
             states=self.max_states,

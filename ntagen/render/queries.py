@@ -49,7 +49,11 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     Raises:
         InputError: Two queries have the same name.
     """
-    queries = {query.name: query for query in PAPER_QUERIES}
+    # Where the tissue answers, that it might help is no question, and a search through all that it
+    # may do takes minutes.
+    is_game = scene.tissue.is_adversarial
+    papers = PAPER_QUERIES[1:] if is_game else PAPER_QUERIES
+    queries = {query.name: query for query in papers}
     for named in scene.queries:
         breach = rules.query(named.name, named.text)
         if breach is not None:

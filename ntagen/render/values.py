@@ -51,6 +51,23 @@ class Spheres:
 
 
 @dataclass(frozen=True, slots=True)
+class Adversary:
+    """What the tissue picks from, as texts: radii of the motion circle, and errors of rolls.
+
+    Attributes:
+        radii: From the strongest bend to the weakest.
+        nominal_bend: The index of the radius without an error.
+        twists: The errors of a roll, in units of ``1 / scale`` rad.
+        nominal_twist: The index of no error.
+    """
+
+    radii: tuple[str, ...]
+    nominal_bend: int
+    twists: tuple[str, ...]
+    nominal_twist: int
+
+
+@dataclass(frozen=True, slots=True)
 class ModelValues:
     """All values for the templates; lengths are texts in units of ``1 / scale`` mm."""
 
@@ -79,6 +96,7 @@ class ModelValues:
     only_plans: bool
     solids: Solids
     moving: Moving | None
+    adversary: Adversary | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +145,7 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
     Raises:
         InputError: A value does not fit the model's numbers, or the model would not move.
     """
+    scene = scene.with_tip_margin()
     if not scene.targets:
         raise InputError("the scene has no target\nhint: add a line such as `target T1 sphere …`")
     if not scene.limits.roll_angles_rad:
@@ -137,6 +156,11 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
     needle, limits = scene.needle, scene.limits
     tip = needle.tip
     _check_motion(scene)
+    if scene.tissue.is_adversarial and any(region.motion for region in scene.regions):
+        raise InputError(
+            "regions that move, and a tissue that answers, cannot be in one task\n"
+            "hint: make the tissue static, or the regions as large as where they get"
+        )
     tables = solids(scene.avoided, scene.targets, scale, frame)
     breathing = moving(scene, tables.places, frame)
     dt, velocity_mm, unit_s = rules.time_units(limits.step_s, needle.speed_mm_per_s)
@@ -164,10 +188,28 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
         unexplored=writer.spheres(_balls(still(scene.unexplored))),
         safe=writer.spheres(_balls(scene.safe)),
         swept=scene.safety == "swept",
-        sweep_margin=_sweep_margin(scale, needle.radius_mm),
+        sweep_margin=_sweep_margin(scale, max(scene.radii_mm)),
         only_plans=only_plans,
         solids=tables,
         moving=breathing,
+        adversary=_adversary(scene, writer),
+    )
+
+
+def _adversary(scene: Scene, writer: _Writer) -> Adversary | None:
+    """What an adversarial tissue picks from; None for a static one."""
+    tissue = scene.tissue
+    if tissue.kind != "adversarial":
+        return None
+    factors, errors = tissue.factors[::-1], tissue.roll_errors_rad
+    return Adversary(
+        radii=tuple(
+            writer.number(scene.needle.radius_mm / factor, "the radius of the motion circle")
+            for factor in factors
+        ),
+        nominal_bend=factors.index(1.0),
+        twists=tuple(writer.number(error, "the error of a roll") for error in errors),
+        nominal_twist=errors.index(0.0),
     )
 
 
@@ -192,20 +234,21 @@ def _check_motion(scene: Scene) -> None:
     """
     needle, limits, per_mm = scene.needle, scene.limits, scene.resolution_per_mm
     push_mm = needle.speed_mm_per_s * limits.step_s
-    breach = (
-        rules.fits(needle.radius_mm, per_mm, "the radius of the motion circle")
-        or rules.visible(needle.radius_mm, per_mm, "the radius of the motion circle")
-        or rules.fits(push_mm, per_mm, "a push")
-        or rules.motion(
-            limits.step_s,
-            needle.speed_mm_per_s,
-            needle.radius_mm,
-            per_mm,
-            swept=scene.safety == "swept",
+    for radius_mm in scene.radii_mm:
+        breach = (
+            rules.fits(radius_mm, per_mm, "the radius of the motion circle")
+            or rules.visible(radius_mm, per_mm, "the radius of the motion circle")
+            or rules.fits(push_mm, per_mm, "a push")
+            or rules.motion(
+                limits.step_s,
+                needle.speed_mm_per_s,
+                radius_mm,
+                per_mm,
+                swept=scene.safety == "swept",
+            )
         )
-    )
-    if breach is not None:
-        raise InputError(f"{breach.message}\nhint: {breach.hint}")
+        if breach is not None:
+            raise InputError(f"{breach.message}\nhint: {breach.hint}")
 
 
 def _sweep_margin(scale: int, radius_mm: float) -> int:
