@@ -230,7 +230,7 @@ def command(
                             strategy=is_used or strategy is not None or controller is not None,
                             folder=query.folder,
                             progress=report,
-                            **_for_defence(options, loaded.task, query),
+                            **_for_task(options, loaded.task, query),
                         ),
                     )
             except InputError as error:
@@ -260,21 +260,27 @@ def command(
     return worst
 
 
-def _is_defence(task: Task | None, query: Asked) -> bool:
-    """Whether a query asks for a strategy against a tissue that answers."""
+def _seeks_target(query: Asked) -> bool:
+    """Whether a query is the paper's question for a strategy that reaches the target."""
     from ntagen.rules import PAPER_QUERIES
 
     text = query.text.partition("=")[2] if query.text.startswith("strategy") else query.text
-    return is_adversarial(task) and text.strip() == PAPER_QUERIES["ReachFinalTR"]
+    return text.strip() == PAPER_QUERIES["ReachFinalTR"]
 
 
-def _for_defence(options: Options, task: Task | None, query: Asked) -> dict[str, Any]:
-    """The options of such a query: a guide, and no list of plans, which a game has not."""
+def _is_defence(task: Task | None, query: Asked) -> bool:
+    """Whether a query asks for a strategy against a tissue that answers."""
+    return is_adversarial(task) and _seeks_target(query)
+
+
+def _for_task(options: Options, task: Task | None, query: Asked) -> dict[str, Any]:
+    """Options of an environment's game: a guide; if the tissue answers, no list of plans."""
     from ntagen.plan.synthesise import GUIDE
 
-    if not _is_defence(task, query):
+    if task is None or not _seeks_target(query):
         return {}
-    return {"guide": options.guide or GUIDE, "plans": "none"}
+    guided = {"guide": options.guide or GUIDE}
+    return guided | {"plans": "none"} if _is_defence(task, query) else guided
 
 
 def _criteria(text: str | None) -> tuple[str, ...]:

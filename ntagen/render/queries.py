@@ -49,10 +49,10 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     Raises:
         InputError: Two queries have the same name.
     """
-    # Where the tissue answers, that it might help is no question, and a search through all that it
-    # may do takes minutes.
-    is_game = scene.tissue.is_adversarial
-    papers = PAPER_QUERIES[1:] if is_game else PAPER_QUERIES
+    # Where the tissue answers, that it might help is no question. Where regions move, the second
+    # query asks the same. A search through all that may happen then takes minutes.
+    is_long = scene.tissue.is_adversarial or scene.breath is not None
+    papers = PAPER_QUERIES[1:] if is_long else PAPER_QUERIES
     queries = {query.name: query for query in papers}
     for named in scene.queries:
         breach = rules.query(named.name, named.text)
