@@ -82,7 +82,7 @@ def part(value: float, what: str) -> Breach | None:
         return None
     return Breach(
         "tissue-out-of-range",
-        f"{what} must be from 0 to {LARGEST_PART:.0%}, but this is {value:.4%}",
+        f"{what} must be from 0 to {LARGEST_PART:.0%}, but this is {100.0 * value:.4g}%",
         "write for example `curvature 10 %`",
     )
 
