@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from ntagen.needle.kinematics import Arc
-from ntagen.needle.virtual import Obstacle
+from ntagen.needle.obstacle import Obstacle
 
 SPACING_MM: Final = 0.25
 """The distance between samples of the shaft, and about how far regions move between two samples."""

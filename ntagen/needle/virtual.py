@@ -12,21 +12,19 @@ It never reads a clock or waits: motions take simulated time on the clock that i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from ntagen.errors import DeviceError
+from ntagen.needle.breathing import BreathWitness
 from ntagen.needle.errors import Errors as Errors
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.nearest import nearest_to
+from ntagen.needle.obstacle import Obstacle as Obstacle
 from ntagen.needle.path import Path
-from ntagen.scene import Needle, Pose, Region, Vector
-
-FORCE_N_PER_MM: Final = 1.0
-"""The rise of the force in the sensing margin; our choice, since no source gives a value."""
+from ntagen.scene import Needle, Pose
 
 ROLL_RAD_PER_S: Final = math.pi
 """The speed of a roll: half a turn per second; our choice."""
@@ -48,30 +46,6 @@ class SimulatedClock:
     def advance(self, seconds: float) -> None:
         """Lets time pass."""
         self._now_s += seconds
-
-
-@dataclass(frozen=True, slots=True)
-class Obstacle:
-    """An actual critical region, and the distance from its surface at which it is felt.
-
-    Attributes:
-        region: The region.
-        margin_mm: The distance.
-        clock_s: The time of the breath when the needle's clock is at 0.
-    """
-
-    region: Region
-    margin_mm: float
-    clock_s: float = 0.0
-
-    def force_n(self, point_mm: Vector, now_s: float = 0.0) -> float:
-        """The force on a tip at a point, at a time of the needle's clock."""
-        return FORCE_N_PER_MM * self.depth_in_margin_mm(point_mm, now_s)
-
-    def depth_in_margin_mm(self, point_mm: Vector, now_s: float = 0.0) -> float:
-        """How deep a point lies in the margin; 0 outside."""
-        away_mm = self.region.distance_at_mm(point_mm, self.clock_s + now_s)
-        return max(0.0, self.margin_mm - away_mm)
 
 
 class VirtualNeedle:
@@ -107,8 +81,6 @@ class VirtualNeedle:
         self._roll_errors = np.random.default_rng(rolls)
         self._path = Path(needle.tip)
         self._left: list[Arc] = []
-        from ntagen.needle.breathing import BreathWitness  # It needs the obstacles of this module.
-
         self._witness = BreathWitness(obstacles)
 
     def now_s(self) -> float:
