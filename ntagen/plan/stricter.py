@@ -52,13 +52,8 @@ def stricter(scene: Scene, by_mm: float, shells_mm: float, depth_mm: float) -> S
         shells_mm: By how much the other regions to avoid are larger.
         depth_mm: How deep a plan must lead into the last target.
     """
-    *before, last = scene.targets
-    most_mm = last.shape.depth_mm
-    shallow_mm = max(0.5 * most_mm, most_mm - depth_mm - BETWEEN_STEPS_MM)
-    scene = scene.with_targets([*before, last.grown(shallow_mm - most_mm)])
     return replace(
-        scene,
-        criticals=tuple(region.grown(by_mm) for region in scene.criticals),
+        wider(deeper(scene, depth_mm + BETWEEN_STEPS_MM), by_mm),
         detections=tuple(region.grown(shells_mm) for region in scene.detections),
         unexplored=tuple(region.grown(shells_mm) for region in scene.unexplored),
     )
