@@ -19,6 +19,7 @@ from ntagen.cli.models import (
     include_option,
     load_model,
     pointing_to_explanations,
+    rank_option,
     show_warnings,
     with_pointer,
 )
@@ -130,14 +131,7 @@ REJECTED_MARK: Final = ("refused", "red")
     "those of the last. Plans of an environment are also ranked, certified and marked if they hold "
     "in exact kinematics.",
 )
-@click.option(
-    "--rank",
-    "ranking",
-    metavar="CRITERIA",
-    default=None,
-    help="How plans of an environment are ranked, the most important criterion first: clearance, "
-    "reserve, rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
-)
+@rank_option("plans of an environment")
 @engine_options
 @overflow_rule()
 @include_option()

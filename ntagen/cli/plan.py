@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.models import include_option
+from ntagen.cli.models import include_option, rank_option
 from ntagen.cli.quantities import TIME
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
@@ -48,14 +48,7 @@ STOPPED: Final = 3
     type=TIME,
     help="The search ends after about this time. It ends sooner if no plan can be better.",
 )
-@click.option(
-    "--rank",
-    "ranking",
-    metavar="CRITERION,…",
-    default=None,
-    help="How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
-    "length, target.  [default: as drive { … } says, else clearance,rolls,length]",
-)
+@rank_option()
 @click.option(
     "-o",
     "--output",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.models import include_option
+from ntagen.cli.models import include_option, rank_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -46,14 +46,7 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     type=click.IntRange(min=0),
     help="Draw at most this many plans. 0 draws the scene alone, without a search for plans.",
 )
-@click.option(
-    "--rank",
-    "ranking",
-    metavar="CRITERION,…",
-    default=None,
-    help="How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
-    "length, target.  [default: as drive { … } says, else clearance,rolls,length]",
-)
+@rank_option()
 @include_option()
 def command(
     source: Path, output: Path | None, shown: int, ranking: str | None, include: tuple[Path, ...]
@@ -129,7 +122,7 @@ def _of_scene(
     if shown == 0:
         return picture_of_plans(task.scene, None, shown)
     if task.scene.breath is not None:
-        # Waits make so many plans that a list has no end; the best one is asked for, as in drives.
+        # Waits make too many plans for a list. The best one is asked for, as in drives.
         return picture_of_plans(task.scene, BestPlanSynthesiser(engine)(task.scene), shown)
     if sequences(task.scene) <= MOST_WHEN_NARROW:
         # All plans are listed, since some are to be shown beside the best one.

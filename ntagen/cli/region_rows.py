@@ -40,7 +40,7 @@ def region_facts(scene: Scene) -> list[dict[str, object]]:
 
 
 def region_rows(scene: Scene, most: int) -> Iterator[str]:
-    """The regions as lines of a table with aligned columns, at most so many of them."""
+    """The first regions as lines of a table with aligned columns, `most` of them at most."""
     regions = scene.regions[:most]
     way = _straight_way(scene)
     rows = [["region", "kind", "shape", "volume", "x mm", "y mm", "z mm", "from the straight way"]]
