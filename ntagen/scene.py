@@ -36,6 +36,9 @@ DEFAULT_LENGTH_MM = 200.0
 """The default length of a needle: that of long biopsy needles. The longest path of the paper's
 instance takes 190 mm, so this limit does not change its model."""
 
+SHAFT_SPACING_MM = 0.5
+"""The places of a shaft in a scene are at most so far apart."""
+
 _KINDS = ("target", "critical", "detection", "unexplored", "safe")
 
 RegionKind = Literal["target", "critical", "detection", "unexplored", "safe"]
@@ -280,6 +283,8 @@ class Scene:
             ``swept`` also on the arc between them.
         queries: Named queries besides the two of the paper.
         breath: The breath with which regions move; None if all keep still.
+        shaft_mm: Places of the shaft behind the tip, at most `SHAFT_SPACING_MM` apart; only where
+            regions move, since others cannot come to it.
     """
 
     name: str
@@ -296,6 +301,7 @@ class Scene:
     safety: Literal["sampled", "swept"] = "sampled"
     queries: tuple[NamedQuery, ...] = ()
     breath: Breath | None = None
+    shaft_mm: tuple[Vector, ...] = ()
 
     def __post_init__(self) -> None:
         _require(
@@ -385,6 +391,10 @@ class Scene:
             return self
         clock_s %= self.breath.period_s
         return replace(self, breath=replace(self.breath, clock_s=clock_s))
+
+    def with_shaft(self, places_mm: Sequence[Vector]) -> Scene:
+        """The same scene with a shaft behind the tip, if regions move."""
+        return self if self.breath is None else replace(self, shaft_mm=tuple(places_mm))
 
     def with_targets(self, targets: Sequence[Region]) -> Scene:
         """The same scene with other targets: those that are still to be visited."""

@@ -59,7 +59,8 @@ class Learner:
 
     def scene(self, tip: Pose, radius_mm: float, depth_mm: float) -> Scene:
         """The known scene now; see `Knowledge.scene`."""
-        return self.knowledge.scene(tip, radius_mm, depth_mm, self.clock_now_s())
+        scene = self.knowledge.scene(tip, radius_mm, depth_mm, self.clock_now_s())
+        return scene.with_shaft(self._needle.shaft_mm(depth_mm) if scene.breath else ())
 
     @property
     def has_visited_all(self) -> bool:

@@ -21,8 +21,8 @@ from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.path import Path
-from ntagen.scene import Needle
+from ntagen.needle.path import Path, sample_poses
+from ntagen.scene import SHAFT_SPACING_MM, Needle, Vector
 
 _ROLL_NEGLIGIBLE_RAD: Final = 1e-9
 
@@ -114,6 +114,11 @@ class Steering:
     def channels(self) -> tuple[Arc, ...]:
         """All arcs that were cut, by the estimates at their times, also those that were left."""
         return (*self._left, *self.path.arcs)
+
+    def shaft_mm(self, depth_mm: float) -> tuple[Vector, ...]:
+        """Places of the shaft when the tip is at this depth, `SHAFT_SPACING_MM` apart."""
+        arcs = self.path.pull(max(0.0, self.depth_mm - depth_mm)).arcs
+        return tuple(pose.position_mm for pose in sample_poses(arcs, SHAFT_SPACING_MM))
 
     def pull(self, length_mm: float) -> None:
         """Pulls the needle back along its channel."""

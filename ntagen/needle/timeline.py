@@ -5,7 +5,7 @@ too: what a moving shape is away from the tip changes by no more than both move.
 time comes no nearer than its middle, less half of its length at the sum of the two speeds.
 
 The shaft lies where the tip went: of a shape that must not touch it, every place of the path counts
-from the moment at which the tip was there.
+from the moment at which the tip was there, and what lies behind the start counts from the start.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ntagen.motion import Motion
 from ntagen.needle.kinematics import Arc, Nearest
 from ntagen.needle.nearest import TOLERANCE_MM, places_on
-from ntagen.scene import Pose, Vector
+from ntagen.scene import SHAFT_SPACING_MM, Pose, Vector
 from ntagen.shapes import Shape
 from ntagen.values import dataclass
 
@@ -58,9 +58,18 @@ class Timeline:
         radius_mm: The radius of the motion circle.
         speed_mm_per_s: The speed of pushes.
         clock_s: When it begins.
+        shaft_mm: Places of the shaft behind the tip, at most `SHAFT_SPACING_MM` apart.
     """
 
-    def __init__(self, tip: Pose, radius_mm: float, speed_mm_per_s: float, clock_s: float) -> None:
+    def __init__(
+        self,
+        tip: Pose,
+        radius_mm: float,
+        speed_mm_per_s: float,
+        clock_s: float,
+        shaft_mm: Sequence[Vector] = (),
+    ) -> None:
+        self._shaft = np.array(shaft_mm, dtype=np.float64).reshape(-1, 3)
         self._radius_mm = radius_mm
         self._speed_mm_per_s = speed_mm_per_s
         self._stages = [Stage(Arc(tip, radius_mm, 0.0), clock_s, clock_s, 0.0)]
@@ -179,8 +188,37 @@ class Timeline:
     def shaft_nearest(self, shape: Shape, motion: Motion) -> Nearest:
         """The least distance of tip and shaft to a moving shape, and at which depth that is.
 
-        Never too great; too small by `TOLERANCE_MM` or a hundredth of it, whichever is more.
+        Never too great; too small by `TOLERANCE_MM` or a hundredth of it, whichever is more. A
+        place behind the start counts as the start, and its distance may be too small by half of
+        `SHAFT_SPACING_MM`.
         """
+        ahead, behind_mm = self._path_nearest(shape, motion), self._behind_nearest_mm(shape, motion)
+        return ahead if ahead.distance_mm <= behind_mm else Nearest(behind_mm, 0.0)
+
+    def _behind_nearest_mm(self, shape: Shape, motion: Motion) -> float:
+        """A bound for the distance of the shaft behind the start; infinite without one."""
+        if not len(self._shaft):
+            return math.inf
+        start_s = self._stages[0].start_s
+        # After a period, everything comes again.
+        seconds = min(self.end_s - start_s, motion.period_s)
+        count = max(1, math.ceil(seconds * motion.speed_mm_per_s / _FIRST_MM))
+        half_s = 0.5 * seconds / count
+        times = np.tile(start_s + (2 * np.arange(count) + 1) * half_s, len(self._shaft))
+        places = np.repeat(np.arange(len(self._shaft)), count)
+        best_mm = math.inf
+        while len(times):
+            distances = shape.distance_mm(self._shaft[places] - motion.many_mm(times))
+            best_mm = min(best_mm, float(np.min(distances)))
+            is_open = distances - half_s * motion.speed_mm_per_s < best_mm - TOLERANCE_MM
+            times, places = times[is_open], places[is_open]
+            half_s *= 0.5
+            times = np.concatenate([times - half_s, times + half_s])
+            places = np.tile(places, 2)
+        return best_mm - TOLERANCE_MM - shape.excess_mm - 0.5 * SHAFT_SPACING_MM
+
+    def _path_nearest(self, shape: Shape, motion: Motion) -> Nearest:
+        """The least distance of tip and shaft from the start on."""
         arcs = [stage.arc for stage in self._stages]
         fields = self._boxes(motion)
         speed_mm_per_s = motion.speed_mm_per_s

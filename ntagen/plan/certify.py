@@ -153,7 +153,7 @@ def certify(plan: Plan, scene: Scene) -> Certificate:
 def _certified_in_time(plan: Plan, scene: Scene, breath: Breath) -> Certificate:
     """The certificate where regions may move."""
     needle = scene.needle
-    line, keeps_gate = timeline(plan, needle, breath)
+    line, keeps_gate = timeline(plan, needle, breath, scene.shaft_mm)
     unmoved = tuple(one for one in scene.avoided if one.motion is None)
     near = iter(_clearances(plan.arcs(needle), needle.tip.position_mm, unmoved))
     clearances = []

@@ -8,7 +8,7 @@ the breath.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ntagen.motion import Breath, Motion
@@ -24,16 +24,19 @@ if TYPE_CHECKING:
 _STILL = Motion(1.0)
 
 
-def timeline(plan: Plan, needle: Needle, breath: Breath) -> tuple[Timeline, bool]:
+def timeline(
+    plan: Plan, needle: Needle, breath: Breath, shaft_mm: Sequence[Vector] = ()
+) -> tuple[Timeline, bool]:
     """The plan on the clock of the breath, and whether it pushes only while the gate is open."""
     # It takes numpy, which still scenes do not need.
     from ntagen.needle.timeline import Timeline
 
-    line = Timeline(needle.tip, needle.radius_mm, needle.speed_mm_per_s, breath.clock_s)
+    speed_mm_per_s = needle.speed_mm_per_s
+    line = Timeline(needle.tip, needle.radius_mm, speed_mm_per_s, breath.clock_s, shaft_mm)
     keeps_gate, pose = True, needle.tip
     for action in plan.actions:
         if isinstance(action, Push):
-            seconds = action.length_mm / needle.speed_mm_per_s
+            seconds = action.length_mm / speed_mm_per_s
             keeps_gate = keeps_gate and breath.is_open(line.end_s, seconds)
             line.push(pose, action.length_mm)
             pose = line.end

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from ntagen.motion import Breath, Gate, Motion
+from ntagen.needle.kinematics import Arc
 from ntagen.plan.actions import Plan, Push, Roll, Wait
 from ntagen.plan.certify import certify
 from ntagen.plan.document import plan_from_json, plan_to_json
@@ -124,6 +125,28 @@ def test_the_shaft_keeps_the_certified_distance(plan: str, motion: str, shape: s
     found_mm = certify(PLANS[plan], scene).critical_clearance_mm
     assert found_mm <= least_mm + 1e-9
     assert found_mm >= least_mm - BOUND_MM - 0.01 * abs(least_mm)
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("shape", ["sphere", "capsule"])
+def test_the_shaft_behind_the_start_keeps_the_certified_distance(
+    plan: str, motion: str, shape: str
+) -> None:
+    """The plan goes on where a needle was pushed before; no sample lies ahead of that place."""
+    before = Arc(PAPER.needle.tip, PAPER.needle.radius_mm, 30.0)
+    scene = scene_with("critical", SHAPES[shape], MOTIONS[motion])
+    scene = scene.with_needle(before.end, PAPER.needle.radius_mm, 30.0)
+    behind = [before.pose_at(0.5 * i).position_mm for i in range(61)]
+    times, _ = sampled(PLANS[plan], scene)
+    moved = np.array([displaced(MOTIONS[motion], time_s) for time_s in times])
+    free = certify(PLANS[plan], scene).critical_clearance_mm
+    dense = np.array([before.pose_at(0.1 * i).position_mm for i in range(301)])
+    least_mm = min(float(SHAPES[shape].distance_mm(dense - one).min()) for one in moved)
+    found_mm = certify(PLANS[plan], scene.with_shaft(behind)).critical_clearance_mm
+    assert found_mm <= min(free, least_mm)
+    # Half of the distance of the places is the price of places in the stead of a curve.
+    assert found_mm >= min(free, least_mm - BOUND_MM - 0.25)
 
 
 def test_a_region_that_sweeps_over_the_shaft_is_a_hit() -> None:
