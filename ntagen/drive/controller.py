@@ -59,6 +59,7 @@ from ntagen.drive.states import ENDS, Event, State, next_state
 from ntagen.drive.steering import Steering
 from ntagen.drive.supervisor import Guard, Supervisor
 from ntagen.errors import DeviceError, LimitError
+from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
@@ -345,8 +346,7 @@ class Controller:
             return Event.AS_PREDICTED
         self._reviewed_mm = depth_mm
         estimate = self._needle.glance()
-        scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
-        rest = Plan.of(action for action, _ in self._moves)
+        scene, rest = self._left(estimate)
         certificate = certify(rest, scene)
         if not self._settings.margins.allow(certificate):
             return Event.PLAN_FAILS
@@ -355,6 +355,12 @@ class Controller:
             return Event.PLAN_IS_THIN
         self._follow(scene, rest)
         return Event.AS_PREDICTED
+
+    def _left(self, estimate: Estimate) -> tuple[Scene, Plan]:
+        """The known scene for an estimate, and the rest of the plan."""
+        depth_mm = self._needle.depth_mm
+        scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
+        return scene, Plan.of(action for action, _ in self._moves)
 
     def _follow(self, scene: Scene, plan: Plan) -> None:
         """Makes this the plan to follow, from the pose in the scene."""
@@ -417,13 +423,19 @@ class Controller:
         self._reviewed_mm = self._needle.depth_mm
 
     def _keep_pace(self, action: Action) -> bool:
-        """Waits until the breath is where the plan expects it; whether that is not too late."""
+        """Waits until the breath is where the plan expects it; whether the plan still holds.
+
+        If it is too late for that, the rest of the plan may hold from now on as well.
+        """
         if self._learner.a_priori.breath is None:
             return True
         wait_s = self._pace.wait_s(action, self._learner.clock_now_s())
         if wait_s is None:
-            return False
-        if wait_s > 0.0:
+            scene, rest = self._left(self._needle.glance())
+            if not self._settings.margins.allow(certify(rest, scene)):
+                return False
+            self._pace = Pace(scene)
+        elif wait_s > 0.0:
             self._needle.wait(wait_s)
         self._pace.begin(action)
         return True

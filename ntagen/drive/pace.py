@@ -2,8 +2,8 @@
 
 A plan says at which phase of the breath each push begins. A roll takes some time, which the plan
 does not count: after one, the driver waits until the phase is that of the plan, as certificates
-expect. Readings take a little time too; a push may begin late by `LATE_S`. If it is later, the plan
-is out of step, and a new one is made.
+expect. Readings and the ramps of motors take a little time too; a push may begin late by `LATE_S`.
+If it is later, the rest of the plan must hold from that time on, or a new plan is made.
 """
 
 from __future__ import annotations

@@ -74,8 +74,8 @@ class Result(Driven):
     Attributes:
         clearance_mm: The smallest distance of the needle's path to any actual critical region;
             infinite without one, negative if one was pierced.
-        target_distance_mm: The distance of the true tip to the surface of the last target; negative
-            inside.
+        target_distance_mm: The distance of the true tip to the surface of the last target at the
+            last measurement; negative inside.
         pierced: All arcs that were really cut.
     """
 
@@ -142,11 +142,12 @@ def simulate(
     ended = controller.run()
     last = scene.targets[-1]
     tip_mm = needle.true_tip.position_mm
-    clock_s = 0.0 if scene.breath is None else scene.breath.clock_s
+    # The driver decides by its last look; a target that moves goes on while the needle is stopped.
+    clock_s = witness.watched_s + (0.0 if scene.breath is None else scene.breath.clock_s)
     return Result(
         ended=ended,
         clearance_mm=needle.true_clearance_mm(),
-        target_distance_mm=last.distance_at_mm(tip_mm, clock_s + needle.now_s()),
+        target_distance_mm=last.distance_at_mm(tip_mm, clock_s),
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
     )
@@ -176,13 +177,22 @@ def _load() -> None:
 
 
 class _Witness:
-    """Adds the truth to a journal, at each measurement and at the end."""
+    """Adds the truth to a journal, at each measurement and at the end.
+
+    Attributes:
+        watched_s: The time from the first to the last measurement.
+    """
 
     def __init__(self, needle: Simulated, journal: Journal) -> None:
         self._needle = needle
         self._journal = journal
+        self._first_s: float | None = None
+        self.watched_s = 0.0
 
     def record(self, record: Record) -> None:
+        if isinstance(record, Measured):
+            self._first_s = record.time_s if self._first_s is None else self._first_s
+            self.watched_s = record.time_s - self._first_s
         if isinstance(record, Measured | Ended):
             clearance_mm = self._needle.true_clearance_mm()
             shown_mm = clearance_mm if math.isfinite(clearance_mm) else _NO_REGION_MM

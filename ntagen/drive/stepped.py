@@ -3,19 +3,24 @@
 The commands of the driver become lines of G-code; an emulated controller moves its axes with ramps
 and in whole steps; the axes move the needle. All runs on the emulator's clock, so a run takes no
 real time, and the same seed gives the same run.
+
+The needle has a clock of its own, with which regions move. It counts motions without ramps and
+answers without delay, so it is behind. Where regions move, the needle rests whenever it is looked
+at, until its clock has come up.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from ntagen.drive.device import rest
 from ntagen.drive.plant import NeedlePlant, simulated_axes, simulated_controller
 from ntagen.drive.simulate import Maker, Simulated
 from ntagen.grbl.actuator import GrblActuator
 from ntagen.grbl.simulated import SimulatedPort
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.virtual import Obstacle
+from ntagen.needle.virtual import Obstacle, require_possible
 from ntagen.scene import Needle, Pose
 
 
@@ -25,15 +30,21 @@ class Stepped:
     Args:
         needle: The needle.
         speed_mm_per_s: The speed of its insertion.
+        keeps_time: Whether its clock comes up.
     """
 
-    def __init__(self, needle: Simulated, speed_mm_per_s: float) -> None:
+    def __init__(
+        self, needle: Simulated, speed_mm_per_s: float, *, keeps_time: bool = False
+    ) -> None:
         self._needle = needle
         axes = simulated_axes(speed_mm_per_s)
         self._plant = NeedlePlant(needle, axes)
         self.emulator = simulated_controller(self._plant, axes)
         self.port = SimulatedPort(self.emulator)
         self.actuator = GrblActuator(self.port, axes)
+        self._keeps_time = keeps_time
+        # Connecting took time in which the needle did not exist.
+        self._since_s = self.actuator.now_s() - needle.now_s()
 
     def now_s(self) -> float:
         """Seconds on the controller's clock."""
@@ -56,9 +67,26 @@ class Stepped:
         """See `GrblActuator.pull`."""
         self.actuator.pull(length_mm)
 
+    def wait(self, seconds: float) -> None:
+        """Lets the controller rest for a time.
+
+        Raises:
+            DeviceError: It is negative or not finite.
+        """
+        require_possible(seconds >= 0.0, "wait", seconds)
+        self.emulator.advance(self.now_s() + seconds)
+
     def stop(self) -> None:
         """See `GrblActuator.stop`."""
         self.actuator.stop()
+
+    def _settle(self) -> None:
+        """Moves the needle as far as its axes went."""
+        self._plant.settle()
+        if not self._keeps_time:
+            return
+        behind_s = self.now_s() - self._since_s - self._needle.now_s()
+        rest(self._needle, max(0.0, behind_s))
 
     def measure(self) -> Measurement:
         """A reading of the needle's own sensors, with its age on the controller's clock.
@@ -66,7 +94,7 @@ class Stepped:
         Raises:
             DeviceError: There is no reading.
         """
-        self._plant.settle()
+        self._settle()
         reading = self._needle.measure()
         age_s = max(0.0, self._needle.now_s() - reading.time_s)
         return replace(reading, time_s=self.now_s() - age_s)
@@ -74,18 +102,18 @@ class Stepped:
     @property
     def true_tip(self) -> Pose:
         """The true pose of the tip."""
-        self._plant.settle()
+        self._settle()
         return self._needle.true_tip
 
     @property
     def pierced(self) -> tuple[Arc, ...]:
         """All arcs that were cut."""
-        self._plant.settle()
+        self._settle()
         return self._needle.pierced
 
     def true_clearance_mm(self) -> float:
         """The smallest distance of these arcs to any actual critical region."""
-        self._plant.settle()
+        self._settle()
         return self._needle.true_clearance_mm()
 
 
@@ -97,6 +125,7 @@ def stepped(make: Maker) -> Maker:
     """
 
     def behind(needle: Needle, obstacles: tuple[Obstacle, ...], seed: int) -> Simulated:
-        return Stepped(make(needle, obstacles, seed), needle.speed_mm_per_s)
+        moves = any(one.region.motion is not None for one in obstacles)
+        return Stepped(make(needle, obstacles, seed), needle.speed_mm_per_s, keeps_time=moves)
 
     return behind

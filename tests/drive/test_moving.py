@@ -12,7 +12,8 @@ from ntagen.drive.pace import LATE_S, Pace
 from ntagen.drive.records import Breathed, Command, Record
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings
-from ntagen.drive.simulate import phantom, simulate, synthesiser_for
+from ntagen.drive.simulate import phantom, simulate, synthesiser_for, virtual
+from ntagen.drive.stepped import stepped
 from ntagen.errors import DeviceError
 from ntagen.motion import Breath, Gate, Motion
 from ntagen.needle.breathing import SPACING_MM
@@ -77,6 +78,18 @@ def test_a_drive_reaches_a_target_that_moves_through_its_gate(clock_s: float) ->
             phase_deg = 360.0 * ((clock_s + one.time_s) % PERIOD_S) / PERIOD_S
             late_deg = 360.0 * LATE_S / PERIOD_S
             assert phase_deg >= 250.0 - 1e-6 or phase_deg <= 110.0 + late_deg
+
+
+def test_a_stepped_needle_keeps_pace_with_a_target_that_moves() -> None:
+    """Ramps and answers of the controller make each push late; the plans hold later too."""
+    scene, kept = breathing(), Kept()
+    make = stepped(virtual(Errors()))
+    result = simulate(scene, synthesiser_for(SETTINGS), SETTINGS, kept, make=make)
+    assert result.ended.outcome == "target reached", result.ended.reason
+    assert result.target_distance_mm < 0.0
+    assert result.clearance_mm > 0.0
+    pushes = sum(isinstance(one, Command) and one.kind == "push" for one in kept.records)
+    assert pushes > 2 * len(result.syntheses)
 
 
 def test_the_same_run_without_waits_would_miss() -> None:
