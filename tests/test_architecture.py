@@ -88,7 +88,6 @@ SPLIT = {"checker"}
 ONLY_IN: dict[str, set[str]] = {
     "click": {"cli"},
     "rich": {"cli"},
-    "lark": {"nsl"},
     "jinja2": {"render"},
     "markupsafe": {"render"},
     "matplotlib": {"plot"},

@@ -2,12 +2,12 @@
 
 The steps:
 
-1. lark's lexer cuts the text into tokens. Other characters are reported and left out.
+1. The text is cut into tokens (tokens.py). Other characters are reported and left out.
 2. The tokens are cut into statements: at braces, and at the words that begin a statement. All of
    these words are reserved, so that the cut is right even after a statement with a mistake.
-3. Each statement is parsed alone by the grammar (`grammar.lark`, LALR). A mistake is reported at
-   the first token that cannot stand at its place. That statement becomes a `Broken`; it does not
-   affect the others.
+3. Each statement is read alone, by recursive descent (statements.py). A mistake is reported at the
+   first token that cannot stand at its place. That statement becomes a `Broken`; it does not affect
+   the others.
 
 A first word that is nearly a keyword is reported and then replaced by it. Otherwise a misspelt
 ``needle`` would make everything in its braces look wrong.
@@ -21,14 +21,13 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, cast
+from typing import Final
 
 from ntagen.nsl import tree
-from ntagen.nsl.convert import TreeBuilder
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
-from ntagen.nsl.plain import PlainRegion, plain_regions
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source
+from ntagen.nsl.statements import PlainRegion, UnexpectedTokenError, read_statement
 from ntagen.nsl.tokens import (
     ALLOWED,
     BLOCKS,
@@ -41,7 +40,6 @@ from ntagen.nsl.tokens import (
     BlockKind,
     Token,
     begins_statement,
-    grammar,
     keyword_of,
     tokenise,
 )
@@ -55,11 +53,12 @@ from ntagen.nsl.wording import (
     visible,
 )
 
-if TYPE_CHECKING:
-    import lark
-
 MAX_DEPTH: Final = 40
 """How deep parentheses may be nested in an expression, and braces in a file."""
+
+LONG_TEXT: Final = 5000
+"""In texts with so many characters, plain regions are read in a quicker way, which takes some
+milliseconds to get ready."""
 
 
 def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -> tree.File:
@@ -81,9 +80,16 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
             hint="`ntagen check` answers its queries, and `ntagen info` shows what is in it",
         )
         return tree.File(source, ())
-    known = ((one.start, one.end, one) for one in plain_regions(source))
-    tokens = [t for t in tokenise(source, known) if isinstance(t, Token)]
+    tokens = [t for t in tokenise(source, _known(source)) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
+
+
+def _known(source: Source) -> Iterator[tuple[int, int, Token]]:
+    """The plain regions of a long text, with their places. A short text does not need that."""
+    if len(source.text) >= LONG_TEXT:
+        from ntagen.nsl.plain import plain_regions
+
+        yield from ((one.start, one.end, one) for one in plain_regions(source))
 
 
 def _is_uppaal_model(source: Source) -> bool:
@@ -337,32 +343,12 @@ class _Parser:
         is_known = words[0].text in KEYWORDS or words[0].type in PHRASES.values()
         if not is_known or self._is_too_deep(words):
             return broken
-        parsed = self._parse_with_grammar(words)
-        if parsed is None or self._has_gap(words):
-            return broken
-        return TreeBuilder(self._source).statement(parsed, span)
-
-    def _parse_with_grammar(self, words: Sequence[Token]) -> lark.Tree[lark.Token] | None:
-        """The tree of the tokens; None if the grammar refuses a token, which is then reported."""
-        import lark
-
-        parser = grammar().parse_interactive("", start="statement")
-        last: lark.Token | None = None
-        for word in words:
-            last = lark.Token(
-                word.type, word.text, start_pos=word.span.start, end_pos=word.span.end
-            )
-            try:
-                parser.feed_token(last)
-            except lark.UnexpectedToken:
-                self._report_unexpected(words, word, _accepted(parser))
-                return None
         try:
-            parsed = parser.feed_eof(last)  # type: ignore[no-untyped-call]
-        except lark.UnexpectedToken:
-            self._report_unexpected(words, None, _accepted(parser))
-            return None
-        return cast("lark.Tree[lark.Token]", parsed)
+            parsed = read_statement(self._source, words)
+        except UnexpectedTokenError as error:
+            self._report_unexpected(words, error.token, error.expected)
+            return broken
+        return broken if self._has_gap(words) else parsed
 
     def _query(self, words: Sequence[Token]) -> tree.Query | None:
         """A query: its name, an equals sign and the rest of the line."""
@@ -476,11 +462,6 @@ class _Parser:
             f"expected {expected}{', found' if found else ' before'} {what}",
             hint=hint or form_of(solid_in(words)),
         )
-
-
-def _accepted(parser: lark.parsers.lalr_interactive_parser.InteractiveParser) -> list[str]:
-    """The terminals that a parser would take next."""
-    return sorted(cast("set[str]", parser.accepts()))  # type: ignore[no-untyped-call]
 
 
 _VALUE_ENDS: Final = frozenset(

@@ -1,8 +1,8 @@
-"""Regions of plain numbers on one line, read without the grammar: files may have thousands of them.
+"""Regions of plain numbers on one line, read at once: files may have thousands of them.
 
-The tree is the one that the grammar makes, with the same places. What is not plain is left to the
-grammar: names in values, arithmetic, indices, block comments, lines that something unknown follows,
-and every mistake.
+The tree is the one that `ntagen.nsl.statements` makes, with the same places. What is not plain is
+left to it: names in values, arithmetic, indices, block comments, lines that something unknown
+follows, and every mistake.
 """
 
 from __future__ import annotations
@@ -15,25 +15,10 @@ from typing import Final, cast
 from ntagen.nsl import tree
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source, Span
-from ntagen.nsl.tokens import REGIONS, RESERVED, Token
+from ntagen.nsl.statements import PlainRegion
+from ntagen.nsl.tokens import REGIONS, RESERVED
 from ntagen.scene import RegionKind
 from ntagen.values import dataclass
-
-
-@dataclass(frozen=True, slots=True)
-class PlainRegion(Token):
-    """The keyword of a plain region, in place of all its words.
-
-    Attributes:
-        start: Where the region begins.
-        end: Where it ends.
-        node: Its tree.
-    """
-
-    start: int
-    end: int
-    node: tree.Region
-
 
 _N: Final = r"([+-]?)[ \t]*(\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)"
 _S: Final = r"[ \t]*"
@@ -107,7 +92,7 @@ class _Reader:
     body: re.Match[str]
 
     def shape(self, word: str, start: int) -> tree.Sphere | tree.Solid | tree.Around | None:
-        """The shape; None if a unit is none, which the grammar's way reports."""
+        """The shape; None if a unit is none, which the usual way reports."""
         body = self.body
         span = Span(self.source, start, body.end())
         if word == "around":

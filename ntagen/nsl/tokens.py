@@ -1,24 +1,18 @@
 """The words of the language: tokens, comments, and the keywords that begin a statement.
 
-The terminals are those of `grammar.lark`; lark is imported when the first text is read, not before.
+A text is cut by one regular expression, with one group for each terminal. A word in quotes in the
+grammar (statements.py) is a terminal of its own, named by its capitals.
 """
 
 from __future__ import annotations
 
-import functools
-import sys
-import zlib
+import re
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal, cast
+from typing import Final, Literal, cast
 
-from ntagen.cache import cache_folder
 from ntagen.nsl.source import Source, Span
 from ntagen.parameters import BY_WORDS
 from ntagen.values import dataclass
-
-if TYPE_CHECKING:
-    import lark
 
 BlockKind = Literal["file", "environment", "needle", "motion", "for", "drive", "device"]
 """The place of a statement: at the top of a file, or in the braces of another one."""
@@ -121,35 +115,46 @@ class Comment:
     line: int
 
 
-@functools.cache
-def grammar() -> lark.Lark:
-    """The parser of single statements.
+_TERMINALS: Final = {
+    "SPACE": r"\s+",
+    "LINE_COMMENT": r"//[^\n]*",
+    "BLOCK_COMMENT": r"/\*[\s\S]*?\*/",
+    "UNCLOSED_COMMENT": r"/\*[\s\S]*",
+    "NUMBER": r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?",
+    # The rest of the line is UPPAAL's language, up to a comment.
+    "QUERY": r"query\b[^\n]*?(?=[ \t\r]*(?://|\n|\Z))",
+    # The unit of a speed, of a rising force, or of a motor's steps. `min` before a parenthesis is
+    # the function.
+    "RATIO": r"(?:[^\W\d]\w*\s*/\s*(?:ms|s|min)|(?:steps|m?N)\s*/\s*(?:um|mm|cm|m|rad|mrad|deg))"
+    r"\b(?!\s*\()",
+    "NAME": r"[^\W\d]\w*",
+    "SIGN": r"[+-]",
+    "SCALE": r"[*/]",
+    "LPAR": r"\(",
+    "RPAR": r"\)",
+    "COMMA": ",",
+    "BRACE": r"[{}]",
+    "LSQB": r"\[",
+    "RSQB": r"\]",
+    "EQUAL": "=",
+    "PERCENT": "%",
+    "RANGE": r"\.\.",
+    "STRING": r'"[^"\n]*"',
+    # Characters that are not part of the language. They are tokens too, so that the parser can
+    # report them and go on.
+    "UNCLOSED_STRING": r'"[^"\n]*',
+    "HASH": r"#[^\n]*",
+    "STRAY": r'[^\w\s{}()\[\],=+\-*/."#%]+|.',
+}
+"""The first that matches at a place is the terminal there."""
 
-    Computing its tables takes longer than all other work on a file (about 80 ms). So lark stores
-    them in the user's cache folder; it computes them again if the grammar or lark has changed, or
-    if the folder cannot be used. Each grammar has a file of its own, so that two versions of this
-    program do not compute them again and again.
-    """
-    import lark
+_LEXER: Final = re.compile("|".join(f"(?P<{name}>{form})" for name, form in _TERMINALS.items()))
 
-    text = Path(__file__).with_name("grammar.lark").read_text("utf-8")
-    return lark.Lark(
-        text,
-        parser="lalr",
-        lexer="basic",
-        start=["statement", "outside"],
-        propagate_positions=True,
-        maybe_placeholders=False,
-        cache=_cache_file(text) or False,
-    )
-
-
-def _cache_file(text: str) -> str | None:
-    """The file with the tables of a grammar; None if there is no cache folder."""
-    folder = cache_folder()
-    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
-    name = f"nsl-grammar-{version}-{zlib.crc32(text.encode()):08x}.tables"
-    return None if folder is None else str(folder / name)
+_WORDS: Final = {
+    word: "REGION_KIND" if word in REGIONS else word.upper()
+    for word in KEYWORDS | _OTHER_WORDS | _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
+}
+"""The terminals of words that are no names everywhere."""
 
 
 def tokenise(source: Source, known: Iterable[tuple[int, int, Token]] = ()) -> list[Token | Comment]:
@@ -179,20 +184,24 @@ def _lex(
     source: Source, begin: int, end: int, found: list[Token | Comment], most_stray: int
 ) -> int:
     """Adds the tokens and comments of a part of a text; returns how many of them are stray."""
-    text = source.text[begin:end] if begin or end < len(source.text) else source.text
-    if not text or text.isspace():
-        return 0
-    lines_before = source.position(begin)[0] - 1
+    text = source.text
+    line, counted = 0, 0
     stray_count = 0
-    for token in grammar().lex(text, dont_ignore=True):
-        start = begin + cast(int, token.start_pos)
-        line = lines_before + cast(int, token.line)
-        span = source.span(start, start + len(token))
-        if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
-            found.append(Comment(str(token).rstrip(), span, line))
-        elif token.type != "SPACE":
-            found.append(Token(token.type, str(token), span, line))
-            stray_count += token.type in STRAY
+    for match in _LEXER.finditer(text, begin, end):
+        terminal = cast(str, match.lastgroup)
+        if terminal == "SPACE":
+            continue
+        start = match.start()
+        line = line + text.count("\n", counted, start) if line else source.position(start)[0]
+        counted = start
+        word, span = match[0], Span(source, start, match.end())
+        if terminal == "NAME":
+            found.append(Token(_WORDS.get(word, terminal), word, span, line))
+        elif terminal in ("LINE_COMMENT", "BLOCK_COMMENT"):
+            found.append(Comment(word.rstrip(), span, line))
+        else:
+            found.append(Token(terminal, word, span, line))
+            stray_count += terminal in STRAY
             if stray_count > most_stray:
                 break
     return stray_count
