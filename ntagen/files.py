@@ -22,7 +22,6 @@ import fcntl
 import io
 import os
 import re
-import secrets
 import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -308,7 +307,7 @@ def _target(path: Path) -> _Target:
     if found is None or stat.S_ISREG(found.st_mode):
         if found is not None and not os.access(final, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-        return _Target(path, final, final.with_name(f".ntagen-{secrets.token_hex(8)}.part"), found)
+        return _Target(path, final, final.with_name(f".ntagen-{os.urandom(8).hex()}.part"), found)
     if stat.S_ISDIR(found.st_mode):
         raise InputError(f"cannot write {path}: it is a folder\nhint: add a file name to the path")
     return _Target(path, final, None, found)

@@ -3,8 +3,8 @@
 The program has a hundred small frozen classes. Up to Python 3.12 the standard library compiles
 eight functions for each of them, one after the other, whenever the program starts: nearly a
 millisecond a class, a quarter of the time until the first plan. Here the constructor alone is
-compiled; the other functions are closures. The classes are dataclasses: `fields`, `replace`,
-`asdict`, subclasses, pickles and copies work as usual.
+compiled, when the first value is made; the other functions are closures. The classes are
+dataclasses: `fields`, `replace`, `asdict`, subclasses, pickles and copies work as usual.
 """
 
 from __future__ import annotations
@@ -64,13 +64,48 @@ def _frozen(cls: type) -> type:
     parameters = made.__dataclass_params__
     parameters.init = parameters.repr = parameters.eq = parameters.frozen = True
     fields = dataclasses.fields(made)
-    made.__init__ = _constructor(made, fields)
+    made.__init__ = _first_constructor(made, fields)
+    made.__signature__ = _Signature()
     made.__repr__ = _shown
     made.__getstate__, made.__setstate__ = _state, _set_state
     names = tuple(field.name for field in fields)
     _add_comparisons(made, names)
     _add_refusals(made, names)
     return made  # type: ignore[no-any-return]
+
+
+def _first_constructor(
+    cls: Any,  # noqa: ANN401  a class
+    fields: tuple[dataclasses.Field[Any], ...],
+) -> Callable[..., None]:
+    """A function that makes the constructor, and puts it in its own place."""
+
+    def construct(self: object, *values: object, **named: object) -> None:
+        _complete(cls)
+        cls.__init__(self, *values, **named)
+
+    construct.__qualname__, construct.__module__ = f"{cls.__qualname__}.__init__", cls.__module__
+    construct.fields_ = fields  # type: ignore[attr-defined]
+    return construct
+
+
+def _complete(cls: Any) -> None:  # noqa: ANN401  a class
+    """Gives a class, and those above it, their constructors."""
+    for one in cls.__mro__:
+        fields = getattr(vars(one).get("__init__"), "fields_", None)
+        if fields is not None:
+            one.__init__ = _constructor(one, fields)
+
+
+class _Signature:
+    """The signature of a class, which asks for the constructor."""
+
+    def __get__(self, _value: object, cls: type) -> object:
+        import inspect
+
+        _complete(cls)
+        signature = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return signature.replace(parameters=list(signature.parameters.values())[1:])
 
 
 def _constructor(cls: type, fields: tuple[dataclasses.Field[Any], ...]) -> Callable[..., None]:

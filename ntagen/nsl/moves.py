@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import math
 import os
@@ -134,6 +133,8 @@ def _read_table(path: str, folders: Sequence[str]) -> _Rows:
     if os.path.getsize(real) > MOST_BYTES:
         raise ValueError(f"it has more than {MOST_BYTES // 1024} KiB")
     with open(real, encoding="utf-8-sig", newline="") as file:
+        import csv
+
         lines = list(csv.reader(io.StringIO(file.read())))
     if not lines or tuple(part.strip() for part in lines[0]) != COLUMNS:
         raise ValueError("the names of its columns are others")
