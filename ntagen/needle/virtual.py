@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from ntagen.errors import DeviceError
+from ntagen.needle.answering import Answers
 from ntagen.needle.breathing import BreathWitness
 from ntagen.needle.errors import Errors as Errors
 from ntagen.needle.kinematics import Arc
@@ -58,6 +59,8 @@ class VirtualNeedle:
         seed: The seed of the random errors.
         clock: The clock on which time passes.
         reports_pose: Whether measurements have heading and bevel, with the noise of the rolls.
+        answers: What the tissue picks in each segment; None if it does what is expected.
+        free_bevel: Whether the bevel is set before the entry, so that a roll there does not err.
     """
 
     def __init__(
@@ -69,6 +72,8 @@ class VirtualNeedle:
         clock: SimulatedClock,
         *,
         reports_pose: bool = False,
+        answers: Answers | None = None,
+        free_bevel: bool = False,
     ) -> None:
         self._needle = needle
         self._obstacles = obstacles
@@ -80,6 +85,11 @@ class VirtualNeedle:
         self._noise = np.random.default_rng(noise)
         self._roll_errors = np.random.default_rng(rolls)
         self._path = Path(needle.tip)
+        self._answers = answers
+        self._free_bevel = free_bevel
+        self._has_picked = False
+        self._has_rolled = False
+        self._factor = 1.0
         self._left: list[Arc] = []
         self._witness = BreathWitness(obstacles)
 
@@ -94,8 +104,19 @@ class VirtualNeedle:
             DeviceError: The length is negative or not finite.
         """
         require_possible(length_mm >= 0.0, "push", length_mm)
-        self._path = self._path.push(self._needle.radius_mm, length_mm)
+        self._let_pick()
+        self._path = self._path.push(self._needle.radius_mm / self._factor, length_mm)
         self._pass(length_mm / self._needle.speed_mm_per_s)
+
+    def _let_pick(self) -> None:
+        """At the first push of a segment, the tissue picks what holds until the next roll."""
+        if self._answers is None or self._has_picked:
+            return
+        is_seen = self._free_bevel and self._path.depth_mm == 0.0
+        rolls_err = self._has_rolled and not is_seen
+        self._factor, error_rad = self._answers.pick(rolls_err=rolls_err)
+        self._path = self._path.roll(error_rad)
+        self._has_picked = True
 
     def wait(self, seconds: float) -> None:
         """Rests for a time.
@@ -186,6 +207,7 @@ class VirtualNeedle:
 
     def _turn(self, angle_rad: float, error_rad: float) -> None:
         self._path = self._path.roll(angle_rad + error_rad)
+        self._has_rolled, self._has_picked = True, False
         self._pass(abs(angle_rad) / ROLL_RAD_PER_S)
 
 
