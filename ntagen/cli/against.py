@@ -28,6 +28,7 @@ def defence_notes(answer: Answer, task: Task, options: Options, target: str | No
         options: The limits.
         target: The file for the tree, or ``-`` for standard output.
     """
+    from ntagen.drive.trees import document_of
     from ntagen.plan.against_tissue import defend
 
     if answer.verdict != "satisfied":
@@ -43,8 +44,7 @@ def defence_notes(answer: Answer, task: Task, options: Options, target: str | No
         why = f" ({found.stop})" if found.stop else ""
         notes.append(f"no strategy that holds in exact kinematics was found{why}")
     elif target is not None:
-        document = {"format": "ntagen-closed-loop", "version": 1, "tree": found.tree.to_json()}
-        text = json.dumps(document | {"guarantee": found.guarantee(), "holds": found.holds})
+        text = json.dumps(document_of(found))
         if target == "-":
             echo(text)
         else:

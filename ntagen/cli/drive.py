@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.course import (
+    Wanted,
+    course_of,
+    course_options,
+    guarantee_of,
+    maker,
+    picks_at_random,
+    say_idle_options,
+)
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option
 from ntagen.cli.operator import SignalledOperator, signalled_operator
@@ -28,6 +37,7 @@ if TYPE_CHECKING:
 
     from ntagen.drive.configure import Configuration
     from ntagen.drive.device import LiveSensor, WatchedActuator
+    from ntagen.drive.following import Course
     from ntagen.drive.outcome import Driven
     from ntagen.drive.records import Journal
     from ntagen.nsl import Task
@@ -45,8 +55,9 @@ _SIMULATIONS_ONLY: Final = {
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
-4 no strategy that holds in exact kinematics, 5 device fault, 6 no strategy that ends in time,
-70 internal error, 130 interrupted, 143 ended by SIGTERM."""
+4 no strategy that holds in exact kinematics, or nothing is guaranteed any more
+(--only-guaranteed), 5 device fault, 6 no strategy that ends in time, 70 internal error,
+130 interrupted, 143 ended by SIGTERM."""
 
 
 @click.command("drive", epilog=_EPILOG)
@@ -74,6 +85,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Ask before each plan that is followed, and before the needle is pulled back for one.",
 )
 @tracker_options
+@course_options
 @click.option(
     "--known",
     metavar="all|none|NAME,…",
@@ -121,12 +133,16 @@ def command(
     only_settings: bool,
     include: tuple[Path, ...],
     given: tuple[Given, ...],
+    wanted: Wanted,
 ) -> int:
     """Steer a needle to the target and log the run.
 
     The driver pushes a little, estimates where the needle is and how it bends, finds a safe
     strategy, and follows its best plan while it measures. If the needle deviates or the force
     rises, the driver stops, pulls back, and looks for a new strategy with what it has learned.
+
+    In a tissue that answers (tissue adversarial), the driver follows a strategy that wins whatever
+    the tissue picks, and says up to which depth its guarantee held.
 
     Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
     once. Two runs cannot write the same log at the same time.
@@ -140,6 +156,7 @@ def command(
       ntagen drive examples/paper.nsl --tracker openigtlink+sim
       ntagen drive task.nsl --needle grbl:/dev/ttyACM0 --confirm --log run.mcap \\
         --tracker openigtlink:localhost:18944:Needle --registration registration.json
+      ntagen drive examples/answering/answering.nsl --tissue between --seed 1 --only-guaranteed
       ntagen drive examples/paper.nsl --settings
 
     \b
@@ -148,6 +165,7 @@ def command(
     example `initial push 4 mm` for --initial-push 4mm; the command line wins.
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
+    from ntagen.drive.knowledge import told
     from ntagen.nsl import load_task
 
     if as_json:
@@ -158,16 +176,18 @@ def command(
     task = _breathing(task, breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
-    _say_idle(configuration)
+    _say_idle(configuration, picks=picks_at_random(wanted, task.scene))
+    say_idle_options(task.scene, configuration)
     if only_settings:
         show_settings(configuration)
         return 0
     tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
-    run = _Run(environment, task, configuration, known, tracking)
     terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
     entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
     # A tracker or a port that cannot be reached must not cost an earlier log.
     with signalled_operator() as operator, contextlib.ExitStack() as stack:
+        course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
+        run = _Run(environment, task, configuration, known, tracking, wanted, course)
         if is_real:
             setup = stack.enter_context(_real_needle(run, needle, baud_rate))
             log = stack.enter_context(_log(log_path, run))
@@ -177,7 +197,9 @@ def command(
             log = stack.enter_context(_log(log_path, run))
             result = _drive(run, sense, log, terminal, operator)
     if as_json:
-        echo(json.dumps(summary(result, configuration, known, log_path)))
+        guarantee = guarantee_of(result, task.scene, course)
+        ended = summary(result, configuration, known, log_path)
+        echo(json.dumps(ended | {"guarantee": guarantee}))
     else:
         report(result, task.scene, log_path, short=quiet)
     if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
@@ -197,8 +219,8 @@ def _breathing(task: Task, phase_deg: float | None) -> Task:
     return replace(task, scene=task.scene.at_clock(clock_s))
 
 
-def _say_idle(configuration: Configuration) -> None:
-    """Tells which options have no effect on this needle."""
+def _say_idle(configuration: Configuration, *, picks: bool) -> None:
+    """Tells which options have no effect on this needle, in a tissue that may pick at random."""
     needle, errors = configuration.needle, configuration.errors
     if needle.is_real:
         say_idle(_SIMULATIONS_ONLY, "with a real needle")
@@ -207,7 +229,7 @@ def _say_idle(configuration: Configuration) -> None:
     if needle.parameters is not None:
         idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
         say_idle(idle, "on a phantom needle, which has its own errors")
-    elif not (errors.noise_mm or errors.roll_rad):
+    elif not (errors.noise_mm or errors.roll_rad or picks):
         say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
 
 
@@ -220,6 +242,8 @@ class _Run:
     configuration: Configuration
     known: str
     tracking: Tracking
+    wanted: Wanted
+    course: Course | None
 
     @property
     def scene(self) -> Scene:
@@ -283,6 +307,7 @@ def _drive_real(
             known=run.known,
             listen=operator.listen,
             agree=agree,
+            course=run.course,
         )
 
 
@@ -303,11 +328,12 @@ def _drive(
             journal,
             known=run.known,
             errors=run.configuration.errors,
-            make=run.configuration.needle.make,
+            make=maker(run.wanted, run.scene, run.configuration, run.course),
             seed=run.configuration.seed,
             sense=sense,
             listen=operator.listen,
             agree=agree,
+            course=run.course,
         )
 
 
@@ -346,8 +372,9 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         yield []
         return
     from ntagen.drive.knowledge import told
-    from ntagen.drive.log import ACTUAL, SOURCE, Log, metadata_of
+    from ntagen.drive.log import ACTUAL, SOURCE, TREE, Log, metadata_of
     from ntagen.drive.scene_json import scene_to_json
+    from ntagen.drive.trees import COURSE, course_to_log
     from ntagen.nsl.source import MAX_SOURCE_BYTES
 
     # Mistakes on the command line must be found before an earlier log is replaced.
@@ -376,6 +403,9 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         }
         actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
         attachments[ACTUAL] = scene_to_json(actual).encode()
+    if run.course is not None:
+        metadata[COURSE], tree = course_to_log(run.course)
+        attachments |= {} if tree is None else {TREE: tree}
     # A pipe can be read only once.
     if environment.is_file():
         attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
@@ -398,6 +428,7 @@ def _exit_code(outcome: str) -> int:
         State.NO_STRATEGY: 1,
         State.NONE_HOLDS: 4,
         State.NO_TIME_LEFT: 6,
+        State.NOT_GUARANTEED: 4,
         State.TIMED_OUT: 3,
         State.FAULTED: 5,
         State.INTERRUPTED: 130,

@@ -38,6 +38,8 @@ from typing import Final
 from ntagen.drive.deviation import DeviationMonitor, require_explained
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
+from ntagen.drive.following import Course
+from ntagen.drive.guide import Guide
 from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import moves_of, pieces
@@ -90,6 +92,7 @@ class Controller:
         supervisor: What watches the needle while it moves.
         agree: Is told each time what the driver wants to do next; raises `KeyboardInterrupt` if
             the operator does not want that.
+        course: In a tissue that answers, the strategy that is followed; plans without one.
     """
 
     def __init__(
@@ -102,6 +105,7 @@ class Controller:
         listen: Callable[[], None] = lambda: None,
         supervisor: Supervisor | None = None,
         agree: Callable[[str], None] = lambda _: None,
+        course: Course | None = None,
     ) -> None:
         self._settings = settings
         self._journal = journal
@@ -110,6 +114,7 @@ class Controller:
         self._needle = Steering(scene.needle, device, settings, journal, listen)
         self._learner = Learner(scene, settings, self._needle, journal)
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
+        self._guide = Guide(course, scene, settings, self._needle, journal)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
         self._moves: deque[tuple[Action, Pose]] = deque()
         self._reviewed_mm = 0.0
@@ -137,7 +142,8 @@ class Controller:
     def run(self) -> Ended:
         """Drives until the run ends and the needle is stopped; returns the last record."""
         self._journal.started(self._learner.a_priori)
-        self._note(Relied(self._now_s(), relies_on(self._settings, self._learner.a_priori)))
+        relied = relies_on(self._settings, self._learner.a_priori, self._guide.course)
+        self._note(Relied(self._now_s(), relied))
         state = State.ARM
         try:
             while state not in ENDS:
@@ -174,6 +180,7 @@ class Controller:
             return self._ended(State.FAULTED)
 
     def _ended(self, state: State) -> Ended:
+        self._guide.leave("the run is over")
         ended = Ended(
             time_s=self._now_s(),
             outcome=state.value,
@@ -218,7 +225,11 @@ class Controller:
 
     def _arm(self) -> Event:
         self._planner.start()
-        self._learner.arm(self._needle.measure())
+        measurement = self._needle.measure()
+        self._learner.arm(measurement)
+        if self._guide.is_on:
+            self._guide.note(measurement.position_mm)
+            self._guide.leave_if_lost()
         return Event.ARMED
 
     def _make_estimate(self) -> Event:
@@ -232,8 +243,13 @@ class Controller:
         return Event.ESTIMATED
 
     def _find_strategy(self) -> Event:
+        if self._guide.is_on:
+            return self._begin_strategy()
+        if self._guide.forbids_plans:
+            self._reason = self._guide.reason
+            return Event.NOT_GUARANTEED if self._guide.had_strategy else Event.NO_STRATEGY
         self._planner.lack = Lack()
-        is_first = self._planner.count == 0
+        is_first = self._planner.count == 0 and self._needle.depth_mm == 0.0
         rest, self._rest = self._rest, None
         here = self._planner.ask(self._needle.known.tip, self._needle.depth_mm, rest)
         if here.best is not None:
@@ -245,6 +261,14 @@ class Controller:
             self._follow(self._here(), Plan.of([push]))
             return Event.PUSH_IS_FREE
         return self._look_back()
+
+    def _begin_strategy(self) -> Event:
+        """Begins to follow the strategy against the tissue, if its longest branch ends in time."""
+        if self._guide.longest_s() > self._planner.left_s():
+            self._reason = "the strategy against the tissue may not end within the time limit"
+            return Event.NO_TIME_LEFT
+        self._agree(self._guide.text)
+        return Event.TREE_FOUND
 
     def _look_back(self) -> Event:
         """Looks for the nearest place behind the tip from which there is a strategy."""
@@ -293,6 +317,8 @@ class Controller:
         return Event.PUSHED
 
     def _execute(self) -> Event:
+        if self._guide.is_on:
+            return self._follow_branch()
         if not self._moves:
             return Event.PLAN_DONE
         action, self._predicted = self._moves[0]
@@ -302,10 +328,57 @@ class Controller:
         self._act(action)
         return Event.ACTED
 
+    def _follow_branch(self) -> Event:
+        """Makes the next move of the strategy that is followed."""
+        move = self._guide.next()
+        if move is None:
+            self._guide.leave()
+            # The tip is near the end of a branch, and those ends are deep enough in the target.
+            self._learner.visit(self._predicted.position_mm, last_too=True)
+            self._reason = "the tip is in the last target, where the branch that was followed ends"
+            return Event.TREE_DONE
+        action, self._predicted = move
+        self._act(action)
+        return Event.ACTED
+
     def _monitor(self) -> Event:
         measurement = self._needle.measure()
+        if self._guide.is_on:
+            return self._monitor_branch(measurement)
         predicted = self._predicted
         is_off = self._deviation.note(measurement.position_mm, predicted.position_mm)
+        self._note_predicted(measurement)
+        if self._learner.feels(measurement):
+            return Event.FORCE
+        self._learner.visit(measurement.position_mm, last_too=False)
+        if is_off or (self._is_short and self._short_in_row > 1):
+            return Event.DEVIATION
+        if self._is_short:
+            return Event.PLAN_FAILS
+        return Event.IN_TARGET if self._is_there(measurement) else self._review()
+
+    def _monitor_branch(self, measurement: Measurement) -> Event:
+        """Whether a branch of the strategy explains where the tip is, and no region is felt."""
+        self._guide.note(measurement.position_mm)
+        self._predicted = self._guide.expected()
+        self._note_predicted(measurement)
+        event = Event.AS_PREDICTED
+        if self._learner.feels(measurement):
+            event = Event.FORCE
+            self._guide.leave("the force rises, and no known region explains it")
+        elif self._is_short and self._short_in_row > 1:
+            event = Event.DEVIATION
+            self._guide.leave("pushes are ended early")
+        elif self._guide.leave_if_lost():
+            event = Event.OFF_TREE
+        if self._guide.forbids_plans:
+            self._reason = self._guide.reason
+            return Event.NOT_GUARANTEED
+        return event
+
+    def _note_predicted(self, measurement: Measurement) -> None:
+        """Records where the tip was expected, and how far from there it is."""
+        predicted = self._predicted
         self._note(
             Predicted(
                 self._now_s(),
@@ -315,14 +388,6 @@ class Controller:
                 distance(measurement.position_mm, predicted.position_mm),
             )
         )
-        if self._learner.feels(measurement):
-            return Event.FORCE
-        self._learner.visit(measurement.position_mm, last_too=False)
-        if is_off or (self._is_short and self._short_in_row > 1):
-            return Event.DEVIATION
-        if self._is_short:
-            return Event.PLAN_FAILS
-        return Event.IN_TARGET if self._is_there(measurement) else self._review()
 
     def _is_there(self, measurement: Measurement) -> bool:
         """Whether the tip is surely in the last target before the plan ends."""

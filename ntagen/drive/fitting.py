@@ -13,7 +13,8 @@ from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm
 from ntagen.needle.errors import Errors
-from ntagen.scene import Scene
+from ntagen.needle.priors import Priors
+from ntagen.scene import Scene, Tissue
 
 if TYPE_CHECKING:
     from ntagen.needle.phantom_parameters import PhantomParameters
@@ -42,9 +43,9 @@ def overrun_mm(
 def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -> Settings:
     """The settings that fit the virtual needle and the scene, as after a calibration.
 
-    The priors are at least the needle's errors. The sensing margin is that of the thinnest shell in
-    the scene. If the driver does not know all regions, pushes become so short that it feels a
-    region before it can pierce it.
+    The priors are at least the needle's errors, and the bounds of a tissue that answers. The
+    sensing margin is that of the thinnest shell in the scene. If the driver does not know all
+    regions, pushes become so short that it feels a region before it can pierce it.
 
     Raises:
         InputError: No push is short enough for that.
@@ -54,6 +55,8 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
         roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
         noise_mm=max(settings.priors.noise_mm, errors.noise_mm),
     )
+    if scene.tissue.is_adversarial:
+        priors = _expecting(priors, scene.tissue)
     otherwise_mm = settings.sensing_margin_mm
     margins_mm = (
         sensing_margin_mm(region, scene.detections, otherwise_mm) for region in scene.criticals
@@ -63,6 +66,17 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
     if known == "all" or not settings.force_sensing:
         return settings
     return settings.with_spacing(fitting_spacing_mm(settings, margin_mm, scene.needle.length_mm))
+
+
+def _expecting(priors: Priors, tissue: Tissue) -> Priors:
+    """The priors of an estimator in a tissue that answers: what it may do is no surprise."""
+    x, y = tissue.curvature_ratio, tissue.roll_rad
+    return replace(
+        priors,
+        curvature_ratio=max(priors.curvature_ratio, x),
+        curvature_drift=max(priors.curvature_drift, x),
+        roll_rad=max(priors.roll_rad, y),
+    )
 
 
 def settings_for_phantom(

@@ -4,7 +4,8 @@ It contains:
 
 * metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
 * attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
-  (the true scene and its source), and for each synthesis ``rebuild-0001/scene.json``,
+  (the true scene and its source), ``against-tissue.json`` (the strategy against a tissue that
+  answers, if one is followed), and for each synthesis ``rebuild-0001/scene.json``,
   ``…/model.xml`` (``…/model.xml.gz`` if it is large), ``…/plans.json``, ``…/strategy.json.gz``;
 * one channel ``/ntagen/…`` for each kind of record (`ntagen.drive.messages`), and the channels for
   viewers (`ntagen.drive.viewing`).
@@ -52,6 +53,7 @@ METADATA: Final = "ntagen"
 SCENE: Final = "scene.json"
 ACTUAL: Final = "actual.json"
 SOURCE: Final = "scene.nsl"
+TREE: Final = "against-tissue.json"
 STRATEGY: Final = "strategy.json.gz"
 
 _PLANS_LOGGED: Final = 200

@@ -41,6 +41,8 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Forgotten,
     records.CutShort,
     records.Breathed,
+    records.Followed,
+    records.Guaranteed,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

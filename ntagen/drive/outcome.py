@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ntagen.drive.records import Ended, Record
+from ntagen.drive.records import Ended, Guaranteed, Record
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 
@@ -33,27 +33,33 @@ class Driven:
     Attributes:
         ended: The driver's own last record.
         syntheses: Every synthesis, in order.
+        guaranteed: How long the guarantee of a strategy held that was followed.
     """
 
     ended: Ended
     syntheses: tuple[Made, ...]
+    guaranteed: Guaranteed | None
 
 
 class SynthesisCounter:
-    """A journal that notes every synthesis.
+    """A journal that notes every synthesis, and how long a guarantee held.
 
     Attributes:
         syntheses: What was noted.
+        guaranteed: What was noted.
     """
 
     def __init__(self) -> None:
         self.syntheses: list[Made] = []
+        self.guaranteed: Guaranteed | None = None
 
     def record(self, record: Record) -> None:
-        """Does nothing: only syntheses are noted."""
+        """Notes how long a guarantee held."""
+        if isinstance(record, Guaranteed):
+            self.guaranteed = record
 
     def started(self, scene: Scene) -> None:
-        """Does nothing: only syntheses are noted."""
+        """Does nothing: the scene is known."""
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
         """Notes what was found, and how long that took."""

@@ -93,6 +93,10 @@ class Planner:
         if now_s - self._started_s >= self._settings.timeout_s:
             raise LimitError(f"the limit of {self._settings.timeout_s:g} s is over")
 
+    def left_s(self) -> float:
+        """The time that is left."""
+        return self._settings.timeout_s - (self._needle.now_s() - self._started_s)
+
     def ask(self, tip: Pose, depth_mm: float, rest: Plan | None = None) -> Synthesis:
         """The synthesis from a pose, with the current knowledge, and in the time left.
 
@@ -138,7 +142,7 @@ class Planner:
             synthesis: The synthesis.
             back_mm: How far the needle must be pulled back before.
         """
-        left_s = self._settings.timeout_s - (self._needle.now_s() - self._started_s)
+        left_s = self.left_s()
         speed_mm_per_s = synthesis.scene.needle.speed_mm_per_s
         if back_mm > 0.0:
             # Beyond the place, and again up to it, in the open channel.

@@ -25,11 +25,13 @@ from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Metadat
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
-from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, SCENE
+from ntagen.drive.following import Course
+from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, SCENE, TREE
 from ntagen.drive.messages import PACKAGE, decode
 from ntagen.drive.records import Record
 from ntagen.drive.scene_json import samples_in, scene_from_json
 from ntagen.drive.settings import Settings
+from ntagen.drive.trees import COURSE, course_from_log
 from ntagen.errors import InputError
 from ntagen.files import open_file
 from ntagen.scene import Scene
@@ -96,6 +98,21 @@ class RunLog:
         except (KeyError, ValueError) as error:
             raise InputError("the log has no settings of a run") from error
         return Settings.from_json(document)
+
+    @property
+    def course(self) -> Course | None:
+        """How the run went in a tissue that answers; None in another one.
+
+        Raises:
+            InputError: The log does not say so in the way in which it is written.
+        """
+        if COURSE not in self.metadata:
+            return None
+        tree = self.attachments.get(TREE)
+        try:
+            return course_from_log(self.metadata[COURSE], tree)
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"the strategy of the run cannot be read: {error!r}") from error
 
     def scene_of(self, number: int) -> Scene:
         """The scene of a synthesis.

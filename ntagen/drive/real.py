@@ -11,6 +11,7 @@ from typing import Final
 
 from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, LiveSensor, WatchedActuator
+from ntagen.drive.following import Course
 from ntagen.drive.knowledge import told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Journal, Journals
@@ -50,6 +51,7 @@ def drive(
     known: str = "all",
     listen: Callable[[], None] = lambda: None,
     agree: Callable[[str], None] = lambda _: None,
+    course: Course | None = None,
 ) -> Driven:
     """Drives a real needle through the scene.
 
@@ -63,6 +65,7 @@ def drive(
         known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
         agree: As in `Controller`.
+        course: As in `Controller`.
     """
     supervisor = Supervisor(sensor, listen)
     actuator.watch = supervisor.watch
@@ -79,6 +82,7 @@ def drive(
         listen,
         supervisor,
         agree,
+        course,
     )
     ended = controller.run()
-    return Driven(ended, tuple(counter.syntheses))
+    return Driven(ended, tuple(counter.syntheses), counter.guaranteed)

@@ -240,6 +240,44 @@ class Breathed(Record):
     clock_s: float
 
 
+@dataclass(frozen=True, slots=True)
+class Followed(Record):
+    """A branch of a strategy against the tissue was followed to its end.
+
+    Attributes:
+        depth_mm: The insertion depth.
+        way: The numbers of the branches from the root of the strategy to this one.
+        factor: What explains the readings best: the curvature, relative to the needle's.
+        roll_error_rad: And by how much the roll before went too far.
+        off_mm: How far the tip is from the path of the branch, in the mean of the last readings.
+        decision: What the strategy decides then, in words.
+    """
+
+    depth_mm: float
+    way: tuple[float, ...]
+    factor: float
+    roll_error_rad: float
+    off_mm: float
+    decision: str
+
+
+@dataclass(frozen=True, slots=True)
+class Guaranteed(Record):
+    """A strategy against the tissue was followed so far.
+
+    Attributes:
+        until_mm: The depth up to which its guarantee held.
+        most_off_mm: The greatest distance of the tip from the path until then.
+        allowed_mm: The distance that is allowed.
+        reason: Why the guarantee has ended, in words; empty if it held up to the target.
+    """
+
+    until_mm: float
+    most_off_mm: float
+    allowed_mm: float
+    reason: str
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

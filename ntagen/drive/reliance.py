@@ -12,6 +12,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import Final
 
+from ntagen.drive.following import Course
 from ntagen.drive.settings import Settings
 from ntagen.scene import Scene
 
@@ -45,8 +46,14 @@ def with_default_margins(settings: Settings, given: Collection[str] = ()) -> Set
     return replace(settings, margins=replace(settings.margins, clearance_mm=clearance_mm))
 
 
-def relies_on(settings: Settings, scene: Scene) -> str:
-    """What the driver relies on, as a sentence; it stands in the log and at the start of a run."""
+def relies_on(settings: Settings, scene: Scene, course: Course | None = None) -> str:
+    """What the driver relies on, as a sentence; it stands in the log and at the start of a run.
+
+    Args:
+        settings: The settings.
+        scene: The a-priori scene.
+        course: In a tissue that answers, the strategy that is followed.
+    """
     known = len(scene.criticals)
     regions = "1 known critical region" if known == 1 else f"{known} known critical regions"
     position = (
@@ -62,8 +69,22 @@ def relies_on(settings: Settings, scene: Scene) -> str:
     map_text = f"on {regions}: {kept if known == 1 else kept.replace('touch it', 'touch them')}"
     relied = [position, force, map_text if known else "on no known critical region"]
     if scene.tissue.is_adversarial:
-        relied.append(
-            "plans are for the expected tissue, with the tip error as margin, and made anew when "
-            "the needle leaves them: what `ntagen check` guarantees is not driven"
-        )
+        relied.append(_relies_on_course(scene, course))
     return "; ".join(relied)
+
+
+def _relies_on_course(scene: Scene, course: Course | None) -> str:
+    """What the driver relies on in a tissue that answers."""
+    if course is None or course.tree is None:
+        why = f"{course.lack}: " if course is not None and course.lack else ""
+        return (
+            f"{why}plans are for the expected tissue, with the tip error as margin, and made anew "
+            "when the needle leaves them: nothing is guaranteed against the tissue"
+        )
+    then = "the run ends" if course.only_guaranteed else "plans follow, without this guarantee"
+    return (
+        f"on a strategy with {course.tree.leaves} branches, one for each answer of the tissue: "
+        f"nothing is touched and the target is reached while the tip is within "
+        f"{scene.tissue.tip_mm:g} mm of one of them, and it is if the tissue picks corners or the "
+        f"middle of its bounds; else {then}"
+    )

@@ -84,6 +84,7 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
         stage,
         stage.listen,
         agree=lambda _: stage.listen(),
+        course=log.course,
     )
     try:
         controller.run()

@@ -13,6 +13,7 @@ from typing import Final, Protocol
 from ntagen.drive.controller import Controller
 from ntagen.drive.device import Actuator, Assembly, Device, Sensor, Waiting
 from ntagen.drive.engine import engine_for
+from ntagen.drive.following import Course
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
@@ -20,11 +21,14 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
+from ntagen.needle.answering import Answers, Between, Corners, Given
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.plan.best_plan import BestPlanSynthesiser
+from ntagen.plan.branches import worst_path
+from ntagen.plan.closed_loop import Segment
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Needle, Pose, Scene
 
@@ -57,6 +61,47 @@ def virtual(errors: Errors) -> Maker:
     """Virtual needles with these errors."""
     return lambda needle, obstacles, seed: VirtualNeedle(
         needle, obstacles, errors, seed, SimulatedClock()
+    )
+
+
+def answering(errors: Errors, scene: Scene, kind: str, tree: Segment | None = None) -> Maker:
+    """Virtual needles in a tissue that answers.
+
+    Args:
+        errors: Their other errors.
+        scene: The scene, with the bounds of the tissue.
+        kind: What the tissue does: ``corners`` picks corners or the middle of its bounds at random,
+            ``between`` any values; ``worst`` is worst for the strategy; ``expected`` picks nothing.
+        tree: The strategy for which ``worst`` is worst.
+
+    Raises:
+        InputError: Nothing can be worst without a strategy.
+    """
+    if kind == "worst" and tree is None:
+        raise InputError(
+            "without a strategy that is followed, nothing is the worst for it\n"
+            "hint: use --tissue corners"
+        )
+
+    def answers(seed: int) -> Answers:
+        match kind:
+            case "corners":
+                return Corners(scene.tissue, seed)
+            case "between":
+                return Between(scene.tissue, seed)
+            case "worst" if tree is not None:
+                way = worst_path(tree, scene)
+                return Given([(one.branch.factor, one.branch.roll_error_rad) for one in way])
+        return Given()
+
+    return lambda needle, obstacles, seed: VirtualNeedle(
+        needle,
+        obstacles,
+        errors,
+        seed,
+        SimulatedClock(),
+        answers=answers(seed),
+        free_bevel=scene.limits.free_bevel,
     )
 
 
@@ -97,6 +142,7 @@ def simulate(
     sense: Callable[[Device], Sensor] | None = None,
     listen: Callable[[], None] = lambda: None,
     agree: Callable[[str], None] = lambda _: None,
+    course: Course | None = None,
 ) -> Result:
     """Drives a simulated needle through the scene.
 
@@ -113,6 +159,7 @@ def simulate(
         sense: Gives what measures the needle; by default it measures itself.
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
         agree: As in `Controller`.
+        course: As in `Controller`.
     """
     obstacles = obstacles_of(scene, settings.sensing_margin_mm)
     errors = errors or Errors()
@@ -138,6 +185,7 @@ def simulate(
         Journals(journal, witness, counter),
         listen,
         agree=agree,
+        course=course,
     )
     ended = controller.run()
     last = scene.targets[-1]
@@ -150,6 +198,7 @@ def simulate(
         target_distance_mm=last.distance_at_mm(tip_mm, clock_s),
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
+        guaranteed=counter.guaranteed,
     )
 
 

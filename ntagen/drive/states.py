@@ -17,6 +17,10 @@ The initial push belongs to a plan: the first synthesis is made before anything 
 finds no plan, and the push is proven to be free of known regions, it is made without one: what it
 tells about the needle may give a plan.
 
+In a tissue that answers, a strategy may be followed instead of plans: then `synthesise` leads to
+`execute` at once, and the end of a branch to the target. Where no branch fits any more, the way
+leads to `estimate`, and plans follow, or the run ends.
+
 Each state is a task that ends with one of its events; the table gives the next state. `EVENTS`
 lists the events of each state, and `TRANSITIONS` has exactly one entry for each pair of state and
 event: nothing is undefined. Time-out, device fault and interruption can end every task; each has
@@ -48,6 +52,7 @@ class State(Enum):
     NO_STRATEGY = "no strategy"
     NONE_HOLDS = "no strategy that holds"
     NO_TIME_LEFT = "no strategy in the time left"
+    NOT_GUARANTEED = "no longer guaranteed"
     TIMED_OUT = "time-out"
     FAULTED = "device fault"
     INTERRUPTED = "interrupted"
@@ -68,6 +73,10 @@ class Event(Enum):
     NO_STRATEGY = "no strategy, even from the entry"
     NONE_HOLDS = "no strategy that holds, even from the entry"
     NO_TIME_LEFT = "no strategy that ends in time"
+    TREE_FOUND = "strategy against the tissue"
+    NOT_GUARANTEED = "the guarantee has ended"
+    OFF_TREE = "on no branch of the strategy"
+    TREE_DONE = "the branch ends in the target"
     ACTED = "acted"
     PLAN_DONE = "plan done"
     OUT_OF_STEP = "out of step with the breath"
@@ -90,6 +99,7 @@ ENDS: Final = frozenset(
         State.NO_STRATEGY,
         State.NONE_HOLDS,
         State.NO_TIME_LEFT,
+        State.NOT_GUARANTEED,
         State.TIMED_OUT,
         State.FAULTED,
         State.INTERRUPTED,
@@ -117,6 +127,11 @@ _WORKFLOW: Final = {
     (State.SYNTHESISE, Event.NO_STRATEGY): State.NO_STRATEGY,
     (State.SYNTHESISE, Event.NONE_HOLDS): State.NONE_HOLDS,
     (State.SYNTHESISE, Event.NO_TIME_LEFT): State.NO_TIME_LEFT,
+    (State.SYNTHESISE, Event.TREE_FOUND): State.EXECUTE,
+    (State.SYNTHESISE, Event.NOT_GUARANTEED): State.NOT_GUARANTEED,
+    (State.EXECUTE, Event.TREE_DONE): State.TARGET_REACHED,
+    (State.MONITOR, Event.OFF_TREE): State.ESTIMATE,
+    (State.MONITOR, Event.NOT_GUARANTEED): State.NOT_GUARANTEED,
     (State.EXECUTE, Event.ACTED): State.MONITOR,
     (State.EXECUTE, Event.PLAN_DONE): State.ESTIMATE,
     (State.EXECUTE, Event.OUT_OF_STEP): State.ESTIMATE,

@@ -6,7 +6,9 @@ from ntagen.drive.records import (
     CutShort,
     Ended,
     Estimated,
+    Followed,
     Forgotten,
+    Guaranteed,
     Learned,
     Record,
     Relied,
@@ -17,8 +19,10 @@ from ntagen.drive.records import (
 from ntagen.drive.states import Event, State
 from ntagen.plan.wording import counted
 from ntagen.scene import Vector
+from ntagen.units import deg_from_rad
 
 _FAR_MM = 1e8
+_NO_ROLL_RAD = 1e-9
 
 
 def tell(record: Record) -> str | None:
@@ -48,6 +52,10 @@ def _text(record: Record) -> str | None:
             return f"{record.kind} region '{record.name}' is now part of a larger one"
         case CutShort():
             return f"{record.reason}: stop after {record.made_mm:.2f} mm of the push"
+        case Followed():
+            return followed(record)
+        case Guaranteed():
+            return guaranteed(record)
         case Relied():
             return record.text
         case Visited():
@@ -83,6 +91,32 @@ def _synthesis(record: Synthesised) -> str:
     far = record.clearance_mm > _FAR_MM
     clearance = "" if far else f", {record.clearance_mm:.2f} mm from critical regions"
     return f"{place}: {count}; best: {record.plan}{clearance}"
+
+
+def followed(record: Followed) -> str:
+    """What the driver has seen of the tissue at the end of a branch, and what it does then."""
+    tissue = f"the needle bends {record.factor:g} times as expected"
+    if abs(record.roll_error_rad) > _NO_ROLL_RAD:
+        error_deg = deg_from_rad(record.roll_error_rad)
+        side = "too far" if error_deg > 0.0 else "not far enough"
+        tissue += f", and the roll went {abs(error_deg):g} deg {side}"
+    return (
+        f"{record.depth_mm:.2f} mm deep: {tissue} ({record.off_mm:.2f} mm off); "
+        f"so: {record.decision}"
+    )
+
+
+def guaranteed(record: Guaranteed) -> str:
+    """How long the guarantee of a strategy held."""
+    off = (
+        f"the tip was at most {record.most_off_mm:.3f} mm off ({record.allowed_mm:.3g} mm allowed)"
+    )
+    if not record.reason:
+        return f"the guarantee held up to the target: {off}"
+    return (
+        f"the guarantee ends here: {record.reason}; it held up to a depth of "
+        f"{record.until_mm:.2f} mm: {off}"
+    )
 
 
 def _point(position_mm: Vector) -> str:

@@ -28,7 +28,9 @@ from ntagen.drive.records import (
     CutShort,
     Ended,
     Estimated,
+    Followed,
     Forgotten,
+    Guaranteed,
     Learned,
     Measured,
     Predicted,
@@ -38,6 +40,7 @@ from ntagen.drive.records import (
     Visited,
 )
 from ntagen.drive.states import Event
+from ntagen.drive.story import followed, guaranteed
 from ntagen.needle.kinematics import bending_axis
 from ntagen.needle.path import sample_poses
 from ntagen.plan.synthesise import Synthesis
@@ -190,6 +193,10 @@ def _text(record: Record) -> str:
             return f"learned {record.kind} region '{record.name}'"
         case CutShort():
             return f"{record.reason}: the push ended after {record.made_mm:.2f} mm"
+        case Followed():
+            return followed(record)
+        case Guaranteed():
+            return guaranteed(record)
         case Relied():
             return record.text
         case Visited():
