@@ -16,7 +16,9 @@ from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:
+    from ntagen.drive.configure import Configuration
     from ntagen.plot.picture import Picture
+    from ntagen.scene import Scene
 
 _BUDGET_S: Final = 3.0
 """The time to look for plans, if there are too many to list all."""
@@ -46,17 +48,31 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     type=click.IntRange(min=0),
     help="Draw at most this many plans. 0 draws the scene alone, without a search for plans.",
 )
+@click.option(
+    "--strategy",
+    "tree_path",
+    metavar="FILE.json",
+    type=click.Path(path_type=Path),
+    help="In a tissue that answers, draw the strategy in this file, which ntagen check --plans "
+    "wrote for this task, and do not look for one.",
+)
 @rank_option()
 @include_option()
 def command(
-    source: Path, output: Path | None, shown: int, ranking: str | None, include: tuple[Path, ...]
+    source: Path,
+    output: Path | None,
+    shown: int,
+    tree_path: Path | None,
+    ranking: str | None,
+    include: tuple[Path, ...],
 ) -> None:
     """Draw a scene with its plans, or a run from its log.
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
     detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue,
-    the others are faint. For a run, the picture also shows the true path, the measurements and what
-    the driver learned.
+    the others are faint. In a tissue that answers (tissue adversarial), all branches of a strategy
+    against it are drawn instead, the expected one thick. For a run, the picture also shows the true
+    path, the measurements and what the driver learned.
 
     \b
     Examples:
@@ -69,14 +85,17 @@ def command(
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
+        say_idle({"tree_path": "--strategy"}, "here: the log of a run contains its strategy")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
-        say_idle({"ranking": "--rank"}, "with --plans 0")
+        say_idle({"ranking": "--rank", "tree_path": "--strategy"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path)
     require_apart({"-o": path}, {"source": source})
     picture = (
-        _of_run(source, shown) if _is_log(source) else _of_scene(source, shown, criteria, include)
+        _of_run(source, shown)
+        if _is_log(source)
+        else _of_scene(source, shown, criteria, include, tree_path)
     )
     # Importing Matplotlib takes half a second: it waits until everything else is right.
     from ntagen.plot.picture import draw
@@ -104,7 +123,11 @@ def _of_run(source: Path, shown: int) -> Picture:
 
 
 def _of_scene(
-    source: Path, shown: int, ranking: tuple[str, ...], include: tuple[Path, ...]
+    source: Path,
+    shown: int,
+    ranking: tuple[str, ...],
+    include: tuple[Path, ...],
+    tree_path: Path | None,
 ) -> Picture:
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
@@ -116,11 +139,17 @@ def _of_scene(
     task = load_task(source, include=include)
     for warning in task.warnings:
         echo(warning.render(), err=True)
-    settings = configure(task.given, task.scene).settings
+    configuration = configure(task.given, task.scene)
+    settings = configuration.settings
     engine = engine_for(settings)
     engine = replace(engine, ranking=ranking or settings.ranking)
     if shown == 0:
         return picture_of_plans(task.scene, None, shown)
+    if not task.scene.tissue.is_adversarial:
+        say_idle({"tree_path": "--strategy"}, "in a tissue that is static")
+    elif (found := _of_strategy(task.scene, configuration, tree_path)) is not None:
+        say_idle({"ranking": "--rank"}, "here: a strategy against the tissue is drawn, not plans")
+        return found
     if task.scene.breath is not None:
         # Waits make too many plans for a list. The best one is asked for, as in drives.
         return picture_of_plans(task.scene, BestPlanSynthesiser(engine)(task.scene), shown)
@@ -131,3 +160,18 @@ def _of_scene(
         task.scene, engine, clock=time.monotonic, count=shown, budget_s=_BUDGET_S
     )
     return picture_of_plans(task.scene, synthesis, shown)
+
+
+def _of_strategy(
+    scene: Scene, configuration: Configuration, tree_path: Path | None
+) -> Picture | None:
+    """The picture of the strategy against the tissue; None, and the reason, if there is none."""
+    from ntagen.cli.course import Wanted, course_of
+    from ntagen.plot.strategy import picture_of_strategy
+
+    course = course_of(Wanted(tree_path=tree_path), scene, configuration, lambda: None)
+    if course is None or course.tree is None:
+        lack = "" if course is None else course.lack
+        echo(f"note: {lack}; plans for the expected tissue are drawn", err=True)
+        return None
+    return picture_of_strategy(scene, course.tree)

@@ -55,6 +55,8 @@ class Picture:
         measured: Measured positions of the tip.
         learned: Names of regions that the driver learned; they are hatched.
         unknown: Names of regions that the driver did not know.
+        best_label: What the path of the best plan is in the legend.
+        other_label: What the other paths are.
         title: The line above the picture.
         caption: The lines below the picture.
     """
@@ -66,6 +68,8 @@ class Picture:
     measured: Curve = ()
     learned: frozenset[str] = frozenset()
     unknown: frozenset[str] = frozenset()
+    best_label: str = "best plan"
+    other_label: str = "other plans"
     title: str = ""
     caption: str = ""
 
@@ -286,12 +290,12 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     measured = [picture.measured] if picture.measured else []
     best = [picture.best] if picture.best else []
     dots = {"marker": ".", "markersize": 2.5, "linestyle": "none"}
-    other = {"color": _OTHER, "linewidth": 0.7, "alpha": alpha, "label": "other plans"}
-    plan = {"color": _NEEDLE, "linewidth": 2.2, "label": "best plan"}
+    other = {"color": _OTHER, "linewidth": 0.7, "alpha": alpha, "label": picture.other_label}
+    plan = {"color": _NEEDLE, "linewidth": 2.2, "label": picture.best_label}
     true = {"color": _TRUE, "linewidth": 1.0, "label": "true path"}
     if picture.true_path:
         # The plan is a light band under the true path, so that both are visible.
-        plan |= {"linewidth": 4.0, "alpha": 0.45, "label": "last plan"}
+        plan |= {"linewidth": 4.0, "alpha": 0.45}
     return [
         (other | {"zorder": 4}, picture.others),
         (plan | {"zorder": 5}, best),

@@ -4,17 +4,29 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from ntagen.drive.reading import RunLog
-from ntagen.drive.records import Ended, Measured, Synthesised, Truth
+from ntagen.drive.records import (
+    Ended,
+    Followed,
+    Guaranteed,
+    Measured,
+    Record,
+    Synthesised,
+    Truth,
+)
+from ntagen.drive.story import guaranteed
 from ntagen.errors import InputError
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
+from ntagen.plan.branches import path_of
 from ntagen.plan.document import plan_from_json
 from ntagen.plan.synthesise import Synthesis
 from ntagen.plan.wording import clearance_of, counted, ranked_by
 from ntagen.plot.picture import Curve, Picture
+from ntagen.plot.strategy import FOLLOWED_LABEL, OTHER_LABEL, branches_of, curve_of
 from ntagen.scene import Needle, Scene, Vector
 
 _SPACING_MM: Final = 0.5
@@ -57,17 +69,24 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
     names = {region.name for region in actual.regions}
     learned = tuple(region for region in _last_scene(log).regions if region.name not in names)
     plans, needle = _last_plans(log, shown)
+    best = curve(plans[0], needle) if plans else ()
+    others, labels = [curve(plan, needle) for plan in plans[1:]], ("last plan", "other plans")
+    followed = _followed(log, shown)
+    if followed is not None:
+        (best, others), labels = followed, (FOLLOWED_LABEL, OTHER_LABEL)
     ends = [record for record in log.records if isinstance(record, Ended)]
     return Picture(
         scene=actual.with_regions(*learned),
-        best=curve(plans[0], needle) if plans else (),
-        others=[curve(plan, needle) for plan in plans[1:]],
+        best=best,
+        others=others,
+        best_label=labels[0],
+        other_label=labels[1],
         true_path=_split([r.position_mm for r in log.records if isinstance(r, Truth)]),
         measured=[r.position_mm for r in log.records if isinstance(r, Measured)],
         learned=frozenset(region.name for region in learned),
         unknown=frozenset(names - {region.name for region in told.regions}),
         title=f"{actual.name}, a run with seed {log.metadata.get('seed', '?')}",
-        caption=_outcome(ends[-1]) if ends else "the log is torn",
+        caption=_outcome(ends[-1], log.records) if ends else "the log is torn",
     )
 
 
@@ -82,11 +101,27 @@ def _shortened(plan: str) -> str:
     return plan if len(plan) <= _LONGEST else plan[:_LONGEST].rpartition(",")[0] + ", …"
 
 
-def _outcome(ended: Ended) -> str:
-    return (
-        f"{ended.outcome} after {ended.time_s:.0f} s; {ended.syntheses} syntheses, "
-        f"{ended.adjustments} adjustments"
-    )
+def _outcome(ended: Ended, records: Sequence[Record]) -> str:
+    outcome = f"{ended.outcome} after {ended.time_s:.0f} s"
+    kept = [guaranteed(record) for record in records if isinstance(record, Guaranteed)]
+    count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"
+    made = [] if kept and not ended.syntheses else [count]
+    return "\n".join(["; ".join([outcome, *made]), *kept])
+
+
+def _followed(log: RunLog, shown: int) -> tuple[Curve, list[Curve]] | None:
+    """The way through a strategy that was followed, and all its branches; None after plans."""
+    course = log.course
+    ways = [record.way for record in log.records if isinstance(record, Followed)]
+    if course is None or course.tree is None or not ways:
+        return None
+    if any(isinstance(record, Synthesised) for record in log.records):
+        return None
+    try:
+        way = path_of(course.tree, log.scene, tuple(map(int, ways[-1])))
+    except IndexError as error:
+        raise InputError(f"the strategy of the run has no such branch: {error}") from error
+    return curve_of(way), branches_of(course.tree, log.scene) if shown else []
 
 
 def _last_scene(log: RunLog) -> Scene:
