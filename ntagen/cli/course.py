@@ -121,11 +121,11 @@ def course_of(
     Raises:
         InputError: The options contradict each other, or the file has no strategy for the scene.
     """
+    if not scene.tissue.is_adversarial:
+        return None
     from ntagen.drive.following import Course
     from ntagen.drive.trees import load_tree
 
-    if not scene.tissue.is_adversarial:
-        return None
     if wanted.by == "plans":
         if wanted.tree_path is not None or wanted.only_guaranteed:
             raise InputError(

@@ -374,7 +374,6 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
     from ntagen.drive.knowledge import told
     from ntagen.drive.log import ACTUAL, SOURCE, TREE, Log, metadata_of
     from ntagen.drive.scene_json import scene_to_json
-    from ntagen.drive.trees import COURSE, course_to_log
     from ntagen.nsl.source import MAX_SOURCE_BYTES
 
     # Mistakes on the command line must be found before an earlier log is replaced.
@@ -404,6 +403,8 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
         attachments[ACTUAL] = scene_to_json(actual).encode()
     if run.course is not None:
+        from ntagen.drive.trees import COURSE, course_to_log
+
         metadata[COURSE], tree = course_to_log(run.course)
         attachments |= {} if tree is None else {TREE: tree}
     # A pipe can be read only once.

@@ -30,6 +30,7 @@ from ntagen.drive.pieces import pieces
 from ntagen.drive.settings import Settings
 from ntagen.needle.kinematics import Arc, orthonormal, roll
 from ntagen.needle.noise import squared_length_bound
+from ntagen.needle.path import Path
 from ntagen.plan.actions import Action, Push, Roll
 from ntagen.plan.branches import arc_of
 from ntagen.plan.closed_loop import Branch, Segment
@@ -86,11 +87,11 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A segment on one way through the tree, and the pose from which it begins."""
+    """A segment on one way through the tree, and the path that leads to it."""
 
     way: tuple[int, ...]
     segment: Segment
-    pose: Pose
+    path: Path
 
 
 class _Candidates:
@@ -100,11 +101,14 @@ class _Candidates:
         self.ways: list[tuple[int, ...]] = []
         self.branches: list[Branch] = []
         self.arcs: list[Arc] = []
+        self._paths: list[Path] = []
         for node in nodes:
+            pose = orthonormal(node.path.tip)
             for number, branch in enumerate(node.segment.branches):
                 self.ways.append((*node.way, number))
                 self.branches.append(branch)
-                self.arcs.append(arc_of(node.pose, node.segment, branch, radius_mm))
+                self.arcs.append(arc_of(pose, node.segment, branch, radius_mm))
+                self._paths.append(node.path)
         starts = [arc.start for arc in self.arcs]
         self._positions = np.array([pose.position_mm for pose in starts])
         self._headings = np.array([pose.heading for pose in starts])
@@ -156,7 +160,17 @@ class _Candidates:
         """The last differences between readings and the path of one, at most so many."""
         return [one[number] for one in self._differences[-count:]]
 
-    def after(self, chosen: int) -> list[_Node]:
+    def before(self, number: int) -> Path:
+        """The path that leads to the segment, on the way of one."""
+        return self._paths[number]
+
+    def path(self, number: int, roll_rad: float, length_mm: float) -> Path:
+        """The path of one after so much of the segment; the roll before it was this."""
+        turned_rad = roll_rad + self.branches[number].roll_error_rad
+        turned = self._paths[number].roll(turned_rad) if turned_rad else self._paths[number]
+        return turned.push(self.arcs[number].radius_mm, length_mm)
+
+    def after(self, chosen: int, roll_rad: float) -> list[_Node]:
         """The segments that begin where a branch ends, after the same commands."""
         branch = self.branches[chosen]
         if branch.then is None:
@@ -169,7 +183,7 @@ class _Candidates:
             and abs(one.length_mm - branch.length_mm) <= _SMALL_MM
         ]
         return [
-            _Node(self.ways[i], then, orthonormal(self.arcs[i].end))
+            _Node(self.ways[i], then, self.path(i, roll_rad, self.branches[i].length_mm))
             for i in same
             if (then := self.branches[i].then) is not None
         ]
@@ -203,7 +217,7 @@ class Following:
         self.held_until_mm = 0.0
         # Differences from the branches that were followed in earlier segments.
         self._before: list[_Array] = []
-        self._enter([_Node((), tree, orthonormal(scene.needle.tip))], 0.0)
+        self._enter([_Node((), tree, Path(orthonormal(scene.needle.tip)))], 0.0)
 
     def _enter(self, nodes: Sequence[_Node], depth_mm: float) -> None:
         """A segment begins; the roll before it is the same on all ways."""
@@ -232,10 +246,19 @@ class Following:
         # The roll may still have to be made.
         return pose if self._has_rolled else roll(pose, -self._roll_rad)
 
+    def path(self) -> Path:
+        """The path of the needle up to now, on the branch that is followed."""
+        if not self._has_rolled:
+            return self._candidates.before(self._chosen)
+        return self._candidates.path(self._chosen, self._roll_rad, self._offset_mm)
+
+    def _after(self) -> list[_Node]:
+        return self._candidates.after(self._chosen, self._roll_rad)
+
     def next(self) -> tuple[Action, Pose] | None:
         """The next move and the pose that is expected after it; None at the end in the target."""
         if self._is_due():
-            nodes, length_mm = self._candidates.after(self._chosen), self._branch.length_mm
+            nodes, length_mm = self._after(), self._branch.length_mm
             if not nodes:
                 return None
             self._before = self._last()

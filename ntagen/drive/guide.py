@@ -86,6 +86,7 @@ class Guide:
         """Takes a reading; records the end of a branch."""
         following = self._on()
         following.note(self._needle.depth_mm, position_mm)
+        self._needle.believe(following.path())
         seen = following.seen() if following.is_near() else None
         if seen is None:
             return

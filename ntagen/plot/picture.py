@@ -37,6 +37,7 @@ _OTHER: Final = "#8a94a6"
 _TRUE: Final = "#0b2545"
 _MEASURED: Final = "#7a3e9d"
 _LEGEND_COLUMNS: Final = 6
+_MANY_CURVES: Final = 400
 _SHADOW_POINTS: Final = 160
 _TITLE_WIDTH: Final = 120
 
@@ -161,7 +162,7 @@ def _draw_projection(
             axes.add_patch(_outline(ghost, shown, _ghost_style(region)))
         axes.add_patch(_outline(region, shown, _face(region, picture)))
     for style, curves in _curves(picture):
-        for curve in curves:
+        for curve in _few(curves):
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
             style = {**style, "label": None}
     entry = picture.scene.needle.tip.position_mm
@@ -286,7 +287,9 @@ def _rgb(colour: str) -> tuple[float, float, float]:
 
 def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     """The curves in the order of drawing, with their style."""
-    alpha = max(0.25, min(0.6, 15.0 / max(1, len(picture.others))))
+    count = len(picture.others)
+    # Curves that are joined do not darken each other.
+    alpha = 0.6 if count > _MANY_CURVES else max(0.25, min(0.6, 15.0 / max(1, count)))
     measured = [picture.measured] if picture.measured else []
     best = [picture.best] if picture.best else []
     dots = {"marker": ".", "markersize": 2.5, "linestyle": "none"}
@@ -304,6 +307,14 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     ]
 
 
+def _few(curves: Sequence[Curve]) -> Sequence[Curve]:
+    """The same curves, joined to one with gaps if there are so many that drawing takes long."""
+    if len(curves) <= _MANY_CURVES:
+        return curves
+    gap = (math.nan, math.nan, math.nan)
+    return [[point for curve in curves for point in (*curve, gap)]]
+
+
 def _draw_space(
     axes: Any,  # noqa: ANN401
     picture: Picture,
@@ -315,7 +326,7 @@ def _draw_space(
     for region in picture.scene.regions:
         _draw_solid(axes, region, order)
     for style, curves in _curves(picture):
-        for curve in curves:
+        for curve in _few(curves):
             axes.plot(*([p[i] for p in curve] for i in order), **style)
     entry = picture.scene.needle.tip.position_mm
     axes.plot(*([entry[i]] for i in order), **_TIP_STYLE)

@@ -147,6 +147,27 @@ def test_corners_do_nothing_in_other_tasks(
         check_way(found.tree, way, scene)
 
 
+def beside(tree: Segment) -> Scene:
+    """The scene with its region as near to the branches as they can bear."""
+    ends = [one.arc for one in stretches(tree, SCENE) if one.branch.then is None]
+    middles = [arc.pose_at(0.7 * arc.length_mm).position_mm for arc in ends]
+    x, y, z = (sum(axis) / len(middles) for axis in zip(*middles, strict=True))
+    for tenths in range(40, 100):
+        away_mm = 0.1 * tenths
+        middle = (x + 0.866 * away_mm, y, z + 0.5 * away_mm)
+        near = replace(SCENE, criticals=(Region.ball("C", "critical", middle, 4.0),))
+        if certify_all(tree, near).holds(SCENE.tissue.tip_mm + 0.01):
+            return near
+    raise AssertionError("no place is free")
+
+
+def test_a_known_region_beside_a_branch_is_no_surprise(tree: Segment) -> None:
+    # The force rises there, as it must where the branch leads.
+    near = beside(tree)
+    for way in leaves(tree, near)[::3]:
+        check_way(tree, way, near)
+
+
 @pytest.mark.parametrize("kind", ["corners", "between", "worst", "expected"])
 def test_simulated_tissues_keep_to_their_bounds(tree: Segment, kind: str) -> None:
     for seed in range(3):
