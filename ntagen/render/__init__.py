@@ -3,20 +3,17 @@
 `render` writes the whole XML document, `render_queries` the same queries as a ``.q`` file. Both
 depend on the scene alone: the same scene gives the same text, byte for byte.
 
-The templates in ``templates/`` have the automata and the arithmetic in UPPAAL's language.
+The templates in ``templates/`` have the automata and the arithmetic in UPPAAL's language;
+`ntagen.render.generated` is a translation of them, so that Jinja is not needed here.
 `ntagen.render.values` computes every number. templates/README.md lists where the model differs from
 the paper.
 """
 
 from __future__ import annotations
 
-import html
-
-from markupsafe import Markup
-
 from ntagen.render.queries import model_queries, render_queries
-from ntagen.render.templates import environment
 from ntagen.render.values import model_values
+from ntagen.render.writing import escaped_text
 from ntagen.scene import Scene
 
 __all__ = ["render", "render_queries"]
@@ -38,13 +35,10 @@ def render(scene: Scene, source: str | None = None, *, only_plans: bool = False)
     Raises:
         InputError: A value of the scene does not fit the model's numbers.
     """
+    # Not at the top: what makes this module must run without it.
+    from ntagen.render import generated
+
     values = model_values(scene, only_plans=only_plans)
-    templates = environment()
-    declaration = templates.get_template("uppaal/declarations.c.jinja").render(
-        model=values, source=None if source is None else " ".join(source.split())
-    )
-    return templates.get_template("model.xml.jinja").render(
-        model=values,
-        declaration=Markup(html.escape(declaration, quote=False)),
-        queries=model_queries(scene),
-    )
+    name = None if source is None else " ".join(source.split())
+    declaration = generated.declaration(values, name)
+    return generated.document(values, escaped_text(declaration), model_queries(scene))

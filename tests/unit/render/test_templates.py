@@ -1,58 +1,91 @@
-"""The template environment: strict, escaping, and none the worse for a broken cache."""
+"""The translated templates: they are current, and write what Jinja writes."""
 
 from __future__ import annotations
 
+import html
 from pathlib import Path
 
 import jinja2
 import pytest
+from markupsafe import Markup
 
-from ntagen.render.templates import environment
+from ntagen import nsl
+from ntagen.render import generated, queries, render, translate
+from ntagen.render.values import model_values
+from ntagen.render.writing import Safe, escaped, with_last
+from ntagen.scene import Scene
 
-fresh = environment.__wrapped__
-
-
-def check_macro(monkeypatch: pytest.MonkeyPatch, cache_home: Path) -> None:
-    """A template is read and escapes what is put in, with the user's cache at some place."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(cache_home))
-    macros = fresh().get_template("uppaal/macros.xml.jinja").module
-    edge = macros.transition("a", "b", [("guard", 0, 0, "x < 1 && y")])  # type: ignore[attr-defined]
-    assert '<label kind="guard" x="0" y="0">x &lt; 1 &amp;&amp; y</label>' in edge
+ROOT = Path(__file__).parents[3]
+TASKS = [*ROOT.glob("examples/**/*.nsl"), *ROOT.glob("tests/corpus/nsl/ok/*.nsl")]
 
 
-def test_guards_are_escaped(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    check_macro(monkeypatch, tmp_path)
+def environment() -> jinja2.Environment:
+    """Jinja as the templates are meant: unknown names are errors, XML is escaped."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(translate.TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        autoescape=lambda name: name is not None and name.endswith(".xml.jinja"),
+        keep_trailing_newline=True,
+    )
 
 
-def test_a_cache_that_is_no_folder_does_no_harm(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+TEMPLATES = environment()
+
+
+def by_jinja(scene: Scene, source: str | None, *, only_plans: bool) -> str:
+    """The model as Jinja renders it from the templates themselves."""
+    values = model_values(scene, only_plans=only_plans)
+    declaration = TEMPLATES.get_template("uppaal/declarations.c.jinja").render(
+        model=values, source=source
+    )
+    return TEMPLATES.get_template("model.xml.jinja").render(
+        model=values,
+        declaration=Markup(html.escape(declaration, quote=False)),
+        queries=queries.model_queries(scene),
+    )
+
+
+def test_the_translation_is_current() -> None:
+    assert Path(generated.__file__).read_text("utf-8") == translate.translated(), "make templates"
+
+
+@pytest.mark.parametrize("path", sorted(TASKS), ids=lambda path: path.stem)
+def test_models_are_those_of_jinja(path: Path) -> None:
+    try:
+        scene = nsl.load(path)
+    except nsl.SourceError:
+        pytest.skip("a file to be included, or one with files that a script makes")
+    for only_plans in (False, True):
+        source = f"{path.name} <'&\">"
+        expected = by_jinja(scene, source, only_plans=only_plans)
+        assert render(scene, source, only_plans=only_plans) == expected
+
+
+@pytest.mark.parametrize("value", ["a < b && c", "'\"", 3, "plain", "&amp;", Safe("<b>")])
+def test_values_are_escaped_as_jinja_does(value: object) -> None:
+    given = Markup(value) if isinstance(value, Safe) else value
+    assert escaped(value) == TEMPLATES.from_string("{{ x|e }}").render(x=given)
+
+
+def test_the_last_row_is_known() -> None:
+    assert list(with_last("ab")) == [(False, "a"), (True, "b")]
+    assert list(with_last([])) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{{ nothing }}",
+        "{{ model | upper }}",
+        "{% raw %}x{% endraw %}{% call f() %}{% endcall %}",
+        "{% for x in model recursive %}{% endfor %}",
+    ],
+)
+def test_what_has_no_translation_is_an_error(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "ntagen").write_text("not a folder")
-    check_macro(monkeypatch, tmp_path)
-
-
-def test_a_cache_that_vanishes_does_no_harm(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    templates = fresh()
-    (tmp_path / "ntagen").rmdir()
-    assert templates.get_template("model.xml.jinja") is not None
-
-
-@pytest.mark.parametrize("damage", [b"", b"j2", b"\x00" * 500, None])
-def test_a_damaged_cache_is_worked_out_anew(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, damage: bytes | None
-) -> None:
-    check_macro(monkeypatch, tmp_path)
-    kept = list((tmp_path / "ntagen").iterdir())
-    assert kept != []
-    for file in kept:
-        whole = file.read_bytes()
-        file.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
-    check_macro(monkeypatch, tmp_path)
-
-
-def test_unknown_names_are_errors() -> None:
-    with pytest.raises(jinja2.UndefinedError):
-        fresh().from_string("{{ model.nothing }}").render(model=object())
+    (tmp_path / "one.jinja").write_text(text)
+    monkeypatch.setattr(translate, "TEMPLATES", tmp_path)
+    monkeypatch.setattr(translate, "DOCUMENTS", {"one": ("one.jinja", ("model",), "shown")})
+    with pytest.raises(ValueError, match="line 1"):
+        translate.translated()
