@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from ntagen.drive.following import Course
 from ntagen.drive.settings import Settings
 from ntagen.scene import Scene
+
+if TYPE_CHECKING:
+    from ntagen.drive.following import Course
 
 _SIGMAS: Final = 3.0
 """A measured coordinate is within this many standard deviations in 99.7 % of cases."""

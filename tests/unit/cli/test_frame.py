@@ -13,6 +13,8 @@ import pytest
 from ntagen import cli
 from ntagen.errors import DeviceError, InputError, LimitError, ModelError
 
+ROOT = Path(__file__).parents[3]
+
 
 def has_module(command: str) -> bool:
     return (Path(cli.__file__).parent / f"{command}.py").is_file()
@@ -111,6 +113,18 @@ def test_the_help_waits_for_no_library() -> None:
     script = f"import sys, ntagen.cli; print({heavy!r} & set(sys.modules))"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout == "set()\n"
+
+
+@pytest.mark.parametrize("words", [["plan"], ["check", "--plans", "-", "--max-plans", "1"]])
+def test_a_first_plan_waits_for_no_library(words: list[str]) -> None:
+    heavy = {"jinja2", "matplotlib", "numpy", "rich", "scipy", "msgspec", "google"}
+    arguments = [words[0], str(ROOT / "examples" / "paper.nsl"), *words[1:]]
+    script = (
+        f"import sys; from ntagen.cli import main; main({arguments!r});"
+        f" print({heavy!r} & set(sys.modules))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "set()"
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
