@@ -97,24 +97,41 @@ def processes(command: list[str], environment: dict[str, str], repeats: int) -> 
     return statistics.median(walls[2:]), statistics.median(processor[2:])
 
 
+def first_line(command: list[str], environment: dict[str, str]) -> tuple[float, float] | None:
+    """Wall and processor seconds until a process prints its first plan; None if that is no plan.
+
+    Then the process is ended.
+    """
+    begin = time.perf_counter()
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as process:
+        if process.stdout is None or b"found" not in process.stdout.readline():
+            return None
+        wall = time.perf_counter() - begin
+        on_processor_ns = Path(f"/proc/{process.pid}/schedstat").read_text().split()[0]
+        process.terminate()
+        process.communicate()
+    return wall, 1e-9 * int(on_processor_ns)
+
+
 def first_lines(
     command: list[str], environment: dict[str, str], repeats: int
 ) -> tuple[float, float]:
-    """The same up to the first line that a process prints; then it is ended."""
-    walls, processor = [], []
-    for _ in range(repeats + 2):
-        begin = time.perf_counter()
-        with subprocess.Popen(
-            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-        ) as process:
-            if process.stdout is None or b"found" not in process.stdout.readline():
-                raise SystemExit("the first line is no plan")
-            walls.append(time.perf_counter() - begin)
-            on_processor_ns = Path(f"/proc/{process.pid}/schedstat").read_text().split()[0]
-            processor.append(1e-9 * int(on_processor_ns))
-            process.terminate()
-            process.communicate()
-    return statistics.median(walls[2:]), statistics.median(processor[2:])
+    """The medians of seconds until the first plan, after two that do not count."""
+    found = [first_line(command, environment) for _ in range(repeats + 2)][2:]
+    pairs = [pair for pair in found if pair is not None]
+    if len(pairs) < repeats:
+        raise SystemExit("the first line is no plan")
+    walls, processor = zip(*pairs, strict=True)
+    return statistics.median(walls), statistics.median(processor)
+
+
+def clean_environment(folder: str) -> dict[str, str]:
+    """Variables for processes that keep compiled modules, and what else they store, in a folder."""
+    return {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    } | {"PYTHONPYCACHEPREFIX": folder, "XDG_CACHE_HOME": folder}
 
 
 def main() -> None:
@@ -127,9 +144,7 @@ def main() -> None:
         stages(given.task)
         return
     with tempfile.TemporaryDirectory() as folder:
-        environment = {
-            name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
-        } | {"PYTHONPYCACHEPREFIX": folder, "XDG_CACHE_HOME": folder}
+        environment = clean_environment(folder)
         own = [sys.executable, __file__, "--stages", "--task", str(given.task)]
         runs = []
         for _ in range(given.repeats + 1):
