@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Sequence
-from fractions import Fraction
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from ntagen.units import deg_from_rad
 from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from fractions import Fraction
 
 LARGEST_UNITS: Final = 2**28
 """The largest absolute value that a scene may put into the model, in units. The model adds and
@@ -281,11 +283,15 @@ def pause_count(count: int) -> Breach | None:
 
 def rounded_time(time_s: float) -> Fraction:
     """A time as a whole multiple of 0.1 ms, in s."""
+    from fractions import Fraction
+
     return Fraction(round(time_s * TIMES_PER_S), TIMES_PER_S)
 
 
 def common_time(*times_s: float) -> Fraction:
     """The longest time of which all these are whole multiples, in s, after rounding to 0.1 ms."""
+    from fractions import Fraction
+
     fractions = [rounded_time(time_s) for time_s in times_s]
     denominator = math.lcm(*(one.denominator for one in fractions))
     numerator = math.gcd(*(int(one * denominator) for one in fractions))
@@ -294,4 +300,7 @@ def common_time(*times_s: float) -> Fraction:
 
 def units_of(value: float, per_mm: int) -> int:
     """The number of units nearest to a finite value (ties go to the even number)."""
-    return round(Fraction(value) * per_mm)
+    numerator, denominator = value.as_integer_ratio()
+    whole, rest = divmod(numerator * per_mm, denominator)
+    # Half a unit goes up if the whole number is odd.
+    return whole + (2 * rest > denominator - whole % 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from dataclasses import replace
 from functools import cached_property
@@ -50,6 +49,8 @@ class ImageBuilder:
 
     def _kept(self, image: DraftImage, path: str, wish: Wish) -> Field | None:
         """The field, which is computed only once for all runs with the same file."""
+        import hashlib
+
         from ntagen.imaging.reading import bytes_of
         from ntagen.imaging.store import kept
 
