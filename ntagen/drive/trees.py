@@ -90,8 +90,8 @@ def load_tree(path: Path, scene: Scene) -> Segment:
         raise InputError(
             f"{path} is a strategy for another task ({document.get('task')}), or for this one "
             f"before it was changed\n"
-            "hint: write it again with `ntagen check TASK --verify --plans FILE`; a driver that "
-            "does not know all regions (--known) needs none of them"
+            "hint: write it again with `ntagen check TASK --verify --plans FILE`; for a driver "
+            "that does not know all regions (--known), leave out --strategy"
         )
     require_holding(tree, scene)
     return tree

@@ -147,7 +147,8 @@ def test_corners_do_nothing_in_other_tasks(
         check_way(found.tree, way, scene)
 
 
-def beside(tree: Segment) -> Scene:
+@pytest.fixture(scope="module")
+def near(tree: Segment) -> Scene:
     """The scene with its region as near to the branches as they can bear."""
     ends = [one.arc for one in stretches(tree, SCENE) if one.branch.then is None]
     middles = [arc.pose_at(0.7 * arc.length_mm).position_mm for arc in ends]
@@ -155,17 +156,39 @@ def beside(tree: Segment) -> Scene:
     for tenths in range(40, 100):
         away_mm = 0.1 * tenths
         middle = (x + 0.866 * away_mm, y, z + 0.5 * away_mm)
-        near = replace(SCENE, criticals=(Region.ball("C", "critical", middle, 4.0),))
-        if certify_all(tree, near).holds(SCENE.tissue.tip_mm + 0.01):
-            return near
+        scene = replace(SCENE, criticals=(Region.ball("C", "critical", middle, 4.0),))
+        if certify_all(tree, scene).holds(SCENE.tissue.tip_mm + 0.01):
+            return scene
     raise AssertionError("no place is free")
 
 
-def test_a_known_region_beside_a_branch_is_no_surprise(tree: Segment) -> None:
+def test_a_known_region_beside_a_branch_is_no_surprise(tree: Segment, near: Scene) -> None:
     # The force rises there, as it must where the branch leads.
-    near = beside(tree)
     for way in leaves(tree, near)[::3]:
         check_way(tree, way, near)
+
+
+@settings(max_examples=examples(10), deadline=None)
+@given(seed=st.integers(0, 10**6), radius_mm=st.floats(28.0, 32.0))
+def test_what_is_guaranteed_holds_whatever_the_tissue_does(
+    tree: Segment, near: Scene, seed: int, radius_mm: float
+) -> None:
+    random_picks = random.Random(seed)
+    picks = [
+        (1.0 + random_picks.uniform(-0.05, 0.05), random_picks.uniform(-0.03, 0.03))
+        for _ in range(2)
+    ]
+    course = Course(tree, only_guaranteed=True)
+    result, diary = drive(course, picking(picks, radius_mm), scene=near)
+    (kept,) = diary.of(Guaranteed)
+    assert kept.most_off_mm <= kept.allowed_mm
+    # The mean of some readings is late by less than this.
+    assert result.clearance_mm > -0.02
+    if result.ended.outcome == State.TARGET_REACHED.value:
+        assert kept.reason == ""
+        assert result.target_distance_mm < 0.02
+    else:
+        assert result.ended.outcome == State.NOT_GUARANTEED.value
 
 
 @pytest.mark.parametrize("kind", ["corners", "between", "worst", "expected"])
