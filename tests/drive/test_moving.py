@@ -80,6 +80,7 @@ def test_a_drive_reaches_a_target_that_moves_through_its_gate(clock_s: float) ->
             assert phase_deg >= 250.0 - 1e-6 or phase_deg <= 110.0 + late_deg
 
 
+@pytest.mark.slow
 def test_a_stepped_needle_keeps_pace_with_a_target_that_moves() -> None:
     """Ramps and answers of the controller make each push late; the plans hold later too."""
     scene, kept = breathing(), Kept()

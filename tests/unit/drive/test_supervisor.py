@@ -186,6 +186,7 @@ def test_a_violation_that_stays_makes_the_driver_pull_back() -> None:
     assert events.index(Event.PLAN_FAILS.value) < events.index(Event.DEVIATION.value)
 
 
+@pytest.mark.slow
 def test_a_run_with_a_push_that_was_ended_early_is_decided_again(tmp_path: Path) -> None:
     stepped, live = bench()
     live.after_mm, live.most_times = 12.1, 2
