@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from ntagen import _checker
-from ntagen.checker.edges import EdgeEntry, EnginePlan, step_of
+from ntagen.checker.edges import EdgeEntry, EngineEdge, EnginePlan, step_of
 from ntagen.checker.errors import rejecting
 from ntagen.values import dataclass
 
@@ -87,7 +87,7 @@ class Answer:
         self.message = raw.message
         self.wrapped = None if raw.wrapped is None else Place(*raw.wrapped)
         self.warnings = tuple(raw.warnings)
-        self.stop = raw.stop
+        self.stop: str | None = raw.stop
         self.explored = raw.explored
         self.stored = raw.stored
         self.seconds = raw.seconds
@@ -174,6 +174,32 @@ class Answer:
         ``None`` if none was asked for or found.
         """
         return self._raw.strategy_json()
+
+    def decisions_of(
+        self, process: str, variables: Sequence[str]
+    ) -> Iterator[tuple[tuple[tuple[int, ...], ...], EngineEdge]]:
+        """What a process does where the strategy lets it move: the first such move of each state.
+
+        That is a small part of a large strategy; to which clock values it applies is left out.
+
+        Args:
+            process: The process.
+            variables: Global integer variables, or arrays of integers.
+
+        Yields:
+            The values of each variable where it is decided (one, or all elements of an array), and
+            the edge that the process takes.
+
+        Raises:
+            ValueError: There is no strategy, or no such process or variable.
+        """
+        decisions = self._raw.decisions_of(process, list(variables))
+        if decisions is None:
+            raise ValueError(f"there is no strategy with {process} and {', '.join(variables)}")
+        for values, move in decisions:
+            edges = step_of(self._edges, move).edges
+            edge = next(one for one in edges if one.process == process)
+            yield tuple(tuple(one) for one in values), edge
 
     def strategy_text(self) -> str | None:
         """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""

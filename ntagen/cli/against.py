@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,7 @@ from ntagen.files import write_files
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Options
     from ntagen.nsl import Task
+    from ntagen.plan.against_tissue import Defence
 
 
 def is_adversarial(task: Task | None) -> bool:
@@ -19,31 +21,45 @@ def is_adversarial(task: Task | None) -> bool:
     return task is not None and task.scene.tissue.is_adversarial
 
 
-def defence_notes(answer: Answer, task: Task, options: Options, target: str | None) -> list[str]:
-    """What holds for the strategy on all its branches; writes it as a tree if that is wanted.
+def defended(task: Task, options: Options) -> Defence:
+    """The answer to the question for a strategy against the environment's tissue.
 
     Args:
-        answer: The answer of the engine to the query for a strategy.
         task: The environment.
-        options: The limits.
-        target: The file for the tree, or ``-`` for standard output.
+        options: The limits, and how the engine is to answer.
     """
-    from ntagen.drive.trees import document_of
     from ntagen.plan.against_tissue import defend
 
-    if answer.verdict != "satisfied":
-        return []
-    found = defend(
+    return defend(
         task.scene,
         timeout_s=options.timeout_s,
         memory_bytes=options.memory_bytes,
         verify=options.verify,
+        options=options,
     )
+
+
+def answer_of(found: Defence) -> Answer:
+    """The answer of the engine, with the verdict and the counts of all plays."""
+    answer = copy.copy(found.answer)
+    answer.verdict, answer.stop = found.verdict, found.stop
+    answer.seconds, answer.explored, answer.stored = found.seconds, found.explored, found.stored
+    return answer
+
+
+def defence_notes(found: Defence, target: str | None) -> list[str]:
+    """What holds for the strategy on all its branches; writes it as a tree if that is wanted.
+
+    Args:
+        found: The answer.
+        target: The file for the tree, or ``-`` for standard output.
+    """
+    from ntagen.drive.trees import document_of
+
     notes = list(found.guarantee())
-    if found.tree is None:
-        why = f" ({found.stop})" if found.stop else ""
-        notes.append(f"no strategy that holds in exact kinematics was found{why}")
-    elif target is not None:
+    if not found.holds or found.tree is None:
+        return notes
+    if target is not None:
         text = json.dumps(document_of(found))
         if target == "-":
             echo(text)

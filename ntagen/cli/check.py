@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli import INTERNAL_ERROR
-from ntagen.cli.against import defence_notes, is_adversarial
+from ntagen.cli.against import answer_of, defence_notes, defended, is_adversarial
 from ntagen.cli.asked import Asked, is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
@@ -32,7 +32,9 @@ from ntagen.files import require_apart
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options, QueryForm
+    from ntagen.loading import Loaded
     from ntagen.nsl import Task
+    from ntagen.plan.against_tissue import Defence
 
 STOPPED: Final = 3
 """Exit code after a limit or a ``maybe``."""
@@ -217,16 +219,14 @@ def command(
             is_used = is_used_by(query, todo[number + 1 :])
             try:
                 with shown_progress(query.text, quiet=as_json) as report:
-                    answer = loaded.model.answer(
-                        query.text,
-                        replace(
-                            options,
-                            strategy=is_used or strategy is not None or controller is not None,
-                            folder=query.folder,
-                            progress=report,
-                            **_for_task(options, loaded.task, query),
-                        ),
+                    asked_so = replace(
+                        options,
+                        strategy=is_used or strategy is not None or controller is not None,
+                        folder=query.folder,
+                        progress=report,
+                        **_for_task(options, loaded.task, query),
                     )
+                    answer, found = _answered(loaded, query, asked_so)
             except InputError as error:
                 if len(todo) == 1:
                     raise
@@ -242,8 +242,9 @@ def command(
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
             notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
-            if loaded.task is not None and _is_defence(loaded.task, query):
-                notes += defence_notes(answer, loaded.task, options, plans)
+            if found is not None:
+                answer = answer_of(found)
+                notes += defence_notes(found, plans)
                 outputs.written.add("--plans")
             if as_json:
                 echo(json.dumps(_record(answer, query)))
@@ -252,6 +253,17 @@ def command(
             worst = max(worst, _severity(answer), key=_SEVERITIES.index)
     say(unwritten(outputs.wanted(), outputs.written))
     return worst
+
+
+def _answered(loaded: Loaded, query: Asked, options: Options) -> tuple[Answer, Defence | None]:
+    """The answer to a query, and what it rests on if the tissue of an environment answers."""
+    if loaded.task is None or not _is_defence(loaded.task, query):
+        return loaded.model.answer(query.text, options), None
+    found = defended(loaded.task, options)
+    # A strategy that is written as it is, is one of the compiled model.
+    if options.strategy:
+        return loaded.model.answer(query.text, options), found
+    return answer_of(found), found
 
 
 def _seeks_target(query: Asked) -> bool:

@@ -9,16 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from ntagen.errors import InputError, ModelError
 from ntagen.plan.closed_loop import Reach, Segment, certify_all, decisions_of
 from ntagen.plan.synthesise import GUIDE, STRATEGY_QUERY
 from ntagen.scene import Scene
 
-_ROUNDING_UNITS: Final = 300
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, Options
+
+_ROUNDING_UNITS: Final = 1000
 """The margins of the model are larger by so many units: its directions are off by some units after
 each push and roll, times the length that is still travelled."""
+
+_PLAYS: Final = 3
+"""So often the game is played with more margin, if rounding took more than there was."""
+
+_MORE_THAN_MISSING: Final = 1.5
+"""Such a play has so many times more margin than was missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +45,7 @@ class Defence:
         seconds: The time that the engine took.
         explored: The states that it explored.
         stored: The states that it stored.
+        answer: What the engine said last.
     """
 
     scene: Scene
@@ -48,6 +58,7 @@ class Defence:
     seconds: float
     explored: int
     stored: int
+    answer: Answer
 
     @property
     def holds(self) -> bool:
@@ -78,6 +89,7 @@ def defend(
     memory_bytes: int | None = 2 << 30,
     verify: bool = False,
     listen: Callable[[], None] = lambda: None,
+    options: Options | None = None,
 ) -> Defence:
     """A strategy against the scene's tissue.
 
@@ -87,6 +99,7 @@ def defend(
         memory_bytes: The engine stops when its states take this much.
         verify: Whether the engine's independent room checks the strategy.
         listen: Is called regularly, and raises `KeyboardInterrupt` to end the search.
+        options: How else the engine is to answer; what is said above comes first.
 
     Returns:
         The answer. It is "unknown" with the reason ``rounding`` if the model has a strategy, and
@@ -96,44 +109,52 @@ def defend(
         InputError: The scene has another tissue, or several targets.
         ModelError: The model ran into a run-time error, or the strategy failed its check.
     """
-    limits: dict[str, Any] = {
-        "timeout_s": timeout_s,
-        "memory_bytes": memory_bytes,
-        "verify": verify,
-        "listen": listen,
-    }
     if not scene.tissue.is_adversarial:
         raise InputError("the tissue is static: it does not answer\nhint: ask for plans instead")
     if len(scene.targets) != 1:
         raise InputError("against an adversarial tissue there is one target\nhint: remove the rest")
-    tip_mm = scene.tissue.tip_mm
-    first = _played(scene, tip_mm + _ROUNDING_UNITS / scene.resolution_per_mm, **limits)
-    if first.holds or first.verdict == "unknown":
-        return first
-    # Rounding decides: with the error of the tip alone, the answer may be another.
-    left_s = None if timeout_s is None else max(0.0, timeout_s - first.seconds)
-    limits["timeout_s"] = left_s
-    second = _played(scene, tip_mm, **limits)
-    both = replace(
-        second,
-        seconds=first.seconds + second.seconds,
-        explored=first.explored + second.explored,
-        stored=max(first.stored, second.stored),
+    from ntagen.checker import Options
+
+    asked = replace(
+        options or Options(),
+        guide=options.guide if options and options.guide else GUIDE,
+        plans="none",
+        trace=False,
+        certificate=False,
+        strategy=True,
+        verify=verify,
+        memory_bytes=memory_bytes,
+        progress=options.progress if options and options.progress else lambda *_: listen(),
     )
-    if second.verdict == "satisfied" and not second.holds:
-        return replace(both, verdict="unknown", stop="rounding")
-    return both
+    plays: list[Defence] = []
+
+    def play(margin_mm: float) -> Defence:
+        spent_s = sum(one.seconds for one in plays)
+        left_s = None if timeout_s is None else max(0.0, timeout_s - spent_s)
+        plays.append(_played(scene, margin_mm, replace(asked, timeout_s=left_s)))
+        return replace(
+            plays[-1],
+            seconds=sum(one.seconds for one in plays),
+            explored=sum(one.explored for one in plays),
+            stored=max(one.stored for one in plays),
+        )
+
+    tip_mm = scene.tissue.tip_mm
+    reserve_mm = _ROUNDING_UNITS / scene.resolution_per_mm
+    for _ in range(_PLAYS):
+        found = play(tip_mm + reserve_mm)
+        if found.reach is None or found.holds:
+            break
+        reserve_mm += _MORE_THAN_MISSING * found.reach.missing_mm(tip_mm)
+    if found.verdict == "not satisfied":
+        # Rounding decides: with the error of the tip alone, the answer may be another.
+        found = play(tip_mm)
+    if found.reach is not None and not found.holds:
+        return replace(found, verdict="unknown", stop="rounding")
+    return found
 
 
-def _played(
-    scene: Scene,
-    margin_mm: float,
-    *,
-    timeout_s: float | None,
-    memory_bytes: int | None,
-    verify: bool,
-    listen: Callable[[], None],
-) -> Defence:
+def _played(scene: Scene, margin_mm: float, options: Options) -> Defence:
     """Plays the game once, with these margins."""
     from ntagen import checker
     from ntagen.render import render
@@ -142,22 +163,13 @@ def _played(
     model = checker.load(render(harder, only_plans=True))
     # The model computes distances: if one wrapped round, the answer would be wrong.
     model.overflow = "error"
-    answer = model.check(
-        STRATEGY_QUERY,
-        guide=GUIDE,
-        strategy=True,
-        verify=verify,
-        timeout_s=timeout_s,
-        memory_bytes=memory_bytes,
-        progress=lambda *_: listen(),
-    )
+    answer = model.answer(STRATEGY_QUERY, options)
     if answer.verdict == "error":
         raise ModelError(f"the model of the scene fails: {answer.message}")
     if answer.verified is False:
         raise ModelError("the strategy fails its check\n" + "\n".join(answer.verification))
     is_won = answer.verdict == "satisfied"
-    text = answer.strategy_json() if is_won else None
-    tree = decisions_of(text, scene) if text is not None else None
+    tree = decisions_of(answer, scene) if is_won else None
     verdict: Literal["satisfied", "not satisfied", "unknown"] = "unknown"
     if answer.verdict in ("satisfied", "not satisfied"):
         verdict = "satisfied" if is_won else "not satisfied"
@@ -172,4 +184,5 @@ def _played(
         seconds=answer.seconds,
         explored=answer.explored,
         stored=answer.stored,
+        answer=answer,
     )

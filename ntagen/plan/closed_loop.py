@@ -11,21 +11,22 @@ or y. `certify_all` follows every branch in exact kinematics.
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ntagen import rules
 from ntagen.errors import NtagenError
 from ntagen.needle.kinematics import Arc, orthonormal, roll
 from ntagen.needle.nearest import nearest_to
-from ntagen.needle.path import sample_poses
 from ntagen.scene import Pose, Scene
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer
 
 _SPACING_MM: Final = 0.1
 """Distances are computed at points so far apart on a path."""
@@ -123,40 +124,32 @@ class Reach:
         is_free = self.clearance_mm >= tip_mm and self.clearance_mm > 0.0
         return is_free and self.depth_mm >= tip_mm
 
+    def missing_mm(self, tip_mm: float) -> float:
+        """How much is missing on the worst branch so that it holds; 0 if nothing is."""
+        return max(0.0, tip_mm - min(self.clearance_mm, self.depth_mm))
 
-def decisions_of(strategy_json: str, scene: Scene) -> Segment:
-    """The tree of decisions of a strategy for the scene's model.
+
+def decisions_of(answer: Answer, scene: Scene) -> Segment:
+    """The tree of decisions of an answer's strategy for the scene's model.
 
     Raises:
         NtagenError: It is no such strategy.
     """
-    decided = dict(_decisions(strategy_json))
-    return _Reader(decided, scene).segment((), 0, 0)
+    return _Reader(dict(_decisions(answer)), scene).segment((), 0, 0)
 
 
-_STATE: Final = re.compile(r'\{"locations":\s*(?=\{"User":\s*"Idle",\s*"Needle":\s*"Idle")')
-
-
-def _decisions(text: str) -> Iterator[tuple[Key, int]]:
+def _decisions(answer: Answer) -> Iterator[tuple[Key, int]]:
     """What is decided where: the index of the angle of a roll, or -1 for a push.
 
-    The text has a state for each of the many steps between two decisions, so only those are read
-    in which the User decides.
+    A strategy has a state for each of the many steps between two decisions, so only those are asked
+    for in which the User decides.
     """
-    decoder = json.JSONDecoder()
-    for found in _STATE.finditer(text):
-        state, _ = decoder.raw_decode(text, found.start())
-        values = state["variables"]
-        moves = [edge for one in state["decisions"] for edge in one["action"] or ()]
-        sent = next((edge for edge in moves if edge["process"] == "User"), None)
-        if sent is None:
-            continue
-        picks: list[int] = []
-        while (pick := values.get(f"picks[{len(picks)}]")) is not None:
-            picks.append(pick)
-        segment = values["segment"]
-        key = (tuple(picks[: segment + 1]), segment, values["needle_progress"])
-        yield key, sent["select"].get("angle_index", -1)
+    decided = answer.decisions_of("User", ("picks", "segment", "needle_progress"))
+    for (picks, (segment,), (progress,)), edge in decided:
+        # Elsewhere the User does what it must.
+        if edge.source == "Idle":
+            key = (picks[: segment + 1], segment, progress)
+            yield key, edge.select.get("angle_index", -1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,10 +249,21 @@ class _Found:
             self.most_rolls = max(self.most_rolls, rolls)
 
     def _pass(self, arc: Arc) -> None:
-        points = np.array([pose.position_mm for pose in sample_poses((arc,), _SPACING_MM)])
+        points = _points(arc)
         for region in self._scene.avoided:
             # No point of the path is farther than half the spacing from one of these.
             near_mm = float(region.shape.distance_mm(points).min()) - 0.5 * _SPACING_MM
             if near_mm < self.clearance_mm:
                 nearest = nearest_to((arc,), arc.start.position_mm, region.shape)
                 self.clearance_mm = min(self.clearance_mm, nearest.distance_mm)
+
+
+def _points(arc: Arc) -> NDArray[np.float64]:
+    """Points on an arc, at most `_SPACING_MM` apart, with both ends, of shape (n, 3)."""
+    count = max(1, math.ceil(arc.length_mm / _SPACING_MM))
+    angle = np.linspace(0.0, arc.length_mm / arc.radius_mm, count + 1)[:, None]
+    start, heading, bevel = (
+        np.array(part) for part in (arc.start.position_mm, arc.start.heading, arc.start.bevel)
+    )
+    ahead, aside = np.sin(angle) * heading, (1.0 - np.cos(angle)) * bevel
+    return np.asarray(start + arc.radius_mm * (ahead - aside))

@@ -9,8 +9,9 @@ the time, and times and states of the engine. The yardstick are plans without an
 constant errors at all corners: 43, 37 and 17 of 50 (frontier of the project, 45 deg, two rolls).
 
 With `--tissues`, each strategy is followed by code that shares nothing with the model: by so many
-tissues that pick corners or the middle, by as many that pick any value between, and by the 1,000
-worst of the former.
+tissues that pick corners or the middle, by as many that pick any value between, by as many that
+pick the factor anew at each push (a game that no strategy was asked to win), and by the 1,000 worst
+of the first.
 """
 
 from __future__ import annotations
@@ -78,11 +79,14 @@ def followed(found: Defence, count: int) -> dict[str, Any]:
     random = np.random.default_rng(1)
     at_corners = oracle.simulate(tree, scene, count, oracle.corners(scene, random))
     within = oracle.simulate(tree, scene, count, oracle.between(scene, random))
+    anew = oracle.simulate_pushes(tree, scene, count, random)
     worst = oracle.worst(tree, scene, WORST)
     return {
         "corners": int(at_corners.safe(tip_mm).sum()),
         "between, with the tip error": int(within.safe(tip_mm).sum()),
         "between, without it": int(within.safe(0.0).sum()),
+        "at each push, with the tip error": int(anew.safe(tip_mm).sum()),
+        "at each push, without it": int(anew.safe(0.0).sum()),
         "worst": int((worst >= tip_mm - 1e-6).sum()),
         "worst of": len(worst),
         "least margin": float(worst[0]),

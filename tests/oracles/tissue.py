@@ -76,6 +76,76 @@ class Outcome:
         return (self.clearance_mm >= tip_mm - slack) & (self.depth_mm >= tip_mm - slack)
 
 
+def simulate_pushes(
+    tree: Mapping[str, Any], scene: Scene, count: int, random: np.random.Generator
+) -> Outcome:
+    """Lets so many tissues pick a corner or the middle anew at each push.
+
+    The driver tells branches apart by the mean of the first pushes, and follows the nearest one.
+    """
+    push_mm = scene.needle.speed_mm_per_s * scene.limits.step_s
+    tissue = scene.tissue
+    outcome = Outcome(np.full(count, math.inf), np.full(count, -math.inf))
+
+    def follow(
+        segment: Mapping[str, Any], which: NDArray[np.intp], poses: Poses, expected: Poses
+    ) -> None:
+        branches = segment["branches"]
+        errs = any(branch["roll_error_rad"] != 0.0 for branch in branches)
+        errors = random.choice(tissue.roll_errors_rad if errs else (0.0,), len(which))
+        pushes = round(max(branch["length_mm"] for branch in branches) / push_mm)
+        factors = random.choice(tissue.factors, (pushes, len(which)))
+        bends = factors / scene.needle.radius_mm
+        rolled = poses.rolled(segment["roll_rad"] + errors)
+        shortest_mm = min(branch["length_mm"] for branch in branches)
+        seen = round(min(SEEN_AFTER_MM, shortest_mm) / push_mm)
+        seen_poses = _pushed_one_by_one(rolled, bends[:seen], push_mm)[-1]
+        starts = []
+        for branch in branches:
+            begin = expected.rolled(np.array([segment["roll_rad"] + branch["roll_error_rad"]]))
+            starts.append((begin, np.array([branch["factor"] / scene.needle.radius_mm])))
+        there = [begin.pushed(bend, seen * push_mm) for begin, bend in starts]
+        chosen = np.argmin(np.stack([_apart(seen_poses, one) for one in there]), axis=0)
+        for number, branch in enumerate(branches):
+            some = np.flatnonzero(chosen == number)
+            if not len(some):
+                continue
+            length_mm = branch["length_mm"]
+            own = bends[: round(length_mm / push_mm), some]
+            passed = _pushed_one_by_one(rolled.of(some), own, push_mm)
+            for begin, bend in zip(passed, own, strict=False):
+                _touch(begin, bend, push_mm, scene, outcome, which[some])
+            if branch["then"] is None:
+                depth = -scene.targets[-1].shape.distance_mm(passed[-1].position)
+                outcome.depth_mm[which[some]] = depth
+                continue
+            begin, bend = starts[number]
+            follow(branch["then"], which[some], passed[-1], begin.pushed(bend, length_mm))
+
+    tip = scene.needle.tip
+    start = Poses(*(np.tile(np.array(part), (count, 1)) for part in _frame(tip)))
+    expected = Poses(*(np.array(part)[None, :] for part in _frame(tip)))
+    follow(tree, np.arange(count), start, expected)
+    return outcome
+
+
+def _pushed_one_by_one(poses: Poses, bends: Array, push_mm: float) -> list[Poses]:
+    """The poses before and after each push; `bends` has a row of curvatures for each."""
+    passed = [poses]
+    for bend in bends:
+        passed.append(passed[-1].pushed(bend, push_mm))
+    return passed
+
+
+def _apart(poses: Poses, there: Poses) -> Array:
+    """How far poses are from another one: a length that counts directions too."""
+    return np.asarray(
+        np.linalg.norm(poses.position - there.position, axis=1)
+        + AHEAD_MM * np.linalg.norm(poses.heading - there.heading, axis=1)
+        + AHEAD_MM * np.linalg.norm(poses.bevel - there.bevel, axis=1)
+    )
+
+
 def simulate(tree: Mapping[str, Any], scene: Scene, count: int, picks: Picks) -> Outcome:
     """Lets so many tissues pick, and follows in each segment the branch that is nearest."""
     outcome = Outcome(np.full(count, math.inf), np.full(count, -math.inf))
@@ -112,12 +182,7 @@ def _follow(
         begin = expected.rolled(np.array([segment["roll_rad"] + branch["roll_error_rad"]]))
         bend = np.array([branch["factor"] / scene.needle.radius_mm])
         starts.append((begin, bend))
-        there = begin.pushed(bend, seen_mm)
-        costs.append(
-            np.linalg.norm(seen.position - there.position, axis=1)
-            + AHEAD_MM * np.linalg.norm(seen.heading - there.heading, axis=1)
-            + AHEAD_MM * np.linalg.norm(seen.bevel - there.bevel, axis=1)
-        )
+        costs.append(_apart(seen, begin.pushed(bend, seen_mm)))
     chosen = np.argmin(np.stack(costs), axis=0)
     for number, branch in enumerate(branches):
         some = np.flatnonzero(chosen == number)

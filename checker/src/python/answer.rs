@@ -8,7 +8,7 @@ use super::model::Model;
 use super::options;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{
-    json, machine_c, machine_json, strategy_c, strategy_json, strategy_text, text,
+    decisions, json, machine_c, machine_json, strategy_c, strategy_json, strategy_text, text,
 };
 use crate::engine::{self, LoadedModel, Options, Verdict};
 use crate::search::limits::StopReason;
@@ -210,6 +210,17 @@ impl Answer {
         until_signal(py, || self.strategy_json_or_none())
     }
 
+    /// The decisions of the strategy in which a process moves: for each the values of variables by
+    /// name, and the edges; `None` without a strategy, or if a name is unknown.
+    fn decisions_of(
+        &self,
+        py: Python<'_>,
+        process: &str,
+        variables: Vec<String>,
+    ) -> PyResult<Option<Vec<DecisionEntry>>> {
+        until_signal(py, move || self.decisions_or_none(process, &variables))
+    }
+
     /// The strategy, or the machine of a game with observations, as a controller in C; `None`
     /// without any.
     fn controller_c(&self, py: Python<'_>) -> PyResult<Option<String>> {
@@ -223,6 +234,9 @@ impl Answer {
         until_signal(py, || self.strategy_text_or_none())
     }
 }
+
+/// A decision: the values of variables, each with all elements, and the edges of its move.
+type DecisionEntry = (Vec<Vec<i32>>, StepEntry);
 
 impl Answer {
     fn plans_json_or_none(&self) -> Option<String> {
@@ -284,6 +298,18 @@ impl Answer {
                 .get()
                 .with(|model| strategy_json::text(model.network(), strategy, &self.query)),
         )
+    }
+
+    fn decisions_or_none(&self, process: &str, variables: &[String]) -> Option<Vec<DecisionEntry>> {
+        let strategy = self.inner.evidence.strategy.as_ref()?;
+        self.model.get().with(|model| {
+            let network = model.network();
+            let found = decisions::of_process(network, strategy, process, variables)?;
+            let entries = found
+                .into_iter()
+                .map(|one| (one.values, step_entry(network, &one.parts)));
+            Some(entries.collect())
+        })
     }
 
     fn strategy_text_or_none(&self) -> Option<String> {

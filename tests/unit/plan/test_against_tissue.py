@@ -71,6 +71,40 @@ def test_simulated_tissues_that_pick_corners_do_no_harm(solved: Defence) -> None
     assert worst[0] >= scene.tissue.tip_mm - 1e-6
 
 
+def test_factors_that_change_at_each_push_stay_between_those_that_do_not(solved: Defence) -> None:
+    assert solved.tree is not None
+    tree, scene = json.loads(json.dumps(solved.tree.to_json())), solved.scene
+    anew = oracle.simulate_pushes(tree, scene, 200, np.random.default_rng(0))
+    assert anew.safe(0.0).all()
+    steady = replace(scene, tissue=Tissue("adversarial", 0.0, 0.0, 0.0))
+    same = oracle.simulate_pushes(tree, steady, 3, np.random.default_rng(0))
+    usual = oracle.simulate(tree, steady, 3, oracle.corners(steady, np.random.default_rng(0)))
+    assert np.allclose(same.depth_mm, usual.depth_mm)
+    assert np.allclose(same.clearance_mm, usual.clearance_mm, atol=oracle.SPACING_MM)
+
+
+def test_decisions_are_those_of_the_whole_strategy() -> None:
+    scene = _scene((0.0, -36.0, -3.0, 7.0), tissue=Tissue("adversarial", 0.05, 0.03, 0.2))
+    answer = defend(scene).answer
+    whole = {}
+    for state in json.loads(answer.strategy_json() or "")["states"]:
+        moves = [edge for one in state["decisions"] for edge in one["action"] or ()]
+        sent = [edge for edge in moves if edge["process"] == "User"]
+        if sent:
+            values = state["variables"]
+            picks = [values[name] for name in values if name.startswith("picks[")]
+            key = (*picks, values["segment"], values["needle_progress"], sent[0]["source"])
+            whole[key] = sent[0]["select"]
+    names = ["picks", "segment", "needle_progress"]
+    decided = {
+        (*picks, segment, progress, edge.source): edge.select
+        for (picks, (segment,), (progress,)), edge in answer.decisions_of("User", names)
+    }
+    assert decided == whole
+    with pytest.raises(ValueError, match="Nobody"):
+        list(answer.decisions_of("Nobody", ["picks"]))
+
+
 def test_the_certificate_sees_a_tissue_beyond_its_bounds(solved: Defence) -> None:
     assert solved.tree is not None
     blocked = replace(

@@ -1,6 +1,7 @@
 //! Text, JSON and C: how answers, models and strategies are written and read.
 
 pub mod decision_table;
+pub mod decisions;
 pub mod explain;
 pub mod json;
 pub mod json_reader;
