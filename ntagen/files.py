@@ -23,7 +23,7 @@ import io
 import os
 import re
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, BinaryIO, Final, Literal
 
@@ -41,13 +41,18 @@ _PIECE_BYTES: Final = 2**20
 _OWN_DESCRIPTORS: Final = re.compile(r"/dev/fd|/proc/(\d+)(/task/\d+)?/fd")
 
 
-def write_files(contents: Mapping[Path, str | bytes]) -> None:
+Content = str | bytes | Iterable[str]
+"""What to write: a text, bytes, or a text in pieces, which need never be in memory together."""
+
+
+def write_files(contents: Mapping[Path, Content]) -> None:
     """Writes files, each of them completely or not at all; missing folders are made.
 
     Files are renamed only when all are written, so that an error leaves all files unchanged.
 
     Args:
         contents: What to write, by path; texts are written in UTF-8. Existing files are replaced.
+            If making the pieces of a text fails, nothing is written.
 
     Raises:
         InputError: A file cannot be written there.
@@ -331,7 +336,7 @@ def _followed(path: Path) -> tuple[Path, int | None]:
     raise OSError(errno.ELOOP, os.strerror(errno.ELOOP))
 
 
-def _write_part(target: _Target, part: Path, content: str | bytes) -> None:
+def _write_part(target: _Target, part: Path, content: Content) -> None:
     """Writes the temporary file, with the mode that the file has or gets."""
     found = target.found
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
@@ -347,7 +352,7 @@ def _write_part(target: _Target, part: Path, content: str | bytes) -> None:
         os.fsync(descriptor)
 
 
-def _write_through(target: _Target, content: str | bytes) -> None:
+def _write_through(target: _Target, content: Content) -> None:
     """Writes to a pipe or device."""
     with os.fdopen(_descriptor(target), "wb") as file:
         _write(file, content)
@@ -360,8 +365,12 @@ def _descriptor(target: _Target) -> int:
     return os.open(target.final, os.O_WRONLY | os.O_CLOEXEC | os.O_NOCTTY)
 
 
-def _write(file: BinaryIO, content: str | bytes) -> None:
+def _write(file: BinaryIO, content: Content) -> None:
     """Writes in pieces, so that a long text is not in memory twice."""
+    if not isinstance(content, str | bytes):
+        for text in content:
+            file.write(text.encode(errors="backslashreplace"))
+        return
     for start in range(0, len(content), _PIECE_BYTES):
         piece = content[start : start + _PIECE_BYTES]
         # The text may contain a file name with bytes that are not UTF-8.

@@ -7,6 +7,7 @@ mod answer;
 mod convert;
 mod model;
 mod options;
+mod plans;
 mod play;
 mod walks;
 
@@ -71,6 +72,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulation>()?;
     module.add_class::<play::Strategy>()?;
     module.add_class::<play::Play>()?;
+    module.add_class::<plans::Plans>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
     module.add("PARTS", PARTS.to_vec())?;

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Literal
+from itertools import accumulate
+from typing import TYPE_CHECKING, Final, Literal
 
 from ntagen import _checker
-from ntagen.checker.edges import EdgeEntry, EngineEdge, EnginePlan, step_of
+from ntagen.checker.edges import EdgeEntry, EngineEdge, EnginePlan, EngineStep, step_of
 from ntagen.checker.errors import rejecting
 from ntagen.values import dataclass
 
@@ -24,6 +25,12 @@ Extreme = int | Literal["inf"] | None
 Value = Extreme | list[Extreme] | list[list[Extreme] | None]
 """The value of ``sup`` or ``inf`` is an `Extreme`, that of ``bounds`` the pair of the least and the
 greatest. Several items have a list of these."""
+
+PAGE_PLANS: Final = 4096
+"""So many plans are taken from the engine together."""
+
+JSON_PAGE_PLANS: Final = 64
+"""So many plans are written as text together: each may take tens of thousands of characters."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +72,8 @@ class Answer:
         peak_bytes: The greatest number of bytes that states and tables took.
         plan_count: How many plans were found; ``None`` if none were asked for, or if the
             environment has choices, so that a strategy is not a list of plans.
+        has_more_plans: Whether there are more plans, or may be.
+        plans_stop: ``states``, ``memory`` or ``time`` if a limit ended the list of plans.
         verified: Whether the strategy and the exact runs of the traces passed their independent
             checks; ``None`` if there was no check, or one did not finish.
         verification: What these checks covered, or what is wrong, line by line.
@@ -95,6 +104,7 @@ class Answer:
         self.peak_bytes = raw.peak_bytes
         self.plan_count = raw.plan_count
         self.has_more_plans = raw.has_more_plans
+        self.plans_stop = raw.plans_stop
         self.verified = raw.verified
         self.verification = tuple(raw.verification())
 
@@ -106,15 +116,56 @@ class Answer:
     @property
     def plans(self) -> tuple[EnginePlan, ...]:
         """The plans; empty if none were asked for or found."""
-        return tuple(self._plans())
+        chains = self.plan_chains()
+        return tuple(
+            EnginePlan(tuple(step for chain in plan for step in chains[chain]))
+            for page in self.plan_pages()
+            for plan in page
+        )
 
-    def _plans(self) -> Iterator[EnginePlan]:
-        for plan in self._raw.plans():
-            yield EnginePlan(tuple(step_of(self._edges, step) for step in plan))
+    def plan_chains(self) -> tuple[tuple[EngineStep, ...], ...]:
+        """The distinct sequences of transitions that plans consist of; see `plan_pages`."""
+        raw = self._raw.plans()
+        if raw is None:
+            return ()
+        entries, chains = raw.chains()
+        steps = [step_of(self._edges, entry) for entry in entries]
+        return tuple(tuple(steps[index] for index in chain) for chain in chains)
+
+    def plan_pages(self, size: int = PAGE_PLANS) -> Iterator[list[tuple[int, ...]]]:
+        """The plans in pages of at most `size`; no more than one page is in memory.
+
+        Yields:
+            Of each plan, the indices of its sequences of transitions in `plan_chains`.
+        """
+        raw = self._raw.plans()
+        while raw is not None:
+            lengths, chains = (memoryview(data).cast("I") for data in raw.page(size))
+            if not lengths:
+                return
+            ends = list(accumulate(lengths))
+            yield [tuple(chains[s:e]) for s, e in zip([0, *ends], ends, strict=False)]
 
     def plans_json(self) -> str | None:
         """The plans as JSON text with every edge in full; ``None`` without plans."""
-        return self._raw.plans_json()
+        around = self._raw.around_plans()
+        return None if around is None else "".join(self.plans_json_pieces())
+
+    def plans_json_pieces(self) -> Iterator[str]:
+        """The same text in pieces, which are never in memory together."""
+        around = self._raw.around_plans()
+        if around is None:
+            return
+        yield around[0]
+        for number, line in enumerate(self.plan_lines()):
+            yield f",{line}" if number else line
+        yield around[1]
+
+    def plan_lines(self) -> Iterator[str]:
+        """Each plan as JSON text on one line."""
+        raw = self._raw.plans()
+        while raw is not None and (page := raw.page_json(JSON_PAGE_PLANS)):
+            yield from page
 
     @property
     def runs(self) -> tuple[Run, ...]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli import INTERNAL_ERROR
-from ntagen.cli.against import answer_of, defence_notes, defended, is_adversarial
+from ntagen.cli.against import answer_of, defence_notes
 from ntagen.cli.asked import Asked, is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
@@ -25,16 +25,14 @@ from ntagen.cli.models import (
 )
 from ntagen.cli.options import engine_options
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model, Options, QueryForm
-    from ntagen.loading import Loaded
-    from ntagen.nsl import Task
-    from ntagen.plan.against_tissue import Defence
+    from ntagen.checker import Answer, Model, QueryForm
 
 STOPPED: Final = 3
 """Exit code after a limit or a ``maybe``."""
@@ -128,10 +126,11 @@ REJECTED_MARK: Final = ("refused", "red")
 )
 @click.option(
     "--plans",
-    metavar="FILE.json|-",
+    metavar="FILE.json|FILE.jsonl|-",
     help="Write all plans of a control query to FILE, or list them (-); with several, FILE has "
     "those of the last. Plans of an environment are also ranked, certified and marked if they hold "
-    "in exact kinematics.",
+    "in exact kinematics. FILE.jsonl has one plan on each line, in the order of the model: it is "
+    "written while the plans are certified, and millions of them take no memory.",
 )
 @rank_option("plans of an environment")
 @engine_options
@@ -161,6 +160,7 @@ def command(
     \b
     Examples:
       ntagen check examples/paper.nsl --plans plans.json
+      ntagen check many.nsl --plans plans.jsonl --timeout 10min
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml model.q --json --timeout 60s
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
@@ -202,7 +202,7 @@ def command(
         trace=verify or trace is not None or wanted_trace is not None,
         wanted_trace=wanted_trace or "any",
         certificate=certificate is not None,
-        **given,
+        **given | most_plans(plans),
     )
     worst = 0
     with pointing_to_explanations(not as_json):
@@ -217,16 +217,18 @@ def command(
             _header(model_path, loaded.model)
         for number, query in enumerate(todo):
             is_used = is_used_by(query, todo[number + 1 :])
+            outputs = replace(outputs, limits=list_limits(options, quiet=as_json))
+            wanted = replace(
+                options,
+                strategy=is_used or outputs.wants_strategy,
+                folder=query.folder,
+                **for_task(options, loaded.task, query),
+            )
             try:
                 with shown_progress(query.text, quiet=as_json) as report:
-                    asked_so = replace(
-                        options,
-                        strategy=is_used or strategy is not None or controller is not None,
-                        folder=query.folder,
-                        progress=report,
-                        **_for_task(options, loaded.task, query),
+                    answer, found = answered(
+                        loaded, query, replace(wanted, progress=report), overflow
                     )
-                    answer, found = _answered(loaded, query, asked_so)
             except InputError as error:
                 if len(todo) == 1:
                     raise
@@ -242,51 +244,19 @@ def command(
             show_warnings(answer.warnings)
             covered = answer.verification if verify else ()
             notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
+            list_stop = outputs.stops.get(query.text)
             if found is not None:
                 answer = answer_of(found)
                 notes += defence_notes(found, plans)
                 outputs.written.add("--plans")
             if as_json:
-                echo(json.dumps(_record(answer, query)))
+                echo(json.dumps(_record(answer, query, list_stop)))
             else:
                 _row(answer, query, notes, trace_is_written=trace is not None)
-            worst = max(worst, _severity(answer), key=_SEVERITIES.index)
+            severity = max(_severity(answer), STOPPED if list_stop else 0)
+            worst = max(worst, severity, key=_SEVERITIES.index)
     say(unwritten(outputs.wanted(), outputs.written))
     return worst
-
-
-def _answered(loaded: Loaded, query: Asked, options: Options) -> tuple[Answer, Defence | None]:
-    """The answer to a query, and what it rests on if the tissue of an environment answers."""
-    if loaded.task is None or not _is_defence(loaded.task, query):
-        return loaded.model.answer(query.text, options), None
-    found = defended(loaded.task, options)
-    # A strategy that is written as it is, is one of the compiled model.
-    if options.strategy:
-        return loaded.model.answer(query.text, options), found
-    return answer_of(found), found
-
-
-def _seeks_target(query: Asked) -> bool:
-    """Whether a query is the paper's question for a strategy that reaches the target."""
-    from ntagen.rules import PAPER_QUERIES
-
-    text = query.text.partition("=")[2] if query.text.startswith("strategy") else query.text
-    return text.strip() == PAPER_QUERIES["ReachFinalTR"]
-
-
-def _is_defence(task: Task | None, query: Asked) -> bool:
-    """Whether a query asks for a strategy against a tissue that answers."""
-    return is_adversarial(task) and _seeks_target(query)
-
-
-def _for_task(options: Options, task: Task | None, query: Asked) -> dict[str, Any]:
-    """Options of an environment's game: a guide; if the tissue answers, no list of plans."""
-    from ntagen.plan.synthesise import GUIDE
-
-    if task is None or not _seeks_target(query):
-        return {}
-    guided = {"guide": options.guide or GUIDE}
-    return guided | {"plans": "none"} if _is_defence(task, query) else guided
 
 
 def _criteria(text: str | None) -> tuple[str, ...]:
@@ -311,7 +281,7 @@ def _severity(answer: Answer) -> int:
     return codes.get(answer.verdict, MODEL_ERROR)
 
 
-def _record(answer: Answer, query: Asked) -> dict[str, object]:
+def _record(answer: Answer, query: Asked, list_stop: str | None) -> dict[str, object]:
     """The answer as the JSON object that the command line promises."""
     return {
         "query": query.text,
@@ -320,7 +290,7 @@ def _record(answer: Answer, query: Asked) -> dict[str, object]:
         "value": answer.value,
         "message": answer.message,
         "wrapped": None if answer.wrapped is None else asdict(answer.wrapped),
-        "stop": answer.stop,
+        "stop": answer.stop or list_stop,
         "explored": answer.explored,
         "stored": answer.stored,
         "seconds": answer.seconds,

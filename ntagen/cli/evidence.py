@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import json
 from dataclasses import field
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.asked import Asked
+from ntagen.cli.plan_lists import (
+    LINES,
+    ListLimits,
+    Written,
+    certified_within,
+    stopped,
+    write_document,
+    write_lines,
+)
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 from ntagen.values import dataclass
@@ -30,8 +40,16 @@ class Outputs:
     controller: Path | None
     plans: str | None
     ranking: tuple[str, ...]
+    limits: ListLimits = field(default_factory=ListLimits)
     written: set[str] = field(default_factory=set)
     """The options whose output has been written."""
+    stops: dict[str, str] = field(default_factory=dict)
+    """By query: ``time`` or ``memory`` if that limit ended a list of plans."""
+
+    @property
+    def wants_strategy(self) -> bool:
+        """Whether a strategy is written in some form."""
+        return self.strategy is not None or self.controller is not None
 
     def wanted(self) -> dict[str, str | Path | None]:
         """Where the output of each option is written."""
@@ -66,7 +84,7 @@ def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | 
         notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
         outputs.written.add("--plans")
-        notes += _write_plans(answer, outputs.plans, outputs.ranking, task)
+        notes += _write_plans(answer, query, outputs, outputs.plans, task)
     return notes
 
 
@@ -99,35 +117,49 @@ def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
 
 
 def _write_plans(
-    answer: Answer, target: str, ranking: tuple[str, ...], task: Task | None
+    answer: Answer, query: Asked, outputs: Outputs, target: str, task: Task | None
 ) -> list[str]:
-    if task is None:
-        if target == "-":
-            echo(answer.plans_json() or "")
-            return []
-        write_files({Path(target): f"{answer.plans_json()}\n"})
-        return [f"{answer.plan_count} plans written to {target}"]
+    if Path(target).suffix == LINES:
+        written = write_lines(answer, Path(target), outputs.limits, task)
+    elif task is None:
+        written = write_document(answer, target, outputs.limits)
+    else:
+        written = _write_ranked(answer, target, outputs, task)
+    stop = written.stop or answer.plans_stop
+    if stop is not None:
+        outputs.stops[query.text] = stop
+    return list(written.notes)
+
+
+def _write_ranked(answer: Answer, target: str, outputs: Outputs, task: Task) -> Written:
     from ntagen.drive.configure import configure
     from ntagen.plan.document import document
-    from ntagen.plan.extract import extract
-    from ntagen.plan.rank import certified
+    from ntagen.plan.rank import rank
     from ntagen.plan.wording import counted, judged, ranked_by, required
 
     scene, settings = task.scene, configure(task.given, task.scene).settings
-    criteria, margins = ranking or settings.ranking, settings.margins
-    ranked = certified(extract(answer.plans, scene), scene, criteria)
+    criteria, margins = outputs.ranking or settings.ranking, settings.margins
+    candidates, stop = certified_within(answer, scene, outputs.limits)
+    ranked = rank(candidates, criteria)
     holding = [candidate for candidate in ranked if margins.allow(candidate.certificate)]
-    notes = [counted(len(ranked), len(holding)), required(margins)]
+    is_complete = stop is None and not answer.has_more_plans
+    notes = [
+        counted(len(ranked), len(holding), is_complete=is_complete),
+        *stopped(len(ranked), stop),
+        required(margins),
+    ]
     if target == "-":
         shown = list(enumerate(ranked, start=1))
     else:
         plans = document(scene, ranked, criteria, margins)
-        write_files({Path(target): json.dumps(plans, indent=1) + "\n"})
+        pieces = json.JSONEncoder(indent=1).iterencode(plans)
+        write_files({Path(target): chain(pieces, ["\n"])})
         notes.insert(0, f"plans written to {target}")
-        shown = [one for one in enumerate(ranked, start=1) if one[1] in holding[:BEST_SHOWN]]
+        best = holding[:BEST_SHOWN]
+        shown = [one for one in enumerate(ranked, start=1) if one[1] in best]
     if shown:
         notes.append(f"{ranked_by(criteria)}:")
     for place, candidate in shown:
         verdict = judged(candidate.certificate, margins)
         notes.append(f"  {place:>3}. {verdict}  {candidate.plan}")
-    return notes
+    return Written(tuple(notes), stop)

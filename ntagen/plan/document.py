@@ -38,14 +38,21 @@ def document(
         "ranking": list(ranking),
         "margins": asdict(margins),
         "plans": [
-            {
-                "rank": place,
-                "holds": margins.allow(candidate.certificate),
-                "actions": plan_to_json(candidate.plan),
-                "certificate": _certificate(candidate.certificate),
-            }
+            plan_document(candidate, margins, place)
             for place, candidate in enumerate(candidates, start=1)
         ],
+    }
+
+
+def plan_document(
+    candidate: Candidate, margins: Margins, rank: int | None = None
+) -> dict[str, Any]:
+    """A plan with its certificate; the rank is null in lists that are not ranked."""
+    return {
+        "rank": rank,
+        "holds": margins.allow(candidate.certificate),
+        "actions": plan_to_json(candidate.plan),
+        "certificate": _certificate(candidate.certificate),
     }
 
 

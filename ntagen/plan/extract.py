@@ -10,7 +10,8 @@ tissue's answers) are not actions of the needle.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import chain, groupby
 from typing import Final, Protocol
 
 from ntagen.errors import NtagenError
@@ -53,6 +54,16 @@ class Run(Protocol):
         """The moves in order."""
 
 
+class Listed(Protocol):
+    """Plans as the engine lists them; see `ntagen.checker.Answer`."""
+
+    def plan_chains(self) -> Sequence[Sequence[Step]]:
+        """The distinct sequences of moves."""
+
+    def plan_pages(self) -> Iterable[Sequence[Sequence[int]]]:
+        """The plans, some at a time: of each, the indices of its sequences of moves."""
+
+
 class Walk(Protocol):
     """A walk through a model, from its initial state."""
 
@@ -75,6 +86,58 @@ def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
             of the scene.
     """
     return tuple(dict.fromkeys(_plan(run, scene) for run in runs))
+
+
+def pages_of(listed: Listed, scene: Scene) -> Iterator[list[Plan]]:
+    """The plans of an answer, some at a time, in its order: only one page is in memory.
+
+    In the model of a scene the User alone has a choice, and each choice is an action. So no plan
+    comes twice.
+
+    Raises:
+        NtagenError: As for `extract`.
+    """
+    actions = _Actions(scene)
+    chains = [actions.runs_in(steps) for steps in listed.plan_chains()]
+    for page in listed.plan_pages():
+        yield [actions.plan_of(chains[index] for index in plan) for plan in page]
+
+
+class _Actions:
+    """Makes plans of equal actions that follow each other, and keeps their sums.
+
+    Equal plans have equal sums, because they are added up in the same way as in `Plan.of`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._sums: dict[tuple[Action, int], Action] = {}
+
+    def runs_in(self, steps: Iterable[Step]) -> tuple[tuple[Action, int], ...]:
+        """Each action of some moves, and how often it follows itself."""
+        edges = (edge for step in steps for edge in step.edges)
+        found = [action for edge in edges if (action := _action(edge, self._scene)) is not None]
+        return tuple((action, len(list(same))) for action, same in groupby(found))
+
+    def plan_of(self, chains: Iterable[tuple[tuple[Action, int], ...]]) -> Plan:
+        """The plan of such actions."""
+        runs: list[tuple[Action, int]] = []
+        for run in chain.from_iterable(chains):
+            if runs and runs[-1][0] == run[0]:
+                runs[-1] = (run[0], runs[-1][1] + run[1])
+            else:
+                runs.append(run)
+        actions: list[Action] = []
+        for run in runs:
+            if isinstance(run[0], Roll):
+                actions += [run[0]] * run[1]
+                continue
+            whole = self._sums.get(run)
+            if whole is None:
+                (whole,) = Plan.of([run[0]] * run[1]).actions
+                self._sums[run] = whole
+            actions.append(whole)
+        return Plan(tuple(actions))
 
 
 def leads_to_target(walk: Walk, plan: Plan, scene: Scene) -> bool:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING, Final, Protocol
 
 from ntagen.errors import LimitError, ModelError
 from ntagen.plan.actions import Plan
 from ntagen.plan.certify import Certificate
-from ntagen.plan.extract import extract, leads_to_target
+from ntagen.plan.extract import leads_to_target, pages_of
 from ntagen.plan.rank import DEFAULT_RANKING, Candidate, certified, rank
 from ntagen.scene import Scene
 from ntagen.values import dataclass
@@ -217,7 +218,7 @@ class EngineSynthesiser:
         if answer.verdict not in ("satisfied", "not satisfied"):
             raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
         is_won = answer.verdict == "satisfied"
-        plans = extract(answer.plans, scene) if is_won else ()
+        plans = tuple(chain.from_iterable(pages_of(answer, scene))) if is_won else ()
         strategy_json = (answer.strategy_json() or "") if is_won and self.keeps_strategy else ""
         return Listing(
             model_xml, model, plans, answer.seconds, strategy_json, not answer.has_more_plans

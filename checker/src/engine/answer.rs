@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::evidence::witness::{Proof, Witness};
 use crate::game::partial_observation::Machine;
 use crate::game::strategy::Strategy;
-use crate::game::strategy::plans::Plan;
+use crate::game::strategy::plan_list::PlanList;
 use crate::ir::SiteId;
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
@@ -44,10 +44,12 @@ pub struct Evidence {
     /// How the check of the strategy ended, if it was wanted.
     pub verification: Option<Verification>,
     /// Plans, if they were wanted.
-    pub plans: Option<Vec<Plan>>,
+    pub plans: Option<Arc<PlanList>>,
     /// Whether there are more plans than were wanted, or may be: after the first plan the search
     /// may stop.
     pub has_more_plans: bool,
+    /// What ended the list of plans, if a limit did.
+    pub plans_stop: Option<StopReason>,
 }
 
 impl Evidence {

@@ -1,16 +1,21 @@
 //! Queries are answered, and answers taken apart.
 
+use std::sync::Arc;
+
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
+use super::convert::{RejectedError, rejected, stop_name, until_signal};
 use super::model::Model;
 use super::options;
+use super::plans::Plans;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{
     decisions, json, machine_c, machine_json, strategy_c, strategy_json, strategy_text, text,
 };
+use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, LoadedModel, Options, Verdict};
+use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
 
 /// Answers a query; `options` is an `Options` of `ntagen.checker.options`.
@@ -136,8 +141,8 @@ impl Answer {
 
     /// How many plans there are; `None` if none were asked for or there is no list of plans.
     #[getter]
-    fn plan_count(&self) -> Option<usize> {
-        self.inner.evidence.plans.as_ref().map(Vec::len)
+    fn plan_count(&self) -> Option<u64> {
+        Some(self.inner.evidence.plans.as_ref()?.count())
     }
 
     /// Whether there are more plans than were asked for.
@@ -146,25 +151,30 @@ impl Answer {
         self.inner.evidence.has_more_plans
     }
 
-    /// The plans: of each, the steps that leave a state without committed locations.
-    fn plans(&self) -> Vec<Vec<StepEntry>> {
-        self.model.get().with(|model| {
-            let network = model.network();
-            let plans = self.inner.evidence.plans.iter().flatten().map(|plan| {
-                let steps = plan
-                    .steps
-                    .iter()
-                    .filter(|step| !step.was_committed)
-                    .map(|step| step_entry(network, &step.parts));
-                steps.collect()
-            });
-            plans.collect()
+    /// "states", "memory" or "time" if a limit ended the list of plans.
+    #[getter]
+    fn plans_stop(&self) -> Option<&'static str> {
+        self.inner.evidence.plans_stop.and_then(stop_name)
+    }
+
+    /// The plans, one after the other; `None` without plans.
+    fn plans(&self, py: Python<'_>) -> Option<Plans> {
+        let list = self.inner.evidence.plans.as_ref()?;
+        Some(Plans {
+            model: self.model.clone_ref(py),
+            texts: PlanTexts::new(PlanWalk::new(Arc::clone(list))),
         })
     }
 
-    /// The plans as JSON; `None` without plans.
-    fn plans_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.plans_json_or_none())
+    /// What stands before the plans as JSON, and what after them; `None` without plans.
+    fn around_plans(&self) -> Option<(String, &'static str)> {
+        let evidence = &self.inner.evidence;
+        let count = evidence.plans.as_ref()?.count();
+        Some(json::around_plans(
+            &self.query,
+            count,
+            evidence.has_more_plans,
+        ))
     }
 
     /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
@@ -239,17 +249,6 @@ impl Answer {
 type DecisionEntry = (Vec<Vec<i32>>, StepEntry);
 
 impl Answer {
-    fn plans_json_or_none(&self) -> Option<String> {
-        let evidence = &self.inner.evidence;
-        let plans = evidence.plans.as_ref()?;
-        let more = evidence.has_more_plans;
-        Some(
-            self.model
-                .get()
-                .with(|model| json::plans(model.network(), plans, &self.query, more).to_string()),
-        )
-    }
-
     fn trace_text_or_none(&self) -> Option<String> {
         let witnesses = &self.inner.evidence.witnesses;
         if witnesses.is_empty() {

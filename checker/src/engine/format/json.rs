@@ -4,7 +4,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::cancellation;
-use crate::game::strategy::plans::Plan;
+use crate::game::strategy::plan_list::PlanStep;
 use crate::ir::Network;
 use crate::network::Part;
 use crate::search::liveness::ending::RunEnding;
@@ -218,20 +218,24 @@ pub fn choices(network: &Network, choices: &[Choice]) -> Json {
     list.collect()
 }
 
-/// Plans: of each, the transitions that leave a state without committed locations; all others
-/// follow from them.
-pub fn plans(network: &Network, plans: &[Plan], query: &str, has_more: bool) -> Json {
-    let list = plans.iter().map(|plan| {
-        let steps = plan.steps.iter().filter(|step| !step.was_committed);
-        let steps: Vec<Json> = steps.map(|step| json!({ "edges": parts(network, &step.parts) })).collect();
-        json!({ "steps": steps, "end": { "locations": locations(network, &plan.end), "variables": variables(network, &plan.end) } })
-    });
-    json!({
+/// A plan that ends with these words: the transitions that leave a state without committed
+/// locations; all others follow from them.
+pub fn plan<'p>(network: &Network, steps: impl Iterator<Item = &'p PlanStep>, end: &[i32]) -> Json {
+    let steps = steps.filter(|step| !step.was_committed);
+    let steps = steps.map(|step| json!({ "edges": parts(network, &step.parts) }));
+    json!({ "steps": steps.collect::<Vec<_>>(), "end": discrete(network, end) })
+}
+
+/// What stands before the plans in a list of them, and what after them.
+pub fn around_plans(query: &str, count: u64, has_more: bool) -> (String, &'static str) {
+    let head = json!({
         "format": "ntagen-model-plans",
         "version": 1,
         "query": query,
-        "count": plans.len(),
+        "count": count,
         "complete": !has_more,
-        "plans": list.collect::<Vec<_>>(),
-    })
+    });
+    let head = head.to_string();
+    let head = head.trim_end_matches('}');
+    (format!("{head},\"plans\":["), "]}")
 }

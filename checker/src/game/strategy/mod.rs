@@ -30,6 +30,7 @@ pub(super) mod chains;
 pub mod closed_loop;
 pub mod co_buchi;
 pub(super) mod extraction;
+pub mod plan_list;
 pub mod plans;
 pub(super) mod safety;
 

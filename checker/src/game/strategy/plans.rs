@@ -5,46 +5,14 @@
 //! it. Plans come in the order of the moves of each state, which does not depend on the search.
 //!
 //! Cost: proportional to the nodes on winning paths. Plans are found one after the other, and are
-//! never all in memory here.
+//! never all in memory here. [`super::plan_list`] makes a list of them.
 
 use crate::cancellation;
-use crate::network::{Failure, Moves, Part};
 use crate::zones::Zone;
-use crate::zones::federation::block_bytes;
 
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::Standing;
 use crate::game::solver::Solver;
-
-/// One transition of a plan.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PlanStep {
-    /// The edges that are taken.
-    pub parts: Vec<Part>,
-    /// Whether some process was in a committed location before it: such a step follows from the one
-    /// before it.
-    pub was_committed: bool,
-}
-
-/// A plan with the words that it ends in.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Plan {
-    /// The transitions, in order.
-    pub steps: Vec<PlanStep>,
-    /// The words at its end.
-    pub end: Vec<i32>,
-}
-
-impl Plan {
-    /// The bytes that it takes, including the value itself.
-    pub fn heap_bytes(&self) -> usize {
-        let parts = self.steps.iter().map(|step| size_of_val(&*step.parts));
-        size_of::<Plan>()
-            + block_bytes(size_of_val(&*self.steps))
-            + block_bytes(size_of_val(&*self.end))
-            + parts.map(block_bytes).sum::<usize>()
-    }
-}
 
 /// Why there is no list of plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +22,7 @@ pub enum NoPlans {
 }
 
 /// The work of following an edge, without its zones: see [`cancellation::work`].
-const UNITS_FOR_STEP: usize = 256;
+pub(super) const UNITS_FOR_STEP: usize = 256;
 
 /// A node on the path that is being followed.
 struct Level {
@@ -65,18 +33,15 @@ struct Level {
 
 /// Enumerates the plans of a solved game.
 pub struct Plans<'r, 'g, 's, 'a> {
-    solver: &'r mut Solver<'g, 's, 'a>,
+    pub(super) solver: &'r mut Solver<'g, 's, 'a>,
     path: Vec<Level>,
     edges: Vec<u32>,
     on_path: Vec<bool>,
 }
 
 impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
-    /// The plans of a solved game.
-    pub fn new(solver: &'r mut Solver<'g, 's, 'a>) -> Result<Plans<'r, 'g, 's, 'a>, NoPlans> {
-        if (0..solver.graph.nodes.len() as u32).any(|node| has_opponent_choice(solver, node)) {
-            return Err(NoPlans::EnvironmentChooses);
-        }
+    /// The plans of a solved game in which the environment has no choice.
+    pub fn new(solver: &'r mut Solver<'g, 's, 'a>) -> Plans<'r, 'g, 's, 'a> {
         let dimension = solver.graph.dimension();
         let mut plans = Plans {
             on_path: vec![false; solver.graph.nodes.len()],
@@ -89,7 +54,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
             let zones = zones.zones().map(|zone| Zone::from_bounds(dimension, zone));
             plans.enter(0, zones.collect());
         }
-        Ok(plans)
+        plans
     }
 
     fn enter(&mut self, node: u32, zones: Vec<Zone>) {
@@ -162,38 +127,4 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
         }
         (!zones.is_empty()).then_some(zones)
     }
-
-    /// The transitions of a path, and the words at its end.
-    pub fn plan_of_path(&mut self, path: &[u32]) -> Result<Plan, Failure> {
-        let graph = &mut *self.solver.graph;
-        let symbolic = &mut *graph.symbolic;
-        let mut words = symbolic.stepper.network().initial.clone();
-        let mut moves = Moves::default();
-        let mut steps = Vec::new();
-        for &index in path {
-            let edge = graph.edges[index as usize];
-            for position in 0..edge.length {
-                symbolic.remembered_moves(&mut words, &mut moves)?;
-                let chosen = if position == 0 { edge.ordinal } else { 0 };
-                let parts = moves.get(chosen as usize).parts.to_vec();
-                let was_committed = symbolic.stepper.is_committed(&words);
-                symbolic.stepper.fire(&parts, &mut words)?;
-                steps.push(PlanStep {
-                    parts,
-                    was_committed,
-                });
-            }
-        }
-        Ok(Plan { steps, end: words })
-    }
-}
-
-/// Whether the environment has another move besides this one, or may choose when to move.
-fn has_opponent_choice(solver: &Solver<'_, '_, '_>, node: u32) -> bool {
-    let range = solver.graph.edges_of(node);
-    let count = range.len();
-    let has_opponent = range
-        .into_iter()
-        .any(|edge| !solver.graph.edges[edge].controllable || solver.graph.edges[edge].is_leg);
-    has_opponent && (count > 1 || solver.graph.nodes[node as usize].delays)
 }

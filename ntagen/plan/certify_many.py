@@ -1,0 +1,286 @@
+"""The certificates of many plans at once: the same as `ntagen.plan.certify`, in less time.
+
+Plans that begin in the same way share the arcs of their beginning. All arcs that come after the
+same number of others are computed together, as arrays, with the same closed forms. So distances
+differ from those of single certificates by rounding errors only, less than 1e-9 mm.
+
+Cost: about 10 microseconds for a plan with a few spheres. Distances to other shapes are computed
+plan by plan, and so are whole certificates where regions move or a target is no sphere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ntagen.plan.actions import Plan, Push, Roll
+from ntagen.plan.certify import Arrival, Certificate, Clearance, certify, clearance
+from ntagen.scene import Region, Scene, Vector
+from ntagen.shapes import Sphere
+from ntagen.values import dataclass
+
+_Array = NDArray[np.float64]
+
+_BISECTIONS: Final = 60
+
+
+def certify_all(plans: Sequence[Plan], scene: Scene) -> list[Certificate]:
+    """The certificate of each plan, in their order; see `ntagen.plan.certify.certify`."""
+    targets = scene.targets
+    is_plain = scene.breath is None and targets and math.isfinite(scene.needle.radius_mm)
+    if not is_plain or not all(_is_ball(one) for one in targets):
+        return [certify(plan, scene) for plan in plans]
+    return _Batch(plans, scene).certificates()
+
+
+def _is_ball(region: Region) -> bool:
+    return isinstance(region.shape, Sphere)
+
+
+def _balls(regions: Sequence[Region]) -> tuple[_Array, _Array]:
+    """The middles of spheres, and their radii."""
+    shapes = [one.shape for one in regions if isinstance(one.shape, Sphere)]
+    middles = np.array([one.middle_mm for one in shapes]).reshape(-1, 3)
+    return middles, np.array([one.radius_mm for one in shapes])
+
+
+@dataclass(frozen=True, slots=True)
+class _Poses:
+    """Poses as rows."""
+
+    position: _Array
+    heading: _Array
+    bevel: _Array
+
+    def at(self, rows: NDArray[np.intp]) -> _Poses:
+        return _Poses(self.position[rows], self.heading[rows], self.bevel[rows])
+
+    def rolled(self, angle_rad: _Array) -> _Poses:
+        """The poses after rolls; see `ntagen.needle.kinematics.roll`."""
+        cosine, sine = np.cos(angle_rad)[:, None], np.sin(angle_rad)[:, None]
+        turned = cosine * self.bevel + sine * np.cross(self.heading, self.bevel)
+        bevel = np.where(angle_rad[:, None] == 0.0, self.bevel, turned)
+        return _Poses(self.position, self.heading, bevel)
+
+    def pushed(self, radius_mm: float, length_mm: _Array) -> _Poses:
+        """The poses after pushes; see `ntagen.needle.kinematics.push`."""
+        turn = length_mm / radius_mm
+        cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        return _Poses(
+            self.places(radius_mm, length_mm),
+            cosine * self.heading - sine * self.bevel,
+            cosine * self.bevel + sine * self.heading,
+        )
+
+    def places(self, radius_mm: float, length_mm: _Array) -> _Array:
+        """The places after pushes."""
+        half = 0.5 * (length_mm / radius_mm)
+        chord = length_mm * np.sinc(half / math.pi)
+        ahead, aside = (chord * np.cos(half))[:, None], (chord * np.sin(half))[:, None]
+        return np.asarray(self.position + ahead * self.heading - aside * self.bevel)
+
+    def away(self, middles: _Array) -> _Array:
+        """The distance of each position to each point."""
+        return _lengths(self.position[:, None] - middles)
+
+
+def _lengths(vectors: _Array) -> _Array:
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """What is known at the ends of all arcs that come after the same number of others.
+
+    Attributes:
+        end: The poses.
+        length_mm: The lengths of the paths.
+        near_mm: For each path and point, the least distance.
+        near_at_mm: Where that is.
+        entered_mm: For each path and target, where it is entered; not a number if it is not.
+    """
+
+    end: _Poses
+    length_mm: _Array
+    near_mm: _Array
+    near_at_mm: _Array
+    entered_mm: _Array
+
+
+class _Batch:
+    """Plans whose certificates are computed together."""
+
+    def __init__(self, plans: Sequence[Plan], scene: Scene) -> None:
+        self._plans, self._scene = plans, scene
+        self._avoided = [one for one in scene.avoided if _is_ball(one)]
+        self._middles, self._radii = _balls([*self._avoided, *scene.targets])
+        self._levels = [self._start()]
+        # Of each plan: the number of its arcs, and the row of the last one.
+        self._places = np.zeros((len(plans), 2), dtype=np.intp)
+        for level in self._arcs():
+            self._levels.append(self._next(*level))
+
+    def _start(self) -> _Level:
+        tip = self._scene.needle.tip
+        vectors = (tip.position_mm, tip.heading, tip.bevel)
+        pose = _Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
+        near = pose.away(self._middles)
+        entered = np.full((1, len(self._scene.targets)), math.nan)
+        return _Level(pose, np.zeros(1), near, np.zeros_like(near), entered)
+
+    def _arcs(self) -> Iterator[tuple[NDArray[np.intp], list[tuple[float, ...]], _Array]]:
+        """The arcs of each level: the row of the arc before, the rolls before it, its length."""
+        found: list[dict[tuple[int, tuple[float, ...], float], int]] = []
+        for number, plan in enumerate(self._plans):
+            row, depth = 0, 0
+            rolls: tuple[float, ...] = ()
+            for action in plan.actions:
+                if isinstance(action, Roll):
+                    rolls = (*rolls, action.angle_rad)
+                elif isinstance(action, Push):
+                    if depth == len(found):
+                        found.append({})
+                    key = (row, rolls, action.length_mm)
+                    row = found[depth].setdefault(key, len(found[depth]))
+                    depth, rolls = depth + 1, ()
+            self._places[number] = depth, row
+        for level in found:
+            rows, rolled, lengths = zip(*level, strict=True)
+            yield np.array(rows), list(rolled), np.array(lengths)
+
+    def _next(
+        self, rows: NDArray[np.intp], rolled: list[tuple[float, ...]], length_mm: _Array
+    ) -> _Level:
+        before, radius_mm = self._levels[-1], self._scene.needle.radius_mm
+        start = before.end.at(rows)
+        for turn in range(max(map(len, rolled))):
+            angles = [rolls[turn] if turn < len(rolls) else 0.0 for rolls in rolled]
+            start = start.rolled(np.array(angles))
+        end = start.pushed(radius_mm, length_mm)
+        since_mm = before.length_mm[rows]
+        arc_mm, at_mm = self._nearest(start, end, length_mm, self._middles)
+        near_mm, near_at_mm = before.near_mm[rows], before.near_at_mm[rows]
+        is_nearer = arc_mm < near_mm
+        return _Level(
+            end,
+            since_mm + length_mm,
+            np.where(is_nearer, arc_mm, near_mm),
+            np.where(is_nearer, since_mm[:, None] + at_mm, near_at_mm),
+            self._entered(before.entered_mm[rows], start, since_mm, length_mm),
+        )
+
+    def _nearest(
+        self, start: _Poses, end: _Poses, length_mm: _Array, middles: _Array
+    ) -> tuple[_Array, _Array]:
+        """The least distance of each arc to each point, and where; see `Arc.nearest_to`."""
+        radius_mm = self._scene.needle.radius_mm
+        from_center = middles - (start.position - radius_mm * start.bevel)[:, None]
+        sine = np.einsum("npi,ni->np", from_center, start.heading)
+        cosine = np.einsum("npi,ni->np", from_center, start.bevel)
+        turn = np.arctan2(sine, cosine) % (2.0 * math.pi)
+        foot_mm = turn * radius_mm
+        aside = np.cos(turn)[..., None] * start.bevel[:, None]
+        aside += np.sin(turn)[..., None] * start.heading[:, None]
+        foot_away = _lengths(from_center - radius_mm * aside)
+        first, last = start.away(middles), end.away(middles)
+        best = np.where(last < first, last, first)
+        best_at = np.where(last < first, length_mm[:, None], 0.0)
+        is_foot = (foot_mm < length_mm[:, None]) & (foot_away <= best)
+        return np.where(is_foot, foot_away, best), np.where(is_foot, foot_mm, best_at)
+
+    def _entered(
+        self, known_mm: _Array, start: _Poses, start_mm: _Array, length_mm: _Array
+    ) -> _Array:
+        """Where each target is entered, after the one before it; see `certify`."""
+        entered = known_mm.copy()
+        since_mm = np.zeros(len(start_mm))
+        for number in range(len(self._scene.targets)):
+            skipped = np.maximum(0.0, since_mm - start_mm)
+            is_open = np.isnan(entered[:, number]) & (skipped <= length_mm)
+            rows = np.flatnonzero(is_open)
+            if len(rows):
+                rest = start.at(rows).pushed(self._scene.needle.radius_mm, skipped[rows])
+                at_mm = self._enters(rest, length_mm[rows] - skipped[rows], number)
+                entered[rows, number] = start_mm[rows] + skipped[rows] + at_mm
+            since_mm = entered[:, number]
+        return entered
+
+    def _enters(self, start: _Poses, length_mm: _Array, number: int) -> _Array:
+        """Where arcs first touch a target; not a number if they never do; see `Arc.enters_at`."""
+        first = len(self._avoided) + number
+        middle, target_mm = self._middles[first : first + 1], self._radii[first]
+        radius_mm = self._scene.needle.radius_mm
+        end = start.pushed(radius_mm, length_mm)
+        away_mm, at_mm = (one[:, 0] for one in self._nearest(start, end, length_mm, middle))
+        found = np.where(start.away(middle)[:, 0] <= target_mm, 0.0, math.nan)
+        rows = np.flatnonzero(np.isnan(found) & (away_mm <= target_mm))
+        if not len(rows):
+            return found
+        start, high = start.at(rows), at_mm[rows]
+        low = np.maximum(0.0, high - math.pi * radius_mm)
+        for _ in range(_BISECTIONS):
+            half = 0.5 * (low + high)
+            is_inside = _lengths(start.places(radius_mm, half) - middle) <= target_mm
+            low, high = np.where(is_inside, low, half), np.where(is_inside, half, high)
+        found[rows] = high
+        return found
+
+    def certificates(self) -> list[Certificate]:
+        """The certificate of each plan."""
+        scene, count = self._scene, len(self._avoided)
+        rows = [
+            (
+                (level.near_mm - self._radii).tolist(),
+                level.near_at_mm.tolist(),
+                level.entered_mm.tolist(),
+                level.end.position.tolist(),
+                level.end.away(self._middles[-1:])[:, 0].tolist(),
+            )
+            for level in self._levels
+        ]
+        last_radius_mm = float(self._radii[-1])
+        certificates = []
+        for plan, (depth, row) in zip(self._plans, self._places.tolist(), strict=True):
+            near, near_at, entered, ends, end_away = (part[row] for part in rows[depth])
+            away = [*near[count:-1], end_away - last_radius_mm]
+            if depth == 0:
+                certificates.append(certify(plan, scene))
+                continue
+            arrivals = zip(scene.targets, entered, away, strict=True)
+            x, y, z = ends
+            certificates.append(
+                Certificate(
+                    clearances=self._clearances(plan, near, near_at),
+                    arrivals=tuple(
+                        Arrival(one.name, None if at_mm != at_mm else at_mm, -away_mm)
+                        for one, at_mm, away_mm in arrivals
+                    ),
+                    end_mm=(x, y, z),
+                    end_distance_mm=end_away,
+                    length_mm=plan.length_mm,
+                    roll_count=plan.counted_rolls(scene.limits),
+                )
+            )
+        return certificates
+
+    def _clearances(
+        self, plan: Plan, near: list[float], near_at: list[float]
+    ) -> tuple[Clearance, ...]:
+        places = iter(zip(near, near_at, strict=True))
+        if len(self._avoided) == len(self._scene.avoided):
+            return tuple(
+                Clearance(one.name, one.kind, *place)
+                for one, place in zip(self._avoided, places, strict=False)
+            )
+        arcs = plan.arcs(self._scene.needle)
+        entry_mm: Vector = self._scene.needle.tip.position_mm
+        return tuple(
+            Clearance(one.name, one.kind, *next(places))
+            if _is_ball(one)
+            else clearance(arcs, entry_mm, one)
+            for one in self._scene.avoided
+        )
