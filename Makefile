@@ -93,6 +93,7 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 	$(BIN)/python tests/benchmarks/many_regions.py
 	$(BIN)/python tests/benchmarks/moving.py
 	$(BIN)/python tests/benchmarks/fields.py
+	$(BIN)/python tests/benchmarks/plan_list.py
 	$(BIN)/python tests/benchmarks/tables.py
 	$(BIN)/python tests/benchmarks/start.py
 	$(BIN)/python tests/benchmarks/reductions.py

@@ -87,7 +87,8 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         type=click.IntRange(min=1),
         default=1_000_000,
         show_default=True,
-        help="Write at most N plans. With 1, the search stops at the first plan.",
+        help="Write at most N plans. With 1, the search stops at the first plan. With --plans "
+        "FILE.jsonl, all are written unless you give this option.",
     ),
     "search": click.option(
         "--search",

@@ -7,7 +7,6 @@ what was written in part is removed again.
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -149,11 +148,11 @@ def _certified_lines(
     answer: Answer, scene: Scene, margins: Margins
 ) -> Iterator[tuple[list[str], int]]:
     """Pages of lines, each with the number of plans in it that hold."""
-    from ntagen.plan.document import plan_document
+    from ntagen.plan.document import plan_line
 
     for page in _certified(answer, scene):
-        plans = [plan_document(candidate, margins) for candidate in page]
-        yield [json.dumps(plan) for plan in plans], sum(plan["holds"] for plan in plans)
+        held = sum(margins.allow(candidate.certificate) for candidate in page)
+        yield [plan_line(candidate, margins) for candidate in page], held
 
 
 def _lines(answer: Answer) -> Iterator[tuple[list[str], int]]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any, Final
 
 from ntagen.errors import InputError
@@ -54,6 +56,48 @@ def plan_document(
         "actions": plan_to_json(candidate.plan),
         "certificate": _certificate(candidate.certificate),
     }
+
+
+def plan_line(candidate: Candidate, margins: Margins) -> str:
+    """`plan_document` as JSON text on one line: the same text as of `json.dumps`, sooner."""
+    certificate = candidate.certificate
+    x, y, z = certificate.end_mm
+    clearances = ", ".join(
+        f'{{"region": {_quoted(c.region)}, "kind": "{c.kind}", '
+        f'"distance_mm": {_text(c.distance_mm)}, "at_mm": {_text(c.at_mm)}}}'
+        for c in certificate.clearances
+    )
+    targets = ", ".join(
+        f'{{"region": {_quoted(a.region)}, "entered_at_mm": {_text(a.entered_at_mm)}'
+        f', "depth_mm": {_text(a.depth_mm)}}}'
+        for a in certificate.arrivals
+    )
+    holds = "true" if margins.allow(certificate) else "false"
+    actions = ", ".join(map(_action_text, candidate.plan.actions))
+    return (
+        f'{{"rank": null, "holds": {holds}, "actions": [{actions}], "certificate": '
+        f'{{"length_mm": {_text(certificate.length_mm)}, "rolls": {certificate.roll_count}, '
+        f'"end_mm": [{_text(x)}, {_text(y)}, {_text(z)}], '
+        f'"end_distance_mm": {_text(certificate.end_distance_mm)}, '
+        f'"critical_clearance_mm": {_text(_finite(certificate.critical_clearance_mm))}, '
+        f'"detection_clearance_mm": {_text(_finite(certificate.detection_clearance_mm))}, '
+        f'"clearances": [{clearances}], "targets": [{targets}]}}}}'
+    )
+
+
+def _text(number: float | None) -> str:
+    """A number as `json.dumps` writes it."""
+    return float.__repr__(number) if isinstance(number, float) else json.dumps(number)
+
+
+@lru_cache(maxsize=4096)
+def _quoted(name: str) -> str:
+    return json.dumps(name)
+
+
+@lru_cache(maxsize=4096)
+def _action_text(action: Action) -> str:
+    return json.dumps(_action_to_json(action))
 
 
 def plan_to_json(plan: Plan) -> list[dict[str, float]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from dataclasses import replace
 
@@ -12,8 +13,10 @@ from ntagen import checker
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import Certificate, certify
 from ntagen.plan.certify_many import certify_all
+from ntagen.plan.document import plan_document, plan_line
 from ntagen.plan.extract import extract, pages_of
-from ntagen.plan.synthesise import STRATEGY_QUERY
+from ntagen.plan.rank import Candidate
+from ntagen.plan.synthesise import STRATEGY_QUERY, Margins
 from ntagen.render import render
 from ntagen.scene import Region, Scene
 from ntagen.shapes import Capsule
@@ -69,6 +72,15 @@ def test_many_certificates_are_those_of_single_plans(name: str) -> None:
         for near, same in zip(together.clearances, alone.clearances, strict=True):
             # Where two places are equally near, either may be given.
             assert near.at_mm == pytest.approx(same.at_mm, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_lines_are_those_of_json(name: str) -> None:
+    scene, plans = SCENES[name], some_plans()
+    for plan, certificate in zip(plans, certify_all(plans, scene), strict=True):
+        candidate = Candidate(plan, certificate)
+        expected = json.dumps(plan_document(candidate, Margins()))
+        assert plan_line(candidate, Margins()) == expected
 
 
 @pytest.mark.parametrize("scene", [PAPER, with_limits(PAPER, free_bevel=True)])
