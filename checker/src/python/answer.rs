@@ -5,7 +5,7 @@ use std::sync::Arc;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
-use super::convert::{RejectedError, rejected, stop_name, until_signal};
+use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
 use super::model::Model;
 use super::options;
 use super::plans::Plans;
