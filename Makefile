@@ -43,7 +43,7 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 .PHONY: test
 test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && cd checker && cargo test --locked --quiet
-	source $(RUST) && $(BIN)/python -m pytest
+	source $(RUST) && $(BIN)/python -m pytest --numprocesses=auto --dist=worksteal
 
 .PHONY: quick
 quick: $(INSTALLED) ## Run the tests that take at most a few seconds each, Rust and Python side by side
