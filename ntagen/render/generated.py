@@ -261,8 +261,8 @@ def declaration(model: Any, source: Any) -> str:
     put(shown('{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}}'))
     put('\n'
         '};\n'
-        '\n'
-        '/********************************************* Vectors and matrices *********************************************/\n'
+        '\n')
+    put('/********************************************* Vectors and matrices *********************************************/\n'
         '\n'
         '// out_mat = in_mat_1 * in_mat_2. Each product is cut to units before the sum, as in the paper.\n'
         'void matrix_matrix_dot(int in_mat_1, int in_mat_2, int out_mat) {\n'
@@ -354,9 +354,9 @@ def declaration(model: Any, source: Any) -> str:
         '    matrices[out_mat][2][1] = fint(((vectors[axis][2]/_S_) * (vectors[axis][1]/_S_) *\n'
         '                                (1 - cos(theta/_S_)) + (vectors[axis][0]/_S_) * sin(theta/_S_))*_S_);\n'
         '    matrices[out_mat][2][2] = fint((cos(theta/_S_) + squared(vectors[axis][2]/_S_) * (1 - cos(theta/_S_)))*_S_);\n'
-        '}\n'
-        '\n'
-        '/************************************************ Motion of the needle ************************************************/\n'
+        '}\n')
+    put('\n')
+    put('/************************************************ Motion of the needle ************************************************/\n'
         '\n'
         "// The tip's frame now: first the base, then the travel on the circle, then the roll.\n"
         'void update_tip_rotation_matrix() {\n'
@@ -466,8 +466,8 @@ def declaration(model: Any, source: Any) -> str:
         '    needle_progress += needle_pos_delta;\n'
         '    motion_circle_yaw += tip_yaw_delta;\n'
         '    update_tip_pos();\n'
-        '}\n'
-        '\n')
+        '}\n')
+    put('\n')
     if model.adversary:
         put('/****************************************** The tissue as an opponent ******************************************/\n'
             '// A segment is what the tip travels from the entry or a roll to the next roll. In each of them the tissue picks once how\n'
@@ -1356,8 +1356,8 @@ def declaration(model: Any, source: Any) -> str:
                 '}')
         put('\n')
     put('\n'
-        '\n'
-        '/** What guides the search: it is no part of the question, and a wrong answer only costs time **/\n'
+        '\n')
+    put('/** What guides the search: it is no part of the question, and a wrong answer only costs time **/\n'
         '// How near the tip comes to the target if it goes on along its circle, or after one more roll if there may be one.\n'
         'fixed_t get_miss() {\n'
         '    int i, angle_count;\n'
