@@ -26,8 +26,8 @@ each push and roll, times the length that is still travelled."""
 _PLAYS: Final = 3
 """So often the game is played with more margin, if rounding took more than there was."""
 
-_MORE_THAN_MISSING: Final = 1.5
-"""Such a play has so many times more margin than was missing."""
+_GROWTH: Final = 2.0
+"""Each time the reserve for rounding is at least so many times as large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ def defend(
         found = play(tip_mm + reserve_mm)
         if found.reach is None or found.holds:
             break
-        reserve_mm += _MORE_THAN_MISSING * found.reach.missing_mm(tip_mm)
+        reserve_mm = _GROWTH * (reserve_mm + found.reach.missing_mm(tip_mm))
     if found.verdict == "not satisfied":
         # Rounding decides: with the error of the tip alone, the answer may be another.
         found = play(tip_mm)
