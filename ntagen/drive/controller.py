@@ -1,9 +1,10 @@
 """The online controller: the paper's workflow (section 3) on any device.
 
-A run goes through the state machine of `ntagen.drive.states`; each state has one task here. The
-driver's decisions depend only on its settings, the a-priori scene, the measurements and the
-synthesiser. It reads no clock except the device's and uses no random numbers, so that the same
-measurements always lead to the same decisions (`ntagen.drive.replay`).
+A run goes through the state machine of `ntagen.drive.states`; each state has one task here, and
+`ntagen.drive.workflow` goes from one to the next and ends the run. The driver's decisions depend
+only on its settings, the a-priori scene, the measurements and the synthesiser. It reads no clock
+except the device's and uses no random numbers, so that the same measurements always lead to the
+same decisions (`ntagen.drive.replay`).
 
 The safety rules:
 
@@ -30,7 +31,6 @@ point the run ended.
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
 from collections.abc import Callable
 from typing import Final
@@ -44,23 +44,14 @@ from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import moves_of, pieces
 from ntagen.drive.planning import Lack, Planner
-from ntagen.drive.records import (
-    Command,
-    Ended,
-    Journal,
-    JournalError,
-    Predicted,
-    Record,
-    Relied,
-    Transition,
-)
+from ntagen.drive.records import Ended, Journal, Predicted, Record, Relied
 from ntagen.drive.reliance import relies_on
 from ntagen.drive.reserve import is_enough, is_surely_in
 from ntagen.drive.settings import Settings
-from ntagen.drive.states import ENDS, Event, State, next_state
+from ntagen.drive.states import Event, State
 from ntagen.drive.steering import Steering
 from ntagen.drive.supervisor import Guard, Supervisor
-from ntagen.errors import DeviceError, LimitError
+from ntagen.drive.workflow import Workflow
 from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
@@ -93,6 +84,9 @@ class Controller:
         agree: Is told each time what the driver wants to do next; raises `KeyboardInterrupt` if
             the operator does not want that.
         course: In a tissue that answers, the strategy that is followed; plans without one.
+
+    Attributes:
+        reason: Why the run ends, as far as it is known.
     """
 
     def __init__(
@@ -125,9 +119,18 @@ class Controller:
         self._short_in_row = 0
         self._retreat_mm: float | None = None
         self._adjustments = 0
-        self._reason = ""
-        self._turned_s = 0.0
-        self._tasks: dict[State, Callable[[], Event]] = {
+        self.reason = ""
+
+    def run(self) -> Ended:
+        """Drives until the run ends and the needle is stopped; returns the last record."""
+        self._journal.started(self._learner.a_priori)
+        relied = relies_on(self._settings, self._learner.a_priori, self._guide.course)
+        self._note(Relied(self._now_s(), relied))
+        return Workflow(self, self._needle, self._journal).run(State.ARM)
+
+    def by_state(self) -> dict[State, Callable[[], Event]]:
+        """The task of each state."""
+        return {
             State.ARM: self._arm,
             State.INITIAL_PUSH: self._initial_push,
             State.ESTIMATE: self._make_estimate,
@@ -139,87 +142,21 @@ class Controller:
             State.PUSH: self._push_again,
         }
 
-    def run(self) -> Ended:
-        """Drives until the run ends and the needle is stopped; returns the last record."""
-        self._journal.started(self._learner.a_priori)
-        relied = relies_on(self._settings, self._learner.a_priori, self._guide.course)
-        self._note(Relied(self._now_s(), relied))
-        state = State.ARM
-        try:
-            while state not in ENDS:
-                state = self._turn(state, self._perform(state))
-        except BaseException as error:
-            # A bug, or the operator's second Ctrl-C: the needle must not move on.
-            try:
-                self._needle.stop_at_once()
-            finally:
-                self._tell_bug(state, error)
-            raise
-        return self._finish(self._halt(state))
+    def require_time(self, at_s: float) -> None:
+        """See `Planner.require_time`."""
+        self._planner.require_time(at_s)
 
-    def _turn(self, state: State, event: Event) -> State:
-        """The next state. A run that cannot be recorded ends with a fault."""
-        try:
-            return self._went_on(state, event)
-        except JournalError as error:
-            self._reason = str(error)
-            return self._went_on(state, Event.FAULT)
-
-    def _went_on(self, state: State, event: Event) -> State:
-        following = next_state(state, event)
-        self._turned_s = self._now_s()
-        self._note(Transition(self._turned_s, state.value, event.value, following.value))
-        return following
-
-    def _finish(self, state: State) -> Ended:
-        """Records the end; one that cannot be recorded is a fault."""
-        try:
-            return self._ended(state)
-        except JournalError as error:
-            self._reason = str(error)
-            return self._ended(State.FAULTED)
-
-    def _ended(self, state: State) -> Ended:
+    def ended(self, outcome: State) -> Ended:
+        """The last record."""
         self._guide.leave("the run is over")
-        ended = Ended(
+        return Ended(
             time_s=self._now_s(),
-            outcome=state.value,
-            reason=self._reason,
+            outcome=outcome.value,
+            reason=self.reason,
             depth_mm=self._needle.depth_mm,
             adjustments=self._adjustments,
             syntheses=self._planner.count,
         )
-        self._note(ended)
-        return ended
-
-    def _tell_bug(self, state: State, error: BaseException) -> None:
-        """Records that a mistake of the program ended the run, as far as that is possible.
-
-        A second Ctrl-C is no such mistake: it may have come in the middle of a record.
-        """
-        if isinstance(error, KeyboardInterrupt):
-            return
-        said = " ".join(str(error).split())
-        self._reason = f"internal error: {type(error).__name__}: {said}"
-        with contextlib.suppress(Exception):
-            self._went_on(state, Event.FAULT)
-            self._note(Command(self._now_s(), "stop", 0.0))
-            self._ended(State.FAULTED)
-
-    def _perform(self, state: State) -> Event:
-        """Does a state's task; returns the event with which it ended. An error is an event too."""
-        try:
-            self._planner.require_time(self._turned_s)
-            return self._tasks[state]()
-        except DeviceError as error:
-            self._reason = str(error)
-            return Event.FAULT
-        except LimitError as error:
-            self._reason = str(error)
-            return Event.TIMED_OUT
-        except KeyboardInterrupt as error:
-            self._reason = str(error) or "interrupted by the operator"
-            return Event.INTERRUPT
 
     # The tasks, in the order of the workflow.
 
@@ -238,7 +175,7 @@ class Controller:
         tip = estimate.tip
         self._learner.visit(tip.position_mm, last_too=True)
         if self._learner.has_visited_all:
-            self._reason = "the tip is in the last target"
+            self.reason = "the tip is in the last target"
             return Event.IN_TARGET
         return Event.ESTIMATED
 
@@ -246,7 +183,7 @@ class Controller:
         if self._guide.is_on:
             return self._begin_strategy()
         if self._guide.forbids_plans:
-            self._reason = self._guide.reason
+            self.reason = self._guide.reason
             return Event.NOT_GUARANTEED if self._guide.had_strategy else Event.NO_STRATEGY
         self._planner.lack = Lack()
         is_first = self._planner.count == 0 and self._needle.depth_mm == 0.0
@@ -265,7 +202,7 @@ class Controller:
     def _begin_strategy(self) -> Event:
         """Begins to follow the strategy against the tissue, if its longest branch ends in time."""
         if self._guide.longest_s() > self._planner.left_s():
-            self._reason = "the strategy against the tissue may not end within the time limit"
+            self.reason = "the strategy against the tissue may not end within the time limit"
             return Event.NO_TIME_LEFT
         self._agree(self._guide.text)
         return Event.TREE_FOUND
@@ -286,7 +223,7 @@ class Controller:
                 if is_enough(best.certificate, self._needle.known, _ENOUGH_BEHIND_MM):
                     break
         if not places:
-            event, self._reason = self._planner.lack.event()
+            event, self.reason = self._planner.lack.event()
             return event
         # The nearest place with enough reserve was found last; without one, the most reserve wins.
         if not is_enough(places[-1][1].certificate, self._needle.known, _ENOUGH_BEHIND_MM):
@@ -335,7 +272,7 @@ class Controller:
             self._guide.leave()
             # The tip is near the end of a branch, and those ends are deep enough in the target.
             self._learner.visit(self._predicted.position_mm, last_too=True)
-            self._reason = "the tip is in the last target, where the branch that was followed ends"
+            self.reason = "the tip is in the last target, where the branch that was followed ends"
             return Event.TREE_DONE
         action, self._predicted = move
         self._act(action)
@@ -372,7 +309,7 @@ class Controller:
         elif self._guide.leave_if_lost():
             event = Event.OFF_TREE
         if self._guide.forbids_plans:
-            self._reason = self._guide.reason
+            self.reason = self._guide.reason
             return Event.NOT_GUARANTEED
         return event
 
@@ -527,18 +464,6 @@ class Controller:
         with self._supervisor.guarding(Guard.of(settings, way, regions, expected_n)):
             self._is_short = not self._needle.push(length_mm)
         self._short_in_row = self._short_in_row + 1 if self._is_short else 0
-
-    def _halt(self, state: State) -> State:
-        """Stops the needle at the end of a run, whatever the reason; returns how it ends."""
-        try:
-            self._needle.stop()
-        except JournalError as error:
-            self._reason = str(error)
-            return State.FAULTED
-        except DeviceError as error:
-            # The run ends anyway, but the report must say that the device did not stop.
-            self._reason = f"{self._reason}; it cannot be stopped: {error}"
-        return state
 
     def _now_s(self) -> float:
         return self._needle.now_s()
