@@ -11,6 +11,7 @@ __all__ = [
     "ExactWalk",
     "FailedError",
     "Model",
+    "Plans",
     "Play",
     "RejectedError",
     "Simulation",

@@ -43,6 +43,10 @@ _FEW: Final = 1000
 _PAGE_PLANS: Final = 4096
 """So many plans are certified together."""
 
+_PAGE_PLANS_IN_TIME: Final = 64
+"""So many where regions move: their certificates are made one by one, for 50 ms each, and limits
+are looked at after each page."""
+
 DEFAULT_RANKING: Final = ("clearance", "rolls", "length")
 
 ROBUST_RANKING: Final = ("reserve", "length", "rolls")
@@ -123,6 +127,10 @@ def certified(
 def in_pages(plans: Iterable[Plan], scene: Scene) -> Iterator[list[Candidate]]:
     """The plans with their certificates, in their order: one page at a time is computed."""
     rest = iter(plans)
+    if scene.breath is not None:
+        while page := list(islice(rest, _PAGE_PLANS_IN_TIME)):
+            yield [Candidate(plan, certify(plan, scene)) for plan in page]
+        return
     is_first = True
     while page := list(islice(rest, _PAGE_PLANS)):
         if is_first and len(page) < _FEW:
