@@ -25,8 +25,15 @@ impl Solver<'_, '_, '_> {
         // Everything after a dead end is a dead end, so all of it is made now.
         let mut next = self.graph.nodes.len();
         let look_every = states_between_checks(BETWEEN_LOOKS, self.graph.dimension()) as usize;
-        self.graph.expand_dead_ends()?;
-        self.adopt_new_nodes();
+        for (count, node) in self.graph.take_dead_ends()?.into_iter().enumerate() {
+            self.graph.expand(node)?;
+            self.adopt_new_nodes();
+            if (count + 1).is_multiple_of(look_every)
+                && let Some(reason) = self.look(watch)
+            {
+                return Ok(Some(reason));
+            }
+        }
         while let Some(node) = self.graph.nodes.get(next) {
             if !node.is_expanded && !self.is_decided(next as u32) {
                 self.graph.expand(next as u32)?;

@@ -27,26 +27,26 @@ impl Graph<'_, '_> {
         self.link(origin, node, program, (length, false));
     }
 
-    /// Undoes that dead ends are left out: expands again the nodes that lead to one.
-    pub(in crate::game) fn expand_dead_ends(&mut self) -> Result<(), Failure> {
+    /// Undoes that dead ends are left out: returns the nodes that lead to one, which are to be
+    /// expanded again.
+    pub(in crate::game) fn take_dead_ends(&mut self) -> Result<Vec<u32>, Failure> {
         let DeadEnds { node, .. } = std::mem::take(&mut self.dead_ends);
         let mut edge = node.map_or(NONE, |node| self.nodes[node as usize].first_in);
-        let mut last = NONE;
+        let mut sources = Vec::new();
         while edge != NONE {
             let Edge {
                 source, next_in, ..
             } = self.edges[edge as usize];
             // The edges of a node into the same target are successive.
-            if source != last {
-                self.expand(source)?;
+            if sources.last() != Some(&source) {
+                sources.push(source);
             }
-            last = source;
             edge = next_in;
         }
         if self.nodes[0].standing == Standing::Dead {
             self.reevaluate(0)?;
-            self.expand(0)?;
+            sources.push(0);
         }
-        Ok(())
+        Ok(sources)
     }
 }
