@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import field
 from itertools import chain, islice
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from ntagen.plan.rank import Candidate
     from ntagen.plan.synthesise import Margins
     from ntagen.scene import Scene
+
+_Show = Callable[[int], None]
 
 LINES: Final = ".jsonl"
 """The ending of the names of files that have one plan on each line."""
@@ -55,7 +57,7 @@ class ListLimits:
     start_s: float = field(default_factory=time.monotonic)
 
     def stop(self, in_memory: int = 0) -> str | None:
-        """The limit that is reached with so many certified plans in memory, if any."""
+        """The limit that is reached with this number of certified plans in memory, if any."""
         if self.timeout_s is not None and time.monotonic() - self.start_s >= self.timeout_s:
             return "time"
         size_bytes = in_memory * _CANDIDATE_BYTES
@@ -195,31 +197,20 @@ def _counted(pieces: Iterable[str], show: _Show) -> Iterator[str]:
         show(number)
 
 
-class _Show:
-    """Shows how many plans are listed."""
-
-    def __init__(self) -> None:
-        self.start_s = time.monotonic()
-
-    def __call__(self, count: int) -> None:
-        """Is told so many plans."""
-
-
 @contextmanager
 def _shown(quiet: bool) -> Iterator[_Show]:
-    """Gives the function that is told how many plans are listed; a terminal shows the number."""
-    show = _Show()
+    """Gives the function that takes how many plans are listed; a terminal shows the number."""
     if quiet or not sys.stderr.isatty():
-        yield show
+        yield lambda _: None
         return
     from rich.console import Console
 
+    start_s = time.monotonic()
     with Console(stderr=True).status("listing plans …") as status:
 
-        class OnTerminal(_Show):
-            def __call__(self, count: int) -> None:
-                seconds = time.monotonic() - self.start_s
-                rate = count / seconds if seconds > 0 else 0
-                status.update(f"{count:,} plans listed ({rate:,.0f}/s)")
+        def show(count: int) -> None:
+            seconds = time.monotonic() - start_s
+            rate = count / seconds if seconds > 0 else 0
+            status.update(f"{count:,} plans listed ({rate:,.0f}/s)")
 
-        yield OnTerminal()
+        yield show
