@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ntagen import rules
 from ntagen.errors import NtagenError
 from ntagen.needle.kinematics import Arc, orthonormal, roll
-from ntagen.needle.nearest import nearest_to
+from ntagen.needle.nearest import nearest_to, places_on
 from ntagen.scene import Pose, Scene
 
 if TYPE_CHECKING:
@@ -261,9 +261,5 @@ class _Found:
 def _points(arc: Arc) -> NDArray[np.float64]:
     """Points on an arc, at most `_SPACING_MM` apart, with both ends, of shape (n, 3)."""
     count = max(1, math.ceil(arc.length_mm / _SPACING_MM))
-    angle = np.linspace(0.0, arc.length_mm / arc.radius_mm, count + 1)[:, None]
-    start, heading, bevel = (
-        np.array(part) for part in (arc.start.position_mm, arc.start.heading, arc.start.bevel)
-    )
-    ahead, aside = np.sin(angle) * heading, (1.0 - np.cos(angle)) * bevel
-    return np.asarray(start + arc.radius_mm * (ahead - aside))
+    along_mm = np.linspace(0.0, arc.length_mm, count + 1)
+    return places_on([arc], np.zeros(count + 1, dtype=np.intp), along_mm)
