@@ -30,6 +30,7 @@ from ntagen.checker.options import (
     PlansWanted,
     Progress,
     SearchOrder,
+    StrategyWanted,
     TraceWanted,
 )
 from ntagen.checker.query_form import QueryForm, form_of
@@ -57,6 +58,7 @@ __all__ = [
     "RejectedError",
     "SearchOrder",
     "Simulation",
+    "StrategyWanted",
     "SymbolicState",
     "TraceWanted",
     "Value",

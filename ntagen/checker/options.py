@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 SearchOrder = Literal["bfs", "dfs", "random"]
 CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "all"]
+StrategyWanted = Literal["winner", "controller"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 
 Progress = Callable[[int, int, int, int], object]
@@ -88,6 +89,10 @@ class Options:
 
     strategy: bool = False
     """Whether to make the strategy of the player who wins."""
+
+    wanted_strategy: StrategyWanted = "winner"
+    """Whose strategy is made: with ``"controller"`` none is made where it loses, which takes less
+    time and memory. With `verify` it is the winner's in any case."""
 
     verify: bool = False
     """Whether to check the strategy against every move of the opponent."""

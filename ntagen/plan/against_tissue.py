@@ -122,6 +122,7 @@ def defend(
         trace=False,
         certificate=False,
         strategy=True,
+        wanted_strategy="controller",
         verify=verify,
         memory_bytes=memory_bytes,
         progress=options.progress if options and options.progress else lambda *_: listen(),

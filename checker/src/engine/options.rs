@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::limits::Limits;
-use crate::game::{Forced, Nodes, Priorities};
+use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
 use crate::tuning::Tuning;
@@ -28,6 +28,16 @@ pub enum TraceWanted {
     Shortest,
     /// One that takes the least time.
     Fastest,
+}
+
+/// Whose strategy is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum StrategyWanted {
+    /// That of the player who wins.
+    #[default]
+    Winner,
+    /// That of the controller: none is made where it loses.
+    Controller,
 }
 
 /// The rules by which games are played, and strategies checked.
@@ -114,6 +124,8 @@ pub struct Options {
     pub plans: Option<usize>,
     /// Whether a strategy is wanted.
     pub strategy: bool,
+    /// Whose strategy is made; with `verify` the winner's in any case.
+    pub wanted_strategy: StrategyWanted,
     /// Whether the strategy is checked in closed loop.
     pub verify: bool,
     /// Whether traces get exact times and are replayed.
@@ -141,6 +153,15 @@ impl Options {
             forced: self.forced,
             priorities: self.priorities,
         }
+    }
+
+    /// Whether a strategy is wanted if this player wins.
+    pub(crate) fn want_strategy_of(&self, winner: Player) -> bool {
+        let is_made = match self.wanted_strategy {
+            StrategyWanted::Winner => true,
+            StrategyWanted::Controller => winner == Player::Controller,
+        };
+        self.verify || self.strategy && is_made
     }
 
     /// How many threads share the work, at least one.

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use super::convert::{
     code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
 };
-use crate::engine::{Limits, Options, Reductions, TraceWanted};
+use crate::engine::{Limits, Options, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
 use crate::tuning::Tuning;
 
@@ -29,6 +29,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         },
         plans: plans(&text("plans")?, field(given, "max_plans")?)?,
         strategy: field(given, "strategy")?,
+        wanted_strategy: strategy_wanted(&text("wanted_strategy")?)?,
         verify: field(given, "verify")?,
         runs: field(given, "trace")?,
         trace: trace_wanted(&text("wanted_trace")?)?,
@@ -66,6 +67,14 @@ fn plans(wanted: &str, most: usize) -> PyResult<Option<usize>> {
         "none" => Ok(None),
         "all" => Ok(Some(most)),
         other => Err(unknown("choice of plans", other)),
+    }
+}
+
+fn strategy_wanted(name: &str) -> PyResult<StrategyWanted> {
+    match name {
+        "winner" => Ok(StrategyWanted::Winner),
+        "controller" => Ok(StrategyWanted::Controller),
+        other => Err(unknown("strategy", other)),
     }
 }
 

@@ -1,5 +1,8 @@
 //! What follows after a dead end is not explored, however the goal is written; where only variables
-//! make one, or the locations do not show it, all of it is.
+//! make one, or the locations do not show it, all of it is. So it is for the strategy of the
+//! environment.
+
+use checker::engine::{Answer, Limits, Options, StrategyWanted};
 
 use crate::checks::{check, interpreted};
 use crate::solved::won_and_explored;
@@ -52,4 +55,42 @@ fn what_variables_say_is_no_dead_end() {
     let (is_satisfied, explored) = asked("control: A<> are_won(1) && count[0] == 0");
     assert!(!is_satisfied);
     assert!(explored > 210, "{explored}");
+}
+
+const LOST: &str = "control: A<> Runner(0).Start && Runner(1).Won";
+
+fn with_strategy(wanted_strategy: StrategyWanted, states: Option<u64>) -> Answer {
+    let options = Options {
+        strategy: true,
+        wanted_strategy,
+        limits: Limits {
+            states,
+            ..Limits::default()
+        },
+        ..interpreted()
+    };
+    check(TEXT, LOST, &options)
+}
+
+#[test]
+fn a_strategy_of_the_controller_leaves_them() {
+    let (_, for_the_verdict) = asked(LOST);
+    let answer = with_strategy(StrategyWanted::Controller, None);
+    assert_eq!(won_and_explored(&answer), (false, for_the_verdict));
+    assert!(answer.evidence.strategy.is_none() && answer.message.is_none());
+    let answer = with_strategy(StrategyWanted::Winner, None);
+    let (is_won, explored) = won_and_explored(&answer);
+    assert!(!is_won && explored > 10_000, "{explored}");
+    assert!(answer.evidence.strategy.is_some());
+}
+
+#[test]
+fn limits_hold_there() {
+    let most = 2_000;
+    let answer = with_strategy(StrategyWanted::Winner, Some(most));
+    let (is_won, explored) = won_and_explored(&answer);
+    assert!(!is_won && explored < 2 * most, "{explored}");
+    assert!(answer.evidence.strategy.is_none());
+    let reason = "no strategy: the search for it was stopped by the state limit";
+    assert_eq!(answer.message.as_deref(), Some(reason));
 }

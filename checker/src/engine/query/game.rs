@@ -280,7 +280,7 @@ impl<'a> Game<'a> {
         if let Some(most) = self.plans() {
             add_plans(&mut answer, &mut solver, most, watch);
         }
-        if !self.is_strategy_wanted() {
+        if !self.subject.options.want_strategy_of(winner) {
             return answer.into();
         }
         let solved = Solved {

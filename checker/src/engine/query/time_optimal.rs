@@ -164,7 +164,7 @@ fn first_limit(
     let answer = game::game(plain_game, asked, watch);
     match answer.verdict {
         Verdict::Satisfied => Ok((FIRST_LIMIT, answer.counters)),
-        Verdict::NotSatisfied if options.strategy || options.verify => {
+        Verdict::NotSatisfied if options.want_strategy_of(Player::Environment) => {
             let with_strategy = Options {
                 strategy: options.strategy,
                 verify: options.verify,
