@@ -40,6 +40,8 @@ class Ellipsoid(Shape):
             negative, the points at least so deep inside.
     """
 
+    is_convex = True
+
     middle_mm: Vector
     radii_mm: Vector
     axes: Axes = UPRIGHT

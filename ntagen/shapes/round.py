@@ -14,6 +14,8 @@ from ntagen.values import dataclass
 class Sphere(Shape):
     """All points at most `radius_mm` from `middle_mm`."""
 
+    is_convex = True
+
     middle_mm: Vector
     radius_mm: float
 
@@ -75,6 +77,8 @@ class Capsule(Shape):
         end_radius_mm: The radius of the second.
     """
 
+    is_convex = True
+
     start_mm: Vector
     end_mm: Vector
     start_radius_mm: float
@@ -123,6 +127,22 @@ class Capsule(Shape):
         aside = np.sqrt(((seen - ahead[:, None] * axis) ** 2).sum(axis=1))
         at = np.clip(ahead - aside * slope / math.sqrt(1.0 - slope**2), 0.0, length)
         return np.asarray(np.hypot(ahead - at, aside) - (self.start_radius_mm - slope * at))
+
+    def distance_at_mm(self, point_mm: Vector) -> float:
+        """The signed distance of one point; the same formula as for many."""
+        length = self.length_mm
+        fall = self.start_radius_mm - self.end_radius_mm
+        if abs(fall) >= length:
+            middle_mm = self.start_mm if fall >= 0.0 else self.end_mm
+            return math.dist(point_mm, middle_mm) - self.depth_mm
+        slope = fall / length
+        (a, b, c), (d, e, f), (x, y, z) = self.start_mm, self.end_mm, point_mm
+        u, v, w = (d - a) / length, (e - b) / length, (f - c) / length
+        x, y, z = x - a, y - b, z - c
+        ahead = x * u + y * v + z * w
+        aside = math.hypot(x - ahead * u, y - ahead * v, z - ahead * w)
+        at = min(length, max(0.0, ahead - aside * slope / math.sqrt(1.0 - slope**2)))
+        return math.hypot(ahead - at, aside) - (self.start_radius_mm - slope * at)
 
     def bounds_mm(self) -> Bounds:
         """The bounds of its two balls."""
@@ -191,6 +211,8 @@ class HalfSpace(Shape):
         towards: The unit vector from the plane into the half-space.
     """
 
+    is_convex = True
+
     point_mm: Vector
     towards: Vector
 
@@ -210,6 +232,11 @@ class HalfSpace(Shape):
 
         seen = np.asarray(points, dtype=float) - np.array(self.point_mm)
         return np.asarray(-(seen @ np.array(self.towards)))
+
+    def distance_at_mm(self, point_mm: Vector) -> float:
+        """The signed distance of one point."""
+        (x, y, z), (a, b, c), (u, v, w) = point_mm, self.point_mm, self.towards
+        return (a - x) * u + (b - y) * v + (c - z) * w
 
     def bounds_mm(self) -> Bounds:
         """Infinite, but for a plane at right angles to an axis of the world."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,6 +41,10 @@ class Shape(ABC):
 
     __slots__ = ()
 
+    is_convex: ClassVar[bool] = False
+    """Whether it contains all straight ways between its points; then its distance is a convex
+    function, inside too, and the least one along an arc is found sooner."""
+
     @property
     @abstractmethod
     def center_mm(self) -> Vector:
@@ -66,7 +70,11 @@ class Shape(ABC):
         """The signed distances of points with the shape (n, 3) to the surface; negative inside."""
 
     def distance_at_mm(self, point_mm: Vector) -> float:
-        """The signed distance of one point to the surface; negative inside."""
+        """The signed distance of one point to the surface; negative inside.
+
+        A shape with a closed form writes it twice, without numpy here: one number is computed
+        sooner, and many commands need no numpy at all. A test compares both.
+        """
         import numpy as np
 
         return float(self.distance_mm(np.array([point_mm]))[0])
@@ -144,6 +152,13 @@ def turning(axis: Vector, angle_rad: float) -> Axes:
         (x * y * rest - z * sine, cosine + y * y * rest, z * y * rest + x * sine),
         (x * z * rest + y * sine, y * z * rest - x * sine, cosine + z * z * rest),
     )
+
+
+def own_point(point_mm: Vector, center_mm: Vector, axes: Axes) -> Vector:
+    """A point seen from a centre along own axes."""
+    seen = tuple(p - c for p, c in zip(point_mm, center_mm, strict=True))
+    x, y, z = (sum(s * a for s, a in zip(seen, axis, strict=True)) for axis in axes)
+    return (x, y, z)
 
 
 def own_points(points: Points, center_mm: Vector, axes: Axes) -> Points:

@@ -15,6 +15,7 @@ from ntagen.shapes.shape import (
     Vector,
     around,
     moved,
+    own_point,
     own_points,
     turned,
 )
@@ -31,6 +32,8 @@ class Box(Shape):
         axes: Its own axes in the world.
         rounding_mm: All points at most this far from the cuboid belong to the shape.
     """
+
+    is_convex = True
 
     middle_mm: Vector
     size_mm: Vector
@@ -53,6 +56,12 @@ class Box(Shape):
 
         seen = own_points(points, self.middle_mm, self.axes)
         return _beyond(np.abs(seen) - 0.5 * np.array(self.size_mm)) - self.rounding_mm
+
+    def distance_at_mm(self, point_mm: Vector) -> float:
+        """The signed distance of one point; the same formula as for many."""
+        seen = own_point(point_mm, self.middle_mm, self.axes)
+        excess = (abs(s) - 0.5 * edge for s, edge in zip(seen, self.size_mm, strict=True))
+        return _one_beyond(*excess) - self.rounding_mm
 
     def bounds_mm(self) -> Bounds:
         """The bounds of its eight corners, and the rounding."""
@@ -104,6 +113,8 @@ class Cylinder(Shape):
         rounding_mm: All points at most this far from the cylinder belong to the shape.
     """
 
+    is_convex = True
+
     start_mm: Vector
     end_mm: Vector
     radius_mm: float
@@ -136,6 +147,16 @@ class Cylinder(Shape):
         aside = np.sqrt(((seen - ahead[:, None] * axis) ** 2).sum(axis=1))
         beyond = np.column_stack([aside - self.radius_mm, np.abs(ahead) - 0.5 * length])
         return _beyond(beyond) - self.rounding_mm
+
+    def distance_at_mm(self, point_mm: Vector) -> float:
+        """The signed distance of one point; the same formula as for many."""
+        length = self.length_mm
+        (a, b, c), (d, e, f), (m, n, o) = self.start_mm, self.end_mm, self.center_mm
+        u, v, w = (d - a) / length, (e - b) / length, (f - c) / length
+        x, y, z = point_mm[0] - m, point_mm[1] - n, point_mm[2] - o
+        ahead = x * u + y * v + z * w
+        aside = math.hypot(x - ahead * u, y - ahead * v, z - ahead * w)
+        return _one_beyond(aside - self.radius_mm, abs(ahead) - 0.5 * length) - self.rounding_mm
 
     def bounds_mm(self) -> Bounds:
         """The bounds of its two discs, and the rounding."""
@@ -195,6 +216,12 @@ def _beyond(excess: Points) -> Points:
 
     outside = np.sqrt((np.maximum(excess, 0.0) ** 2).sum(axis=1))
     return np.asarray(outside + np.minimum(excess.max(axis=1), 0.0))
+
+
+def _one_beyond(*excess: float) -> float:
+    """The same for one point."""
+    outside = math.hypot(*(max(one, 0.0) for one in excess))
+    return outside + min(max(excess), 0.0)
 
 
 def _between(start_mm: Vector, end_mm: Vector, share: float) -> Vector:
