@@ -1,7 +1,8 @@
 """The generated declaration, compiled as C: what its text computes, without any model checker.
 
 UPPAAL's language is close to C. What is not C is rewritten: the ranged integer type, clocks and
-channels (left out), and integer constants (enumerators, since C wants constants as array lengths).
+channels (left out), integer constants (enumerators, since C wants constants as array lengths), and
+arrays by reference (C has no others).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ def as_c(declaration: str) -> str:
     """The text of a declaration as a C program without `main`."""
     text = re.sub(r"typedef int\[[^]]*\] (\w+);", r"typedef int \1;", declaration)
     text = re.sub(r"^(clock|broadcast chan) .*$", "", text, flags=re.MULTILINE)
+    text = re.sub(r"&(\w+\[)", r"\1", text)
     text = re.sub(r"const int (\w+) = (-?\d+);", r"enum { \1 = \2 };", text)
     return PRELUDE + text
 
