@@ -98,10 +98,13 @@ def rigid(rows: Sequence[Sequence[float]], what: str) -> Rigid:
         raise ImageError(
             "matrix-degenerate", f"the last row of {what} is not 0, 0, 0, 1", "write it so"
         )
-    lengths = np.linalg.norm(matrix, axis=0)
-    if abs(np.linalg.det(matrix)) < RIGID_TOLERANCE * max(1e-300, lengths.prod()):
+    # Squares of very large and very small numbers do not fit.
+    most = float(np.abs(matrix).max()) or 1.0
+    seen = np.linalg.norm(matrix / most, axis=0)
+    if abs(np.linalg.det(matrix / most)) < RIGID_TOLERANCE * max(1e-300, seen.prod()):
         raise ImageError("matrix-degenerate", f"{what} makes space flat", hint)
-    if np.abs(lengths - 1.0).max() > RIGID_TOLERANCE:
+    lengths = [most * float(length) for length in seen]
+    if max(abs(length - 1.0) for length in lengths) > RIGID_TOLERANCE:
         shown = ", ".join(f"{length:.6g}" for length in lengths)
         raise ImageError(
             "matrix-degenerate", f"{what} scales: its columns have the lengths {shown}", hint

@@ -134,7 +134,7 @@ def register(pairs: Pairs) -> Fit:
     _require_scale(pairs, source, target)
     for frame, points in ((pairs.source, source), (pairs.target, target)):
         _require_extent(frame, points)
-    rotation, translation = _best(source, target)
+    rotation, translation = best_motion(source, target)
     residuals = _residuals(rotation, translation, source, target)
     is_flat = any(
         _extents(points)[2] < _FLAT_RATIO * _extents(points)[0] for points in (source, target)
@@ -164,13 +164,21 @@ def register(pairs: Pairs) -> Fit:
 # The fit.
 
 
-def _best(source: _Array, target: _Array, *, mirrored: bool = False) -> tuple[_Array, _Array]:
-    """The best rotation and translation; with `mirrored`, the best reflection instead."""
+def best_motion(source: _Array, target: _Array, *, mirrored: bool = False) -> tuple[_Array, _Array]:
+    """The rotation and the translation that bring points nearest to others, by least squares.
+
+    With `mirrored`, the best reflection instead of the rotation.
+    """
     source_mean, target_mean = source.mean(axis=0), target.mean(axis=0)
-    left, _, right = np.linalg.svd((target - target_mean).T @ (source - source_mean))
-    hand = np.linalg.det(left @ right) * (-1.0 if mirrored else 1.0)
-    rotation = left @ np.diag([1.0, 1.0, math.copysign(1.0, hand)]) @ right
+    rotation = best_rotation(source - source_mean, target - target_mean, mirrored=mirrored)
     return rotation, target_mean - rotation @ source_mean
+
+
+def best_rotation(source: _Array, target: _Array, *, mirrored: bool = False) -> _Array:
+    """The rotation about the origin that brings points nearest to others; see `best_motion`."""
+    left, _, right = np.linalg.svd(target.T @ source)
+    hand = np.linalg.det(left @ right) * (-1.0 if mirrored else 1.0)
+    return np.asarray(left @ np.diag([1.0, 1.0, math.copysign(1.0, hand)]) @ right)
 
 
 def _residuals(rotation: _Array, translation: _Array, source: _Array, target: _Array) -> _Array:
@@ -184,7 +192,7 @@ def _left_out(index: int, source: _Array, target: _Array) -> tuple[float, float]
         return None
     if any(_is_line(points[others]) for points in (source, target)):
         return None
-    rotation, translation = _best(source[others], target[others])
+    rotation, translation = best_motion(source[others], target[others])
     distances = _residuals(rotation, translation, source, target)
     return float(distances[index]), _rms(distances[others])
 
@@ -293,7 +301,7 @@ def _require_extent(frame: str, points: _Array) -> None:
 
 def _require_same_hand(residuals: _Array, source: _Array, target: _Array) -> None:
     """Refuses sets of which one is the mirror image of the other."""
-    mirror = _rms(_residuals(*_best(source, target, mirrored=True), source, target))
+    mirror = _rms(_residuals(*best_motion(source, target, mirrored=True), source, target))
     if mirror < _CLEARLY * _rms(residuals):
         raise InputError(
             "one set of points is the mirror image of the other: a reflection fits to "
@@ -312,7 +320,7 @@ def _require_fit(pairs: Pairs, residuals: _Array, source: _Array, target: _Array
         order = list(range(len(pairs.names)))
         order[i], order[j] = j, i
         changed = target[order]
-        if _rms(_residuals(*_best(source, changed), source, changed)) < _CLEARLY * fre_mm:
+        if _rms(_residuals(*best_motion(source, changed), source, changed)) < _CLEARLY * fre_mm:
             hint = f"are {pairs.names[i]} and {pairs.names[j]} exchanged in one of the sets?"
             break
     raise InputError(

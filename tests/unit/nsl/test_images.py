@@ -527,6 +527,7 @@ def test_what_lies_in_a_mesh_is_seen(line: str, code: str, tmp_path: Path) -> No
 
 FRAMES: dict[str, tuple[str, str, str]] = {
     "scaled": (anatomy.FRAME.replace("(1, 0", "(1.01, 0"), "N108", "scales"),
+    "huge": (anatomy.FRAME.replace("(1, 0", "(1e200, 0"), "N108", "flat"),
     "mirrored": (anatomy.FRAME.replace("(1, 0", "(-1, 0"), "N108", "mirrors"),
     "flat": (anatomy.FRAME.replace("(0, 1", "(0, 0"), "N108", "flat"),
     "two rows": ("transform from LPS (1, 0, 0, 0 mm), (0, 1, 0, 0 mm)", "N037", "three or four"),
