@@ -140,7 +140,11 @@ class GrowingFile:
         self.closed = False
         try:
             if self._is_plain:
-                _lock(self._descriptor, path)
+                lock(
+                    self._descriptor,
+                    f"cannot write {path}: another run is writing to it\n"
+                    "hint: wait until that run has ended, or choose another file",
+                )
                 self._is_ours = True
                 with _naming(path):
                     os.ftruncate(self._descriptor, 0)
@@ -388,8 +392,12 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
         made.append(one)
 
 
-def _lock(descriptor: int, path: Path) -> None:
+def lock(descriptor: int, refusal: str) -> None:
     """Locks an open file for as long as it is open.
+
+    Args:
+        descriptor: The file.
+        refusal: What to say if another process has locked it.
 
     Raises:
         InputError: Another process has locked it.
@@ -397,10 +405,7 @@ def _lock(descriptor: int, path: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(
-            f"cannot write {path}: another run is writing to it\n"
-            "hint: wait until that run has ended, or choose another file"
-        ) from None
+        raise InputError(refusal) from None
     except OSError:
         # Some network file systems have no locks; then nothing prevents two writers.
         return

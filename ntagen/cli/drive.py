@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -30,7 +29,7 @@ from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
 from ntagen.errors import ModelError, NtagenError
-from ntagen.files import read_file, require_apart
+from ntagen.files import require_apart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -372,55 +371,22 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         yield []
         return
     from ntagen.drive.knowledge import told
-    from ntagen.drive.log import ACTUAL, SOURCE, TREE, Log, metadata_of
-    from ntagen.drive.scene_json import scene_to_json
-    from ntagen.nsl.source import MAX_SOURCE_BYTES
+    from ntagen.drive.log import TREE, Log
+    from ntagen.drive.log_facts import facts_of
 
     # Mistakes on the command line must be found before an earlier log is replaced.
-    environment, configuration = run.environment, run.configuration
-    errors = configuration.errors
     told(run.scene, run.known)
-    require_apart({"--log": path}, {"environment": environment})
-    metadata = {
-        "program": f"ntagen {_version()}",
-        "started_at": datetime.now(tz=UTC).isoformat(timespec="milliseconds"),
-        "environment": environment.name.encode(errors="replace").decode(),
-        "known": run.known,
-        "tracker": run.tracking.text,
-        "settings": configuration.settings.to_json(),
-        "origins": dict(configuration.origins),
-        **configuration.needle.facts(),
-    }
-    attachments = {}
-    if not configuration.needle.is_real:
-        metadata |= {
-            "seed": configuration.seed,
-            "noise_mm": errors.noise_mm,
-            "roll_error_rad": errors.roll_rad,
-            "true_radius_mm": errors.radius_mm,
-            "true_bevel_rad": errors.bevel_rad,
-        }
-        actual = replace(run.scene, needle=errors.true_needle(run.scene.needle))
-        attachments[ACTUAL] = scene_to_json(actual).encode()
+    require_apart({"--log": path}, {"environment": run.environment})
+    metadata, attachments = facts_of(
+        run.environment, run.scene, run.configuration, run.known, run.tracking.text
+    )
     if run.course is not None:
         from ntagen.drive.trees import COURSE, course_to_log
 
         metadata[COURSE], tree = course_to_log(run.course)
         attachments |= {} if tree is None else {TREE: tree}
-    # A pipe can be read only once.
-    if environment.is_file():
-        attachments[SOURCE] = read_file(environment, MAX_SOURCE_BYTES)
-    with Log(path, metadata_of(metadata), attachments) as log:
+    with Log(path, metadata, attachments) as log:
         yield [log]
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("ntagen")
-    except PackageNotFoundError:
-        return "(not installed)"
 
 
 def _exit_code(outcome: str) -> int:

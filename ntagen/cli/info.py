@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
-from ntagen.cli.terminal import echo, safe
+from ntagen.cli.terminal import echo, safe, table_console
 from ntagen.files import write_files
 
 if TYPE_CHECKING:
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 
 ROWS_SHOWN: Final = 40
 """A table shows at most this many rows; the JSON object has all."""
-
-_UNBOUNDED_WIDTH: Final = 10_000
 
 
 @click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong.")
@@ -140,11 +137,7 @@ def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:
 
 
 def _show(path: Path, model: Model) -> None:
-    from rich.console import Console
-
-    # A pipe or file has no width, and text that is folded over two lines is hard to search.
-    width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
-    console = Console(highlight=False, markup=False, width=width)
+    console = table_console()
 
     def say(line: str) -> None:
         console.print(safe(line), soft_wrap=True)

@@ -1,4 +1,4 @@
-"""Numbers with a unit on the command line: sizes and times."""
+"""Numbers with a unit on the command line: sizes, times and lengths."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 from typing import Final
 
 import click
+
+from ntagen.units import MM_PER
 
 _BYTES_PER: Final = {
     "": 1,
@@ -46,3 +48,6 @@ SIZE: Final = _Quantity("size", _BYTES_PER)
 
 TIME: Final = _Quantity("time", _SECONDS_PER)
 """Such as ``60s``; in seconds."""
+
+LENGTH: Final = _Quantity("length", {"": 1.0, **MM_PER})
+"""Such as ``30mm``; in mm."""

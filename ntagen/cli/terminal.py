@@ -11,15 +11,20 @@ from __future__ import annotations
 
 import re
 import sys
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 _UNSAFE: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
 """Control characters except line feeds and tabs, characters that change the direction of writing,
 and the bytes of file names that are not text."""
+
+_UNBOUNDED_WIDTH: Final = 10_000
 
 
 class Styled(NamedTuple):
@@ -40,6 +45,15 @@ def safe(text: str) -> str:
     r"""The text with unsafe characters written as ``\u001b``, which JSON reads as the same."""
     text = text.replace("\r\n", "\n")
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
+
+
+def table_console() -> Console:
+    """Where tables are printed, of texts that were made safe before."""
+    from rich.console import Console
+
+    # A pipe or file has no width, and text that is folded over two lines is hard to search.
+    width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
+    return Console(highlight=False, markup=False, width=width)
 
 
 def echo(*parts: str | Styled, err: bool = False, nl: bool = True) -> None:

@@ -17,7 +17,7 @@ same path for ever. No learned region is put over a channel that was cut safely,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm, shells_of
@@ -105,6 +105,7 @@ class Knowledge:
         visited: The number of targets that have been reached.
         contacts: The number of contacts.
         felt: For each learned critical region, its name and its contacts.
+        reaches_mm: At which distance each known region is felt; filled when it is asked for.
     """
 
     a_priori: Scene
@@ -112,6 +113,10 @@ class Knowledge:
     visited: int = 0
     contacts: int = 0
     felt: tuple[tuple[str, tuple[Contact, ...]], ...] = ()
+    # It follows from `a_priori`, which never changes, and is asked for at every measurement.
+    reaches_mm: dict[tuple[str, float], float] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
     def scene(
         self, tip: Pose, radius_mm: float, depth_mm: float = 0.0, clock_s: float = 0.0
@@ -153,8 +158,11 @@ class Knowledge:
 
     def _reach_mm(self, region: Region, settings: Settings) -> float:
         """The distance from the surface of a known region at which it is felt."""
-        shells = shells_of(region, self.a_priori.detections)
-        return _felt_at_mm(region, shells, settings.sensing_margin_mm)
+        key = (region.name, settings.sensing_margin_mm)
+        if key not in self.reaches_mm:
+            shells = shells_of(region, self.a_priori.detections)
+            self.reaches_mm[key] = _felt_at_mm(region, shells, settings.sensing_margin_mm)
+        return self.reaches_mm[key]
 
     def visiting(self) -> Knowledge:
         """The knowledge after one more target was reached."""

@@ -138,6 +138,8 @@ class Shaft:
                     self._points.append((record.depth_mm, record.position_mm))
             case Predicted() | Estimated() if self._depth_mm > 0.0:
                 self._points[-1] = (self._depth_mm, record.position_mm)
+            case _:
+                return
         line = _thinned(self._points, _SHAFT_SPACING_MM)
         if line == self._shown:
             return

@@ -46,21 +46,22 @@ def push(pose: Pose, radius_mm: float, length_mm: float) -> Pose:
         length_mm: The length of the arc; a negative one moves backwards on the circle.
     """
     turn_rad = length_mm / radius_mm
-    # With the half angle, the small sideways part is exact for short arcs and for large radii.
-    half_sinc = 1.0 if turn_rad == 0.0 else math.sin(turn_rad / 2.0) / (turn_rad / 2.0)
-    chord_mm = length_mm * half_sinc
     cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
-    moved = combine(
-        chord_mm * math.cos(turn_rad / 2.0),
-        pose.heading,
-        -chord_mm * math.sin(turn_rad / 2.0),
-        pose.bevel,
-    )
     return Pose(
-        position_mm=add(pose.position_mm, moved),
+        position_mm=pushed_to(pose, radius_mm, length_mm),
         heading=combine(cosine, pose.heading, -sine, pose.bevel),
         bevel=combine(cosine, pose.bevel, sine, pose.heading),
     )
+
+
+def pushed_to(pose: Pose, radius_mm: float, length_mm: float) -> Vector:
+    """The position in mm after a push; see `push`."""
+    half_rad = 0.5 * length_mm / radius_mm
+    # With the half angle, the small sideways part is exact for short arcs and for large radii.
+    sine = math.sin(half_rad)
+    chord_mm = length_mm * (1.0 if half_rad == 0.0 else sine / half_rad)
+    moved = combine(chord_mm * math.cos(half_rad), pose.heading, -chord_mm * sine, pose.bevel)
+    return add(pose.position_mm, moved)
 
 
 def roll(pose: Pose, angle_rad: float) -> Pose:
@@ -117,6 +118,10 @@ class Arc:
     def pose_at(self, length_mm: float) -> Pose:
         """The pose at an arc length from the start."""
         return push(self.start, self.radius_mm, length_mm)
+
+    def position_at(self, length_mm: float) -> Vector:
+        """The position at an arc length from the start, in mm."""
+        return pushed_to(self.start, self.radius_mm, length_mm)
 
     def upto(self, length_mm: float) -> Arc:
         """The first part of the arc."""
