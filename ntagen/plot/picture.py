@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
+from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import UPRIGHT, Field, Sphere, directions, outline_mm, skin
 
@@ -32,10 +33,6 @@ _COLOURS: Final = {
 }
 _OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
 """The kinds that are drawn as outlines, and their dashes."""
-_NEEDLE: Final = "#1f5fbf"
-_OTHER: Final = "#8a94a6"
-_TRUE: Final = "#0b2545"
-_MEASURED: Final = "#7a3e9d"
 _LEGEND_COLUMNS: Final = 6
 _MANY_CURVES: Final = 400
 _SHADOW_POINTS: Final = 160
@@ -247,7 +244,7 @@ def _shadow(shape: Field, shown: tuple[int, int], style: dict[str, Any]) -> Any:
 _TIP_STYLE: Final[dict[str, Any]] = {
     "marker": "o",
     "markersize": 5,
-    "color": _NEEDLE,
+    "color": NEEDLE,
     "markeredgecolor": "white",
     "linestyle": "none",
     "label": "start",
@@ -293,16 +290,16 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     measured = [picture.measured] if picture.measured else []
     best = [picture.best] if picture.best else []
     dots = {"marker": ".", "markersize": 2.5, "linestyle": "none"}
-    other = {"color": _OTHER, "linewidth": 0.7, "alpha": alpha, "label": picture.other_label}
-    plan = {"color": _NEEDLE, "linewidth": 2.2, "label": picture.best_label}
-    true = {"color": _TRUE, "linewidth": 1.0, "label": "true path"}
+    other = {"color": OTHER, "linewidth": 0.7, "alpha": alpha, "label": picture.other_label}
+    plan = {"color": NEEDLE, "linewidth": 2.2, "label": picture.best_label}
+    true = {"color": TRUE, "linewidth": 1.0, "label": "true path"}
     if picture.true_path:
         # The plan is a light band under the true path, so that both are visible.
         plan |= {"linewidth": 4.0, "alpha": 0.45}
     return [
         (other | {"zorder": 4}, picture.others),
         (plan | {"zorder": 5}, best),
-        ({"color": _MEASURED, **dots, "label": "measured", "zorder": 6}, measured),
+        ({"color": MEASURED, **dots, "label": "measured", "zorder": 6}, measured),
         (true | {"zorder": 7}, picture.true_path),
     ]
 

@@ -1,0 +1,10 @@
+"""The colours of paths, the same in all pictures."""
+
+from __future__ import annotations
+
+from typing import Final
+
+NEEDLE: Final = "#1f5fbf"
+OTHER: Final = "#8a94a6"
+TRUE: Final = "#0b2545"
+MEASURED: Final = "#7a3e9d"
