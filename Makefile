@@ -107,8 +107,14 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what the estimator predicts, and how drives of both needles end
 	$(BIN)/python tests/benchmarks/phantom.py
 	$(BIN)/python tests/benchmarks/predictions.py
+	$(BIN)/python -m tests.benchmarks.matching
 	$(BIN)/python tests/benchmarks/drives.py --noise 0.1 1 2 --least 0.93
 	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 100 --known all none
+
+.PHONY: bench-experiments
+bench-experiments: $(INSTALLED) ## Measure how many runs of a campaign are made in a second, and what it costs beside them
+	$(BIN)/python tests/benchmarks/experiment.py
+	$(BIN)/python tests/benchmarks/experiment.py --dask
 
 .PHONY: bench-devices
 bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, and whether runs with faults at random moments end well

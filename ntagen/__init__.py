@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, RejectedError
     from ntagen.checker.strategy import Strategy
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
+    from ntagen.experiment.scripting import campaign
     from ntagen.loading import load, load_strategy
+    from ntagen.traces.face import match
 
 __all__ = [
     "Answer",
@@ -28,8 +30,10 @@ __all__ = [
     "RejectedError",
     "Strategy",
     "UndecidedError",
+    "campaign",
     "load",
     "load_strategy",
+    "match",
 ]
 
 _HOMES = {
@@ -41,8 +45,10 @@ _HOMES = {
     "RejectedError": "ntagen.checker",
     "Strategy": "ntagen.checker.strategy",
     "UndecidedError": "ntagen.errors",
+    "campaign": "ntagen.experiment.scripting",
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",
+    "match": "ntagen.traces.face",
 }
 """The modules of the public names. A name is imported on first use: the command line imports this
 package for every command, and `ntagen --help` must not wait for the engine."""

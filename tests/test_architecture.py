@@ -22,6 +22,7 @@ BASE = {"errors", "hardware", "motion", "parameters", "rules", "scene", "shapes"
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "values": set(),
+    "version": set(),
     "errors": set(),
     "units": set(),
     "rules": {"units"},
@@ -61,16 +62,19 @@ MAY_IMPORT: dict[str, set[str]] = {
     "grbl": {"errors", "hardware", "units"},
     "extensions": {"errors"},
     "drive": BASE
-    | {"extensions", "files", "imaging", "needle", "nsl", "plan", "render", "checker", "grbl"},
+    | {"extensions", "files", "imaging", "needle", "nsl", "plan", "render", "checker", "grbl"}
+    | {"version"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"extensions", "files", "needle", "drive", "openigtlink"},
+    "traces": BASE | {"files", "needle", "nsl", "plan", "tracking"},
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "drive", "openigtlink", "tracking"},
-    "plot": BASE | {"files", "needle", "plan", "drive"},
+    "plot": BASE | {"files", "needle", "plan", "drive", "traces"},
+    "experiment": BASE | {"files", "needle", "nsl", "plan", "drive", "version"},
     "cli": BASE
-    | {"files", "needle", "nsl", "plan", "render", "loading", "explanations"}
-    | {"extensions", "grbl", "drive", "lab", "plot", "testing", "tracking"}
+    | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
+    | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "__main__": {"cli"},
 }
@@ -79,7 +83,19 @@ MAY_IMPORT: dict[str, set[str]] = {
 The face of the engine is split by module; ``checker`` alone is what it shows to the other rooms.
 """
 
-NEEDLE = {"rules", "scene", "nsl", "render", "needle", "plan", "drive", "plot", "tracking", "lab"}
+NEEDLE = {
+    "rules",
+    "scene",
+    "nsl",
+    "render",
+    "needle",
+    "plan",
+    "drive",
+    "plot",
+    "tracking",
+    "traces",
+    "lab",
+}
 """The rooms that are about needles; the face of the engine serves any model."""
 
 SPLIT = {"checker"}
@@ -89,11 +105,13 @@ ONLY_IN: dict[str, set[str]] = {
     "click": {"cli"},
     "rich": {"cli"},
     "jinja2": {"render"},
-    "matplotlib": {"plot"},
-    "scipy": {"imaging", "needle", "plan"},
+    "matplotlib": {"experiment", "plot"},
+    "scipy": {"experiment", "imaging", "needle", "plan", "traces"},
     "trimesh": {"imaging"},
     "nrrd": {"imaging"},
     "nibabel": {"imaging"},
+    "dask": {"experiment"},
+    "distributed": {"experiment"},
     "mcap": {"drive"},
     "lz4": {"drive"},
     "zstandard": {"drive"},
@@ -105,8 +123,9 @@ ONLY_IN: dict[str, set[str]] = {
     "selectors": {"openigtlink"},
     "select": {"drive", "grbl"},
     "asyncio": {"drive"},
-    "threading": {"drive", "grbl", "cli", "lab", "openigtlink", "plugins", "testing"},
-    "time": {"drive", "grbl", "cli", "lab", "openigtlink", "testing"},
+    "threading": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
+    | {"plugins", "testing"},
+    "time": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink", "testing"},
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

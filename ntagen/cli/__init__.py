@@ -39,8 +39,10 @@ COMMANDS: Final = {
     "explain": "Explain a diagnostic: what it means and how to fix it.",
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
+    "experiment": "Drive many simulated runs, and make a table of them.",
     "calibrate": "Find where the scene lies for a tracker, from pairs of points.",
     "device": "Try a device before it drives a needle.",
+    "match": "Find the actions that explain measured traces of the tip.",
     "replay": "Repeat the decisions of a logged run and compare them.",
     "fmt": "Format environment files.",
 }
@@ -81,13 +83,9 @@ def _module(command: str) -> str:
 
 def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if wanted and not ctx.resilient_parsing:
-        from importlib.metadata import PackageNotFoundError, version
+        from ntagen.version import installed_version
 
-        try:
-            number = version("ntagen")
-        except PackageNotFoundError:
-            number = "(not installed)"
-        echo(f"ntagen {number}")
+        echo(f"ntagen {installed_version()}")
         ctx.exit()
 
 

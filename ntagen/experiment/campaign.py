@@ -1,0 +1,178 @@
+"""Makes all runs of an experiment that are missing, and its table."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final
+
+from ntagen.experiment.crew import Crew
+from ntagen.experiment.description import Experiment
+from ntagen.experiment.identity import identity
+from ntagen.experiment.making import Block
+from ntagen.experiment.record import Run
+from ntagen.experiment.results import Campaign, campaign_of
+from ntagen.experiment.store import finished, finished_in, taken
+from ntagen.experiment.table import document_of
+
+_DEATHS: Final = 2
+"""A run that kills its worker so often is given up."""
+
+_BLOCK_RUNS: Final = 10
+"""Most runs in a block. To hand over a block takes milliseconds, a run a quarter of a second."""
+
+_BLOCKS_PER_WORKER: Final = 8
+"""So many blocks a worker, at least: so the last worker does not end long after the others."""
+
+Key = tuple[str, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a campaign is.
+
+    Attributes:
+        done: The number of runs that are finished or given up.
+        of: The number of all runs.
+        before: The number of runs that were finished when this campaign began.
+        reached: The finished runs that reached the target.
+        hits: The finished runs that hit a critical region.
+        note: Something that a person should know, or empty.
+    """
+
+    done: int
+    of: int
+    before: int
+    reached: int
+    hits: int
+    note: str = ""
+
+
+def carry_out(
+    experiment: Experiment,
+    folder: Path,
+    crew_of: Callable[[], Crew],
+    *,
+    resume: bool = False,
+    logs: bool = True,
+    notify: Callable[[Progress], None] = lambda _: None,
+) -> Campaign:
+    """Makes the runs that are missing, and writes the table and the report.
+
+    Args:
+        experiment: What to make.
+        folder: The folder for all results.
+        crew_of: Engages who makes it; is not called if nothing is missing.
+        resume: Whether the folder may hold runs of this experiment.
+        logs: Whether each run has a log.
+        notify: Is told after each block.
+
+    Returns:
+        The table, and what can be made of it.
+
+    Raises:
+        InputError: The folder cannot be used, or somebody cannot work.
+        KeyboardInterrupt: The user wants an end. All finished runs are on the disk.
+    """
+    folder = folder.absolute()
+    with taken(folder, experiment, resume=resume):
+        work = _Work(experiment, folder, logs, notify, finished(folder, experiment))
+        work.make(crew_of)
+        document = document_of(experiment, work.runs, work.lost)
+        made = campaign_of(document, experiment, folder)
+        made.write()
+    return made
+
+
+@dataclass(slots=True)
+class _Work:
+    """What is finished and what is missing."""
+
+    experiment: Experiment
+    folder: Path
+    logs: bool
+    notify: Callable[[Progress], None]
+    runs: dict[Key, Run]
+    lost: dict[Key, str] = field(default_factory=dict)
+    deaths: Counter[Key] = field(default_factory=Counter)
+    before: int = 0
+    reached: int = 0
+    hits: int = 0
+
+    def make(self, crew_of: Callable[[], Crew]) -> None:
+        """Makes what is missing."""
+        self.before = len(self.runs)
+        self._count(self.runs.values())
+        self._tell()
+        if self.before == self.experiment.runs:
+            return
+        crew = crew_of()
+        try:
+            waiting = deque(self._blocks(crew.size))
+            busy = 0
+            while waiting or busy:
+                while waiting and crew.has_room:
+                    crew.start(waiting.popleft())
+                    busy += 1
+                for done in crew.wait():
+                    busy -= 1
+                    if done.runs is None:
+                        waiting.extendleft(self._left_by_death(done.block))
+                    else:
+                        self._add(done.runs)
+        finally:
+            crew.close()
+
+    def _blocks(self, workers: int) -> Iterator[Block]:
+        """The missing runs, in blocks."""
+        missing = self.experiment.runs - len(self.runs)
+        size = max(1, min(_BLOCK_RUNS, missing // (workers * _BLOCKS_PER_WORKER)))
+        for row in self.experiment.rows:
+            seeds = [seed for seed in row.seeds if (row.id, seed) not in self.runs]
+            for start in range(0, len(seeds), size):
+                part = tuple(seeds[start : start + size])
+                yield Block(row, part, self.folder, identity(), self.logs)
+
+    def _add(self, runs: list[Run]) -> None:
+        """Adds finished runs."""
+        new = {run.key: run for run in runs if run.key not in self.runs}
+        self.runs.update(new)
+        self._count(new.values())
+        self._tell()
+
+    def _count(self, runs: Iterable[Run]) -> None:
+        """Counts new runs: to count all of them after each block would take ever longer."""
+        for run in runs:
+            self.reached += run.is_reached
+            self.hits += run.is_hit
+
+    def _left_by_death(self, block: Block) -> list[Block]:
+        """What is left of a block whose worker died: the run at which it died is the first one."""
+        made = finished_in(self.folder, block.name)
+        self._add([run for run in made.values() if run.seed in block.seeds])
+        left = [seed for seed in block.seeds if seed not in made]
+        if not left:
+            return []
+        key = (block.row.id, left[0])
+        self.deaths[key] += 1
+        if self.deaths[key] < _DEATHS:
+            self._tell(f"a worker died at seed {left[0]} of {block.row.id}; it is made again")
+        else:
+            self.lost[key] = f"its worker died {_DEATHS} times"
+            left = left[1:]
+            self._tell(f"given up: seed {key[1]} of {key[0]}, where a worker died twice")
+        return [replace(block, seeds=tuple(left))] if left else []
+
+    def _tell(self, note: str = "") -> None:
+        self.notify(
+            Progress(
+                done=len(self.runs) + len(self.lost),
+                of=self.experiment.runs,
+                before=self.before,
+                reached=self.reached,
+                hits=self.hits,
+                note=note,
+            )
+        )

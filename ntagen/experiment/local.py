@@ -1,0 +1,169 @@
+"""Workers that are processes of this machine.
+
+Each worker is a pool of one process, so that it is known which block a process had that died. The
+processes are started afresh, not forked: a fork copies locks and threads in any state.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import multiprocessing.connection
+import os
+import signal
+import threading
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from typing import Final
+
+from ntagen.errors import InputError
+from ntagen.experiment.crew import Done
+from ntagen.experiment.making import Block, make_block
+from ntagen.experiment.record import Run
+
+_MOST_FAILED_STARTS: Final = 2
+
+_MAIN: Final = "MainProcess"
+"""The name that Python gives to a process that no other Python has started."""
+
+
+class LocalCrew:
+    """Worker processes.
+
+    Args:
+        count: How many.
+
+    Raises:
+        InputError: This is a worker itself: the main program starts its work when it is imported.
+    """
+
+    def __init__(self, count: int) -> None:
+        require_main_process()
+        self._idle = [_Worker() for _ in range(count)]
+        self._busy: dict[Future[list[Run]], tuple[_Worker, Block]] = {}
+        self.size = count
+        self._failed_starts = 0
+
+    @property
+    def has_room(self) -> bool:
+        """Whether a worker has nothing to do."""
+        return bool(self._idle)
+
+    def start(self, block: Block) -> None:
+        """Gives a block to a worker that has nothing to do."""
+        worker = self._idle.pop()
+        self._busy[worker.start(block)] = worker, block
+
+    def wait(self) -> list[Done]:
+        """Waits until a block is over; a worker that died is replaced.
+
+        Raises:
+            InputError: Workers end before they begin.
+        """
+        ready, _ = wait(self._busy, return_when=FIRST_COMPLETED)
+        done = []
+        for future in ready:
+            worker, block = self._busy.pop(future)
+            try:
+                runs = future.result()
+            except BrokenProcessPool:
+                self._count_start(worker)
+                worker.close()
+                self._idle.append(_Worker())
+                done.append(Done(block, None))
+            else:
+                self._failed_starts = 0
+                self._idle.append(worker)
+                done.append(Done(block, runs))
+        return done
+
+    def _count_start(self, worker: _Worker) -> None:
+        """Gives up if workers die before they have begun, again and again."""
+        self._failed_starts = 0 if worker.has_begun else self._failed_starts + 1
+        if self._failed_starts > _MOST_FAILED_STARTS:
+            raise InputError(
+                "workers end before they begin; what they say stands above\n"
+                'hint: a script must call this below `if __name__ == "__main__":`, because each '
+                "worker imports it"
+            )
+
+    def close(self) -> None:
+        """Ends all processes, in the middle of a run if need be."""
+        for worker in [*self._idle, *(worker for worker, _ in self._busy.values())]:
+            worker.close()
+        self._idle, self._busy = [], {}
+
+    @property
+    def pids(self) -> list[int]:
+        """The numbers of the processes that are making a block."""
+        return [pid for worker, _ in self._busy.values() if (pid := worker.pid) is not None]
+
+
+class _Worker:
+    """A pool of one process, which starts with its first block."""
+
+    def __init__(self) -> None:
+        self._pool = ProcessPoolExecutor(
+            1, mp_context=multiprocessing.get_context("spawn"), initializer=_arrive
+        )
+        self._pid: Future[int] | None = None
+
+    def start(self, block: Block) -> Future[list[Run]]:
+        """Gives it a block."""
+        try:
+            if self._pid is None:
+                self._pid = self._pool.submit(os.getpid)
+            return self._pool.submit(make_block, block)
+        except BrokenProcessPool as error:
+            # It died between two blocks.
+            failed: Future[list[Run]] = Future()
+            failed.set_exception(error)
+            return failed
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether its process came so far as to do something."""
+        return self.pid is not None
+
+    @property
+    def pid(self) -> int | None:
+        """The number of its process, as soon as that runs."""
+        if self._pid is None or not self._pid.done() or self._pid.exception() is not None:
+            return None
+        return self._pid.result()
+
+    def close(self) -> None:
+        """Ends it at once."""
+        pid = self.pid
+        if pid is not None:
+            with contextlib.suppress(OSError):
+                os.kill(pid, signal.SIGKILL)
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+
+def require_main_process() -> None:
+    """Refuses to start workers in a worker, whose main program began its work when imported.
+
+    Raises:
+        InputError: This is one.
+    """
+    # While a worker imports the main program, it has its name, but no parent yet.
+    if multiprocessing.current_process().name != _MAIN:
+        raise InputError(
+            "a worker cannot start workers\n"
+            'hint: call this below `if __name__ == "__main__":`, because each worker imports the '
+            "main program"
+        )
+
+
+def _arrive() -> None:
+    """Prepares a worker: Ctrl-C is for the main process, and without that nobody needs it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        multiprocessing.connection.wait([parent.sentinel])
+        os.kill(os.getpid(), signal.SIGKILL)

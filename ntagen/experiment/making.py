@@ -1,0 +1,191 @@
+"""Makes runs: what a worker does, in a process of its own or on another machine."""
+
+from __future__ import annotations
+
+import functools
+import gc
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from ntagen.drive.log import Log
+from ntagen.drive.log_facts import facts_of
+from ntagen.drive.records import Journal, JournalError, Journals
+from ntagen.drive.simulate import Result, simulate, synthesiser_for
+from ntagen.drive.states import State
+from ntagen.errors import InputError
+from ntagen.experiment.description import Row, digest_of
+from ntagen.experiment.identity import identity
+from ntagen.experiment.record import Observer, Profile, Run, Synthesised
+from ntagen.experiment.store import Results, finished_in, new_log
+from ntagen.nsl import Task, load_task
+
+FAILED = "failed"
+"""The outcome of a run in which the driver broke."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Some runs of a row that one worker makes, one after the other.
+
+    Attributes:
+        row: The row; its seeds count for nothing here.
+        seeds: The seeds of the runs, in the order in which they are made.
+        folder: The folder of the experiment; absolute.
+        version: The ntagen that must make them (`ntagen.experiment.identity`).
+        logs: Whether each run has a log.
+    """
+
+    row: Row
+    seeds: tuple[int, ...]
+    folder: Path
+    version: str
+    logs: bool = True
+
+    @property
+    def name(self) -> str:
+        """A name that no block with other runs has."""
+        return f"{self.row.id}-{self.seeds[0]}-{self.seeds[-1]}-{len(self.seeds)}"
+
+
+def make_block(block: Block, notify: Callable[[Run], None] = lambda _: None) -> list[Run]:
+    """Makes the runs of a block that are not finished yet; each is on the disk at once.
+
+    Args:
+        block: The block.
+        notify: Is told of each run that is on the disk.
+
+    Returns:
+        All runs of the block, in its order.
+
+    Raises:
+        InputError: This is another version of ntagen, the scene is not that of the row, or a run
+            cannot be written.
+    """
+    if block.version != identity():
+        raise InputError(
+            f"a worker has another version of ntagen: {identity()}, and this is {block.version}\n"
+            "hint: install the same version on all machines, start the workers again, and go on "
+            "with --resume"
+        )
+    task = _task(block.row.scenario)
+    if digest_of(block.row, task) != block.row.digest:
+        _task.cache_clear()
+        raise InputError(
+            f"{block.row.scenario} has changed, or is another file on the machine of a worker\n"
+            "hint: restore it, and go on with --resume"
+        )
+    made = finished_in(block.folder, block.name)
+    with Results(block.folder, block.name) as results:
+        for seed in block.seeds:
+            if seed not in made or (block.logs and not Path(block.folder, made[seed].log).exists()):
+                made[seed] = _made(block, task, seed)
+                results.add(made[seed])
+                notify(made[seed])
+    return [made[seed] for seed in block.seeds]
+
+
+@functools.lru_cache(maxsize=8)
+def _task(path: Path) -> Task:
+    task = load_task(path)
+    # Nothing that was loaded is garbage: the collector need not look at it again and again.
+    gc.freeze()
+    return task
+
+
+def _made(block: Block, task: Task, seed: int) -> Run:
+    """Makes a run with its log, if one is wanted."""
+    since = time.perf_counter()
+    run = _logged(block, task, seed) if block.logs else _driven(block.row, task, seed, (), "")
+    return replace(run, seconds=time.perf_counter() - since)
+
+
+def _logged(block: Block, task: Task, seed: int) -> Run:
+    configuration = block.row.configuration(task, seed)
+    facts = facts_of(block.row.scenario, task.scene, configuration, block.row.known)
+    with new_log(block.folder, block.row.id, seed) as (path, name):
+        try:
+            with Log(path, *facts, is_kept_up=False) as log:
+                return _driven(block.row, task, seed, (log,), name)
+        except JournalError as error:
+            # The message names the file as it is called now, and has a hint for a single run.
+            reason = str(error).partition("\nhint: ")[0].rpartition(": ")[2]
+            raise InputError(
+                f"cannot write the log {Path(block.folder, name)}: {reason}\n"
+                "hint: make room, and go on with --resume"
+            ) from error
+
+
+def _driven(row: Row, task: Task, seed: int, logs: Sequence[Journal], name: str) -> Run:
+    """Drives, and keeps what counts. If the driver breaks, that is a result, too."""
+    configuration = row.configuration(task, seed)
+    observer = Observer(task.scene)
+    try:
+        result = simulate(
+            task.scene,
+            synthesiser_for(configuration.settings),
+            configuration.settings,
+            Journals(*logs, observer),
+            known=row.known,
+            errors=configuration.errors,
+            make=configuration.needle.make,
+            seed=seed,
+        )
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:  # a bug in one run must not end a campaign of thousands
+        return _broken(row, seed, error, name)
+    return _run(row, seed, result, observer, name)
+
+
+def _run(row: Row, seed: int, result: Result, observer: Observer, log: str) -> Run:
+    """What is kept of a run. The truth is that of the needle, which knows its own path."""
+    ended = result.ended
+    says_reached = ended.outcome == State.TARGET_REACHED.value
+    clear_mm = result.clearance_mm
+    return Run(
+        row=row.id,
+        seed=seed,
+        outcome=ended.outcome,
+        reason=ended.reason,
+        is_reached=says_reached and result.target_distance_mm <= 0.0,
+        is_hit=clear_mm <= 0.0,
+        clearance_mm=clear_mm if math.isfinite(clear_mm) else None,
+        target_mm=result.target_distance_mm,
+        depth_mm=ended.depth_mm,
+        adjustments=ended.adjustments,
+        needle_s=ended.time_s,
+        syntheses=tuple(
+            Synthesised(one.found, one.hold, one.engine_seconds, one.loop_seconds)
+            for one in result.syntheses
+        ),
+        profile=observer.profile,
+        felt=observer.felt,
+        seconds=0.0,
+        log=log,
+    )
+
+
+def _broken(row: Row, seed: int, error: Exception, log: str) -> Run:
+    """The run of a driver that broke: it reached nothing, and nobody knows the rest."""
+    said = " ".join(str(error).split())
+    return Run(
+        row=row.id,
+        seed=seed,
+        outcome=FAILED,
+        reason=f"{type(error).__name__}: {said}",
+        is_reached=False,
+        is_hit=False,
+        clearance_mm=None,
+        target_mm=None,
+        depth_mm=0.0,
+        adjustments=0,
+        needle_s=0.0,
+        syntheses=(),
+        profile=Profile(),
+        felt=(),
+        seconds=0.0,
+        log=log,
+    )

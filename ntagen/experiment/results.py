@@ -1,0 +1,113 @@
+"""What a campaign gives: the table as plain data, as a frame, and in files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ntagen.errors import InputError
+from ntagen.experiment.description import Experiment
+from ntagen.experiment.report import report_of
+from ntagen.experiment.table import FORMAT_VERSION
+from ntagen.experiment.writing import csv_of, flat, latex_of, markdown_of
+from ntagen.files import MODEL_BYTES, read_file, write_files
+from ntagen.nsl import load
+from ntagen.scene import Scene
+
+FILES = ("table.json", "table.csv", "table.md", "table.tex", "report.html")
+"""The files that `Campaign.write` writes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """A finished campaign.
+
+    Attributes:
+        document: All of it, as ``table.json`` has it.
+        folder: Its folder, with the logs.
+        scenes: The scene of each row, by the name of the row.
+    """
+
+    document: Mapping[str, Any]
+    folder: Path
+    scenes: Mapping[str, Scene]
+
+    @property
+    def table(self) -> list[dict[str, Any]]:
+        """The rows, as plain data (`ntagen.experiment.table.row_of`)."""
+        return list(self.document["rows"])
+
+    @property
+    def runs(self) -> list[dict[str, Any]]:
+        """The runs, as plain data (`ntagen.experiment.record.Run`)."""
+        return list(self.document["runs"])
+
+    def to_frame(self) -> Any:  # noqa: ANN401  it depends on what is installed
+        """The rows as a frame of pandas, or of polars if there is no pandas.
+
+        Raises:
+            InputError: Neither is installed.
+        """
+        rows = [flat(row) for row in self.table]
+        return _frame(rows)
+
+    def _repr_html_(self) -> str:
+        from ntagen.experiment.report import table_of
+
+        return table_of(self.document)
+
+    def write(self) -> None:
+        """Writes `FILES` into the folder; each is written whole or not at all.
+
+        Raises:
+            InputError: They cannot be written.
+        """
+        texts = (
+            json.dumps(self.document, indent=1, allow_nan=False) + "\n",
+            csv_of(self.document),
+            markdown_of(self.document),
+            latex_of(self.document),
+            report_of(self.document, self.scenes),
+        )
+        write_files({self.folder / name: text for name, text in zip(FILES, texts, strict=True)})
+
+
+def campaign_of(document: Mapping[str, Any], experiment: Experiment, folder: Path) -> Campaign:
+    """The campaign of a table."""
+    scenes = {path: load(path) for path in {row.scenario for row in experiment.rows}}
+    return Campaign(document, folder, {row.id: scenes[row.scenario] for row in experiment.rows})
+
+
+def read_table(folder: Path) -> Campaign:
+    """A campaign from the table in its folder; its scenes are not known.
+
+    Raises:
+        InputError: There is no such table.
+    """
+    path = folder / "table.json"
+    try:
+        document = json.loads(read_file(path, MODEL_BYTES))
+        if document["format"] != FORMAT_VERSION:
+            raise InputError(f"{path} has the format {document['format']}, not {FORMAT_VERSION}")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is no table of an experiment: {error}") from error
+    return Campaign(document, folder, {})
+
+
+def _frame(rows: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
+    import importlib
+
+    for name in ("pandas", "polars"):
+        try:
+            library = importlib.import_module(name)
+        except ImportError:
+            continue
+        columns = list(dict.fromkeys(key for row in rows for key in row))
+        return library.DataFrame({key: [row.get(key) for row in rows] for key in columns})
+    raise InputError(
+        "a frame needs pandas or polars, and neither is installed\n"
+        "hint: pip install polars; `table` has the rows without them"
+    )

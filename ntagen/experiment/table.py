@@ -1,0 +1,125 @@
+"""The table of an experiment: plain data, a dict a row, from the runs in any order.
+
+What was measured in seconds of a computer stands in `TIMES`, and is all that two tables of the
+same runs may differ in.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from ntagen.experiment.description import Experiment, Row
+from ntagen.experiment.identity import identity
+from ntagen.experiment.paper import PAPER
+from ntagen.experiment.record import Run
+from ntagen.experiment.statistics import Spread, rate_of, spread_of
+
+FORMAT_VERSION: Final = 1
+
+TIMES: Final = ("synthesis_s", "loop_s", "overall_s", "run_s")
+"""The entries of a row that are, or contain, seconds of a computer."""
+
+RUN_TIMES: Final = ("seconds", "engine_s", "loop_s")
+"""The entries of a run that are."""
+
+
+def document_of(
+    experiment: Experiment,
+    runs: Mapping[tuple[str, int], Run],
+    lost: Mapping[tuple[str, int], str] | None = None,
+) -> dict[str, Any]:
+    """The whole table, as it is written in ``table.json``.
+
+    Args:
+        experiment: The rows.
+        runs: The finished runs, by row and seed.
+        lost: The runs that could not be made, each with the reason.
+    """
+    lost = lost or {}
+    return {
+        "format": FORMAT_VERSION,
+        "ntagen": identity(),
+        "name": experiment.name,
+        "confidence": 0.95,
+        "rows": [
+            row_of(row, [runs[row.id, s] for s in sorted(row.seeds) if (row.id, s) in runs])
+            for row in experiment.rows
+        ],
+        "runs": [
+            runs[row.id, seed].to_json()
+            for row in experiment.rows
+            for seed in sorted(row.seeds)
+            if (row.id, seed) in runs
+        ],
+        "lost": [
+            {"row": row, "seed": seed, "reason": reason}
+            for (row, seed), reason in sorted(lost.items())
+        ],
+    }
+
+
+def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
+    """A row of the table.
+
+    The hit rate is about the needle's true path, and so is "reached": the driver says so, and the
+    true tip is in the target. Overall times are those of the needle and of all syntheses of a run.
+    """
+    sound = [run for run in runs if run.target_mm is not None]
+    syntheses = [one for run in sound for one in run.syntheses]
+    reach = rate_of(sum(run.is_reached for run in runs), len(runs))
+    hit = rate_of(sum(run.is_hit for run in sound), len(sound))
+    clearances = [run.clearance_mm for run in sound if run.clearance_mm is not None]
+    plans = [sum(one.found for one in run.syntheses) for run in sound]
+    hold = [sum(one.hold for one in run.syntheses) for run in sound]
+    return {
+        "id": row.id,
+        "scenario": row.scenario.stem,
+        "known": row.known,
+        "needle": row.needle,
+        "settings": row.shown_values(),
+        "wanted": len(row.seeds),
+        "runs": len(runs),
+        "reached": reach.count,
+        "reach_rate": reach.rate,
+        "reach_low": reach.low,
+        "reach_high": reach.high,
+        "hits": hit.count,
+        "hit_rate": hit.rate,
+        "hit_low": hit.low,
+        "hit_high": hit.high,
+        "outcomes": dict(sorted(Counter(run.outcome for run in runs).items())),
+        "adjustments": _spread(spread_of(run.adjustments for run in sound)),
+        "syntheses": _spread(spread_of(len(run.syntheses) for run in sound)),
+        "plans": _spread(spread_of(plans)),
+        "plans_total": sum(plans),
+        "plans_hold_total": sum(hold),
+        "clearance_mm": _spread(spread_of(clearances)),
+        "needle_s": _spread(spread_of(run.needle_s for run in sound)),
+        "synthesis_s": _spread(spread_of(one.engine_s for one in syntheses)),
+        "loop_s": _spread(spread_of(one.loop_s for one in syntheses)),
+        "overall_s": _spread(spread_of(run.overall_s for run in sound)),
+        "run_s": _spread(spread_of(run.seconds for run in runs)),
+        "paper": dataclasses.asdict(PAPER[row.paper]) | {"line": row.paper} if row.paper else None,
+    }
+
+
+def timeless(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The table without what was measured in seconds of a computer: the rest is reproducible."""
+    rows = [{k: v for k, v in row.items() if k not in TIMES} for row in document["rows"]]
+    return {**document, "rows": rows, "runs": [_timeless_run(run) for run in document["runs"]]}
+
+
+def _timeless_run(run: Mapping[str, Any]) -> dict[str, Any]:
+    kept = {key: value for key, value in run.items() if key not in RUN_TIMES}
+    kept["syntheses"] = [
+        {key: value for key, value in one.items() if key not in RUN_TIMES}
+        for one in run["syntheses"]
+    ]
+    return kept
+
+
+def _spread(spread: Spread | None) -> dict[str, float] | None:
+    return None if spread is None else dataclasses.asdict(spread)
