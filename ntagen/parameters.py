@@ -27,6 +27,7 @@ Kind = Literal[
     "angle per time",
     "data",
     "ratio",
+    "percentage",
     "count",
     "switch",
     "words",
@@ -37,7 +38,7 @@ Value = float | int | bool | tuple[str, ...]
 """The value of a setting, in the unit of its field."""
 
 _QUANTITY: Final = re.compile(
-    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\W\d]*(?:/[a-z]+)?)\s*"
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(%|[^\W\d]*(?:/[a-z]+)?)\s*"
 )
 
 LARGEST: Final = 1e6
@@ -70,6 +71,7 @@ MEASURES: Final[dict[Kind, Measure]] = {
     "angle per time": Measure("an angle per time", "deg/s", RAD_PER_S, "90 deg/s"),
     "data": Measure("a size", "MiB", BYTES_PER, "512 MiB"),
     "ratio": Measure("a plain number", "", {"": 1.0}, "0.05"),
+    "percentage": Measure("a percentage", "%", {"%": 0.01}, "10 %"),
     "count": Measure("a whole number", "", {"": 1.0}, "3"),
     "switch": Measure("on or off", "", {}, "off"),
     "words": Measure("a list of words", "", {}, "clearance, rolls"),
@@ -159,6 +161,11 @@ class Parameter:
             raise ValueError(f"'{text}' is not a whole number")
         return round(value)
 
+    def in_usual_unit(self, value: float) -> float:
+        """A number in the usual unit, without the digits that only the conversion makes."""
+        measure = MEASURES[self.kind]
+        return float(f"{value / measure.units.get(measure.unit, 1.0):.12g}")
+
     def shown(self, value: Value | None) -> str:
         """A value as a person writes it, in the usual unit."""
         measure = MEASURES[self.kind]
@@ -168,8 +175,7 @@ class Parameter:
             return "on" if value else "off"
         if isinstance(value, tuple):
             return ", ".join(value)
-        number = value / measure.units.get(measure.unit, 1.0)
-        return f"{number:.6g} {measure.unit}".rstrip()
+        return f"{self.in_usual_unit(value):.6g} {measure.unit}".rstrip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -419,7 +425,7 @@ PARAMETERS: Final = (
         "needle.noise_mm",
         "noise",
         "length",
-        "Virtual needle: standard deviation of each measured coordinate.",
+        "Simulated needle: standard deviation of each measured coordinate.",
     ),
     Parameter(
         "needle.roll_rad",
@@ -431,15 +437,37 @@ PARAMETERS: Final = (
         "needle.radius_mm",
         "true radius",
         "length",
-        "Virtual needle: the true radius of the motion circle, if the scene's is wrong.",
+        "Simulated needle: the true radius of the motion circle, if the scene's is wrong.",
+        is_above=True,
+    ),
+    Parameter(
+        "needle.radius_ratio",
+        "radius error",
+        "percentage",
+        "Simulated needle: by how much its true radius is greater than the scene's.",
+        -1.0,
         is_above=True,
     ),
     Parameter(
         "needle.bevel_rad",
         "true bevel",
         "angle",
-        "Virtual needle: by which angle about the heading the true bevel differs from the scene's.",
+        "Simulated needle: by which angle about the heading the true bevel differs from the "
+        "scene's.",
         -math.pi,
+    ),
+    Parameter(
+        "needle.lag_rad",
+        "roll lag",
+        "angle",
+        "Phantom needle: the true lag of its tip at a depth of 100 mm, as friction holds the "
+        "shaft; rolls make up for `lag compensation` only.",
+    ),
+    Parameter(
+        "needle.latency_s",
+        "delay",
+        "time",
+        "Phantom needle: a measurement shows position and force as they were this long ago.",
     ),
     Parameter(
         "needle.seed",

@@ -24,7 +24,7 @@ from ntagen.cli.models import include_option
 from ntagen.cli.operator import SignalledOperator, signalled_operator
 from ntagen.cli.report import lines, report, summary
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.steering import show_settings, steering_options
+from ntagen.cli.steering import say_idle_errors, show_settings, steering_options
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
@@ -43,14 +43,6 @@ if TYPE_CHECKING:
     from ntagen.parameters import Given
     from ntagen.plan.synthesise import Synthesiser
     from ntagen.scene import Scene
-
-_SIMULATIONS_ONLY: Final = {
-    "given_needle_seed": "--seed",
-    "given_needle_noise_mm": "--noise",
-    "given_needle_roll_rad": "--roll-error",
-    "given_needle_radius_mm": "--true-radius",
-    "given_needle_bevel_rad": "--true-bevel",
-}
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
@@ -222,13 +214,12 @@ def _say_idle(configuration: Configuration, *, picks: bool) -> None:
     """Tells which options have no effect on this needle, in a tissue that may pick at random."""
     needle, errors = configuration.needle, configuration.errors
     if needle.is_real:
-        say_idle(_SIMULATIONS_ONLY, "with a real needle")
+        say_idle({"given_needle_seed": "--seed"}, "with a real needle")
+        say_idle_errors(needle)
         return
     say_idle({"baud_rate": "--baud"}, "with a simulated needle")
-    if needle.parameters is not None:
-        idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
-        say_idle(idle, "on a phantom needle, which has its own errors")
-    elif not (errors.noise_mm or errors.roll_rad or picks):
+    say_idle_errors(needle)
+    if needle.parameters is None and not (errors.noise_mm or errors.roll_rad or picks):
         say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
 
 

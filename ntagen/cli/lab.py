@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option
 from ntagen.cli.signals import handled
-from ntagen.cli.steering import needle_options
+from ntagen.cli.steering import needle_options, say_idle_errors
 from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
 
@@ -122,9 +121,7 @@ def command(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     fitted = configure((*task.given, *given), task.scene, "all", needle)
-    if needle == "phantom":
-        idle = {"given_needle_noise_mm": "--noise", "given_needle_roll_rad": "--roll-error"}
-        say_idle(idle, "on a phantom needle, which has its own errors")
+    say_idle_errors(fitted.needle)
     margin_mm = fitted.settings.sensing_margin_mm
     placed = place(needle, task.scene, fitted.seed, margin_mm, fitted.errors)
     axes = _axes(described(task, environment), task)

@@ -100,7 +100,7 @@ def summary(
         "true_clearance_mm": None if truth is None or is_clear else truth.clearance_mm,
         "true_target_distance_mm": None if truth is None else truth.target_distance_mm,
         "seed": None if truth is None else configuration.seed,
-        "noise_mm": errors.noise_mm,
+        "noise_mm": configuration.needle.error("noise_mm"),
         "roll_error_deg": deg_from_rad(errors.roll_rad),
         "known": known,
         "log": None if log_path is None else str(log_path),

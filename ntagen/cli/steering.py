@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ntagen.cli.effects import say_idle
 from ntagen.cli.terminal import echo
 from ntagen.parameters import MEASURES, NEEDLE, PARAMETERS, Given, Parameter
 
 if TYPE_CHECKING:
     from ntagen.drive.configure import Configuration
+    from ntagen.drive.needles import Chosen
 
 
 class _Value(click.ParamType[Given]):
@@ -101,6 +103,12 @@ def _option(
 def _name(parameter: Parameter) -> str:
     """The name of the command's parameter."""
     return f"given_{parameter.field.replace('.', '_')}"
+
+
+def say_idle_errors(needle: Chosen) -> None:
+    """Tells which options about errors of a needle mean nothing to this one."""
+    flags = {_name(one): one.flag for one in PARAMETERS if needle.ignores(one.field)}
+    say_idle(flags, f"with {needle.kind}")
 
 
 def show_settings(configuration: Configuration) -> None:

@@ -24,6 +24,8 @@ COMMAND_LINE: Final = "command line"
 DEFAULT: Final = "default"
 """The origin of a value that nobody gave."""
 
+_RADIUS: Final = f"{NEEDLE}.radius_mm"
+_RADIUS_ERROR: Final = f"{NEEDLE}.radius_ratio"
 _NO_FORCE: Final = "follows from force sensing off"
 _AS_NEEDLE: Final = "follows from the scene and the needle"
 
@@ -34,7 +36,7 @@ class Configuration:
 
     Attributes:
         settings: The driver's settings.
-        errors: The errors of the virtual needle.
+        errors: The errors of a simulated needle.
         seed: The seed of these errors.
         origins: The origin of each value that is not a default, by its field.
         needle: The needle.
@@ -54,8 +56,7 @@ class Configuration:
             return value
         if name == "seed":
             return self.seed
-        found: Value | None = getattr(self.errors, name)
-        return found
+        return self.needle.error(name)
 
     def origin(self, parameter: Parameter) -> str:
         """Where the value of a setting comes from."""
@@ -87,6 +88,12 @@ def configure(
     chosen = {one.parameter.field: one for one in given}
     origins = {name: one.origin for name, one in chosen.items()}
     values = {name: _exact(one) for name, one in chosen.items()}
+    if {_RADIUS, _RADIUS_ERROR} <= chosen.keys():
+        places = " and ".join(sorted({origins[_RADIUS], origins[_RADIUS_ERROR]}))
+        raise InputError(
+            "`radius error` and `true radius` both say what the true radius is\n"
+            f"hint: leave out one of them\nnote: they are given here: {places}"
+        )
     errors = Errors(
         **{
             one.name: values[f"{NEEDLE}.{one.name}"]

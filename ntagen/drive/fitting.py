@@ -53,7 +53,7 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
     priors = replace(
         settings.priors,
         roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
-        noise_mm=max(settings.priors.noise_mm, errors.noise_mm),
+        noise_mm=max(settings.priors.noise_mm, errors.noise_mm or 0.0),
     )
     if scene.tissue.is_adversarial:
         priors = _expecting(priors, scene.tissue)

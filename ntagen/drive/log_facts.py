@@ -28,7 +28,7 @@ def facts_of(
         known: The critical regions that the driver knows, in words.
         tracker: What measures, in words; empty if the needle measures itself.
     """
-    errors = configuration.errors
+    errors, needle = configuration.errors, configuration.needle
     metadata: dict[str, Any] = {
         "program": f"ntagen {installed_version()}",
         "started_at": datetime.now(tz=UTC).isoformat(timespec="milliseconds"),
@@ -37,15 +37,15 @@ def facts_of(
         "tracker": tracker,
         "settings": configuration.settings.to_json(),
         "origins": dict(configuration.origins),
-        **configuration.needle.facts(),
+        **needle.facts(),
     }
     attachments = {}
-    if not configuration.needle.is_real:
+    if not needle.is_real:
         metadata |= {
             "seed": configuration.seed,
-            "noise_mm": errors.noise_mm,
+            "noise_mm": needle.error("noise_mm"),
             "roll_error_rad": errors.roll_rad,
-            "true_radius_mm": errors.radius_mm,
+            "true_radius_mm": errors.true_needle(scene.needle).radius_mm,
             "true_bevel_rad": errors.bevel_rad,
         }
         actual = replace(scene, needle=errors.true_needle(scene.needle))

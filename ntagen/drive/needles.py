@@ -11,6 +11,7 @@ from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
 from ntagen.extensions import DEVICES, described, names
 from ntagen.needle.errors import Errors
+from ntagen.parameters import NEEDLE
 from ntagen.plan.rank import ROBUST_RANKING
 from ntagen.scene import Scene
 from ntagen.values import dataclass
@@ -28,6 +29,12 @@ REAL: Final = "grbl"
 _REAL_ROLL_RAD_PER_S: Final = 0.5 * math.pi
 """A real needle is rolled at half the speed of simulated ones; ours."""
 
+_NOT_VIRTUAL: Final = frozenset({"lag_rad", "latency_s"})
+"""The virtual needle turns as its base does, and is measured as it is now."""
+
+_NOT_PHANTOM: Final = frozenset({"roll_rad"})
+"""Rolls of the phantom's base are exact; what its tip does follows from the friction."""
+
 _LAYER_SIGMAS: Final = 3.0
 """Differences of layers are no alarm up to this many standard deviations; ours."""
 
@@ -38,8 +45,8 @@ class Chosen:
 
     Attributes:
         name: Its name.
-        errors: The errors of the virtual needle.
-        parameters: The parameters of the phantom needle; None for another one.
+        errors: The errors of a simulated needle.
+        parameters: The parameters of the phantom needle, with these errors; None for another one.
     """
 
     name: str
@@ -50,6 +57,34 @@ class Chosen:
     def is_real(self) -> bool:
         """Whether it is no simulation."""
         return self.name not in NAMES
+
+    @property
+    def kind(self) -> str:
+        """What it is, in words."""
+        if self.is_real:
+            return "a real needle"
+        return "the virtual needle" if self.parameters is None else "a phantom needle"
+
+    def ignores(self, name: str) -> bool:
+        """Whether a setting, by its field, is an error that means nothing to this needle."""
+        part, _, error = name.partition(".")
+        if part != NEEDLE or error == "seed":
+            return False
+        if self.is_real:
+            return True
+        return error in (_NOT_VIRTUAL if self.parameters is None else _NOT_PHANTOM)
+
+    def error(self, name: str) -> float | None:
+        """An error of the needle by its field of `Errors`; None if it is as in the scene."""
+        if self.parameters is not None:
+            sensing, torsion = self.parameters.sensing, self.parameters.torsion
+            own = {"noise_mm": sensing.noise_mm, "latency_s": sensing.latency_s}
+            own["lag_rad"] = torsion.lag_rad
+        else:
+            own = dict.fromkeys(("noise_mm", "latency_s", "lag_rad"), 0.0)
+            own["noise_mm"] = self.errors.noise_mm or 0.0
+        value: float | None = own[name] if name in own else getattr(self.errors, name)
+        return value
 
     @property
     def make(self) -> Maker | None:
@@ -80,7 +115,7 @@ class Chosen:
         layers_n = self.parameters.forces.layers_n(_LAYER_SIGMAS)
         return replace(
             settings,
-            compensated_lag_rad=self.parameters.torsion.lag_rad,
+            compensated_lag_rad=_usual_phantom().torsion.lag_rad,
             force_n=max(settings.force_n, 2.0 * layers_n),
             ranking=ROBUST_RANKING,
         )
@@ -109,7 +144,7 @@ def choose(name: str, errors: Errors) -> Chosen:
     Args:
         name: One of `NAMES`, or a real needle: `REAL`, or the name of a plugin, both perhaps with a
             colon and more.
-        errors: The errors of the virtual needle.
+        errors: The errors of a simulated needle.
 
     Raises:
         InputError: There is no needle of this name.
@@ -126,7 +161,11 @@ def choose(name: str, errors: Errors) -> Chosen:
             f"{described(DEVICES)}"
         )
     if name != "virtual":
-        from ntagen.needle.phantom_parameters import PhantomParameters
-
-        return Chosen(name, errors, PhantomParameters())
+        return Chosen(name, errors, errors.true_phantom(_usual_phantom()))
     return Chosen(name, errors)
+
+
+def _usual_phantom() -> PhantomParameters:
+    from ntagen.needle.phantom_parameters import PhantomParameters
+
+    return PhantomParameters()

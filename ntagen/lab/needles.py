@@ -76,20 +76,20 @@ def place(
         scene: The actual scene.
         seed: The seed of all that is random.
         margin_mm: The distance at which a region without a detection region is felt.
-        errors: The errors of the virtual needle; none by default.
+        errors: The errors of the needle; by default those that it has by itself.
 
     Raises:
         InputError: There is no needle of this name.
     """
     obstacles = obstacles_of(scene, margin_mm)
     clock = LabClock()
+    errors = errors or Errors()
+    true = errors.true_needle(scene.needle)
     if name == "phantom":
-        parameters = PhantomParameters()
-        phantom = PhantomNeedle(scene.needle, obstacles, seed, clock, parameters, reports_pose=True)
+        parameters = errors.true_phantom(PhantomParameters())
+        phantom = PhantomNeedle(true, obstacles, seed, clock, parameters, reports_pose=True)
         return Placed(phantom, clock, phantom.frame, parameters.sensing.latency_s)
     if name == "virtual":
-        errors = errors or Errors()
-        true = errors.true_needle(scene.needle)
         virtual = VirtualNeedle(true, obstacles, errors, seed, clock, reports_pose=True)
         return Placed(virtual, clock, lambda: Frame(virtual.measure(), is_lost=False), 0.0)
     raise InputError(f"the lab has no needle '{name}'\nhint: choose from {', '.join(NAMES)}")

@@ -171,7 +171,8 @@ class VirtualNeedle:
         """The position with noise, and the force."""
         tip = self._path.tip
         x, y, z = (
-            float(c + self._noise.normal(0.0, self._errors.noise_mm)) for c in tip.position_mm
+            float(c + self._noise.normal(0.0, self._errors.noise_mm or 0.0))
+            for c in tip.position_mm
         )
         return Measurement(
             time_s=self._clock.now_s(),

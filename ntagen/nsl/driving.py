@@ -33,6 +33,7 @@ _DIMENSIONS: Final[dict[Kind, Dimension]] = {
     "angle per time": TURNING,
     "data": DATA,
     "ratio": NUMBER,
+    "percentage": NUMBER,
 }
 
 CHOICES: Final = {

@@ -145,7 +145,9 @@ class Story:
 def made(drive: Drive) -> End:
     """Makes a run."""
     scene = load(drive.path)
-    chosen = choose(drive.needle, Errors(drive.noise_mm, drive.roll_rad))
+    # A needle with its own errors keeps its own noise.
+    noise_mm = drive.noise_mm if drive.needle == "virtual" else None
+    chosen = choose(drive.needle, Errors(noise_mm, drive.roll_rad))
     settings = chosen.fitting(chosen.usual(Settings(), scene), scene, drive.known)
     watched: list[Watched] = []
 
@@ -194,7 +196,6 @@ def shown(drive: Drive, ends: list[End], exists: bool, least: float) -> tuple[bo
     hit = sum(end.clearance_mm <= 0.0 for end in ends)
     seconds = [s for end in ends for s in end.synthesis_s]
     is_enough = not exists or reached >= least * len(ends)
-    # A needle with its own errors has no noise that could be chosen.
     noise = f"noise {drive.noise_mm:4g} mm" if drive.needle == "virtual" else drive.needle
     wanted = f"at least {least:.0%}" if exists else "no plan from the entry"
     print(

@@ -13,7 +13,7 @@ from ntagen.drive.simulate import simulate
 from ntagen.errors import InputError
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
-from ntagen.parameters import BY_FIELD, Given
+from ntagen.parameters import BY_FIELD, BY_WORDS, Given
 from ntagen.plan.rank import ROBUST_RANKING
 from tests.drive.runs import Diary
 from tests.oracles.synthesiser import oracle_synthesis
@@ -72,3 +72,70 @@ def test_the_log_says_which_needle_it_was() -> None:
 def test_another_name_is_refused_with_the_names_that_there_are() -> None:
     with pytest.raises(InputError, match=r"choose from grbl\+sim, phantom, virtual"):
         configure([], OPEN, needle="real")
+
+
+def given(words: str, text: str) -> Given:
+    return Given(BY_WORDS[words], BY_WORDS[words].parse(text), "row")
+
+
+def test_the_phantom_errs_as_it_is_told_and_is_driven_as_usual() -> None:
+    told = [given("noise", "0.5mm"), given("roll lag", "60deg"), given("delay", "200ms")]
+    configuration = configure(told, OPEN, needle="phantom")
+    parameters = configuration.needle.parameters
+    assert parameters is not None
+    assert parameters.sensing.noise_mm == 0.5
+    assert parameters.sensing.latency_s == 0.2
+    assert parameters.torsion.lag_rad == pytest.approx(math.radians(60.0))
+    # The driver was calibrated to the noise; rolls make up for the usual lag, not for this one.
+    assert configuration.settings.priors.noise_mm == pytest.approx(0.5, abs=1e-3)
+    assert configuration.settings.compensated_lag_rad == pytest.approx(math.radians(45.0))
+    shown = {words: value for words, value, _ in configuration.rows()}
+    assert (shown["noise"], shown["roll lag"], shown["delay"]) == ("0.5 mm", "60 deg", "0.2 s")
+
+
+def test_settings_show_what_a_needle_has_by_itself() -> None:
+    for name, expected in (("phantom", ("0.08 mm", "45 deg")), ("virtual", ("0 mm", "0 deg"))):
+        shown = {words: value for words, value, _ in configure([], OPEN, needle=name).rows()}
+        assert (shown["noise"], shown["roll lag"]) == expected
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.5, 2.0])
+def test_a_delayed_measurement_shows_where_the_needle_was(delay_s: float) -> None:
+    told = [given("delay", f"{delay_s} s"), given("noise", "0")]
+    make = configure(told, OPEN, needle="phantom").needle.make
+    assert make is not None
+    needle = make(OPEN.needle, (), 3)
+    needle.push(10.0)
+    speed_mm_per_s = OPEN.needle.speed_mm_per_s
+    behind_mm = needle.true_tip.position_mm[1] - needle.measure().position_mm[1]
+    # What is left are the distortion of the tracker and the bend of the way.
+    assert behind_mm == pytest.approx(-delay_s * speed_mm_per_s, abs=0.4)
+    needle.wait(delay_s)
+    still_mm = needle.true_tip.position_mm[1] - needle.measure().position_mm[1]
+    assert still_mm == pytest.approx(0.0, abs=0.4)
+
+
+def test_a_radius_error_is_relative_to_the_scene_and_excludes_a_true_radius() -> None:
+    wider = configure([given("radius error", "-20%")], OPEN)
+    true = wider.errors.true_needle(OPEN.needle)
+    assert true.radius_mm == pytest.approx(0.8 * OPEN.needle.radius_mm)
+    both = [given("radius error", "10%"), given("true radius", "33mm")]
+    with pytest.raises(InputError, match="both say what the true radius is"):
+        configure(both, OPEN)
+
+
+@pytest.mark.parametrize(
+    ("name", "ignored"),
+    [
+        ("virtual", {"roll lag", "delay"}),
+        ("phantom", {"roll error"}),
+        ("grbl+sim", {"roll error"}),
+        (
+            "grbl:/dev/x",
+            {w for w, p in BY_WORDS.items() if p.field.startswith("needle.")} - {"seed"},
+        ),
+    ],
+)
+def test_which_errors_mean_nothing_to_a_needle(name: str, ignored: set[str]) -> None:
+    needle = choose(name, Errors())
+    assert {words for words, one in BY_WORDS.items() if needle.ignores(one.field)} == ignored
