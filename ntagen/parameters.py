@@ -109,6 +109,17 @@ class Parameter:
         return self.option or "--" + self.words.replace(" ", "-")
 
     @property
+    def is_quantity(self) -> bool:
+        """Whether its values are numbers."""
+        return self.kind not in ("switch", "words")
+
+    @property
+    def words_and_unit(self) -> str:
+        """Its words with the usual unit, as on an axis."""
+        unit = MEASURES[self.kind].unit
+        return f"{self.words} [{unit}]" if unit else self.words
+
+    @property
     def example(self) -> str:
         """How it is written in a file, as an example."""
         return f"{self.words} {MEASURES[self.kind].example}"
@@ -165,6 +176,13 @@ class Parameter:
         """A number in the usual unit, without the digits that only the conversion makes."""
         measure = MEASURES[self.kind]
         return float(f"{value / measure.units.get(measure.unit, 1.0):.12g}")
+
+    def written(self, value: Value) -> str:
+        """A value as a text for `parse`, to 12 digits."""
+        if isinstance(value, bool | tuple):
+            return self.shown(value)
+        measure = MEASURES[self.kind]
+        return f"{self.in_usual_unit(value)!r}{measure.unit}"
 
     def shown(self, value: Value | None) -> str:
         """A value as a person writes it, in the usual unit."""

@@ -40,6 +40,7 @@ COMMANDS: Final = {
     "plot": "Draw a scene, its plans or a run.",
     "drive": "Steer a needle to the target and log the run.",
     "experiment": "Drive many simulated runs, and make a table of them.",
+    "sweep": "Show how much of an error a task stands.",
     "calibrate": "Find where the scene lies for a tracker, from pairs of points.",
     "device": "Try a device before it drives a needle.",
     "match": "Find the actions that explain measured traces of the tip.",

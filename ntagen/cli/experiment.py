@@ -2,52 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
-from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.terminal import echo, safe
-from ntagen.errors import InputError
-
-if TYPE_CHECKING:
-    from ntagen.experiment.campaign import Progress
-
-_LOST: Final = 1
-"""The exit code if some runs could not be made."""
-
-_EPILOG: Final = """\
-Exit codes: 0 all runs were made, 1 some could not be made or the driver broke in them, 2 the input
-is wrong or a result cannot be written, 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
+from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
 
 
-@click.command("experiment", epilog=_EPILOG)
+@click.command("experiment", epilog=EPILOG)
 @click.argument("file", metavar="FILE.toml", type=click.Path(path_type=Path))
 @click.option(
     "--runs",
     metavar="N",
     type=click.IntRange(1, 1_000_000),
     help="Make this many runs of each row; the number in the file does not count then.",
-)
-@click.option(
-    "--workers",
-    metavar="N",
-    type=click.IntRange(1, 1024),
-    help="Use this many processes of this machine.  [default: one for each core]",
-)
-@click.option(
-    "--dask",
-    metavar="ADDRESS",
-    help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They must "
-    "have the same ntagen, and see the same files.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on with an experiment that was interrupted. Finished runs are kept.",
 )
 @click.option(
     "-o",
@@ -57,18 +25,8 @@ is wrong or a result cannot be written, 70 internal error, 130 interrupted, 143 
     type=click.Path(path_type=Path),
     help="The folder for all results.  [default: the name of the file without .toml]",
 )
-@click.option("--no-logs", is_flag=True, help="Write no log of each run.")
-@click.option("--quiet", is_flag=True, help="Print no progress, only the table.")
-def command(
-    file: Path,
-    runs: int | None,
-    workers: int | None,
-    dask: str | None,
-    resume: bool,
-    folder: Path | None,
-    no_logs: bool,
-    quiet: bool,
-) -> int:
+@campaign_options
+def command(file: Path, runs: int | None, folder: Path | None, how: How) -> int:
     """Drive simulated needles many times, and make a table.
 
     The file says what to combine: scenarios, what the driver knows, needles, their errors, and
@@ -87,132 +45,8 @@ def command(
 
     docs/experiments.md explains the file and the table.
     """  # noqa: D301  click wants the control character
-    from ntagen.experiment.campaign import carry_out
     from ntagen.experiment.reading import read_experiment
-    from ntagen.experiment.results import FILES
-    from ntagen.experiment.scripting import crew_of
 
     experiment = read_experiment(file, runs)
     folder = folder or Path(file.stem)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is no folder\nhint: choose another one with -o")
-    try:
-        with _progress(quiet) as notify:
-            made = carry_out(
-                experiment,
-                folder,
-                crew_of(workers, dask),
-                resume=resume,
-                logs=not no_logs,
-                notify=notify,
-            )
-    except KeyboardInterrupt:
-        echo(f"finished runs are kept in {folder}; go on with --resume", err=True)
-        raise
-    document = made.document
-    _show(document)
-    echo(f"wrote {folder / FILES[0]}, {', '.join(FILES[1:])}")
-    broken = sum(row["outcomes"].get("failed", 0) for row in document["rows"])
-    for lost in document["lost"]:
-        echo(f"not made: seed {lost['seed']} of {lost['row']}: {lost['reason']}", err=True)
-    if broken:
-        echo(f"the driver broke in {broken} runs: see `reason` in table.json", err=True)
-    return _LOST if document["lost"] or broken else 0
-
-
-@contextlib.contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Gives what shows the progress: a bar on a terminal, else a line for each tenth."""
-    if quiet:
-        yield lambda _: None
-    elif sys.stderr.isatty():
-        with _bar() as show:
-            yield show
-    else:
-        yield _Lines().show
-
-
-class _Lines:
-    """Progress for a file: a line whenever another tenth is done."""
-
-    def __init__(self) -> None:
-        self._tenth = -1
-
-    def show(self, progress: Progress) -> None:
-        """Prints a line if there is something new."""
-        if progress.note:
-            echo(f"note: {progress.note}", err=True)
-        tenth = 10 * progress.done // max(1, progress.of)
-        if tenth > self._tenth:
-            self._tenth = tenth
-            echo(f"{progress.done} of {progress.of} runs{_counts(progress)}", err=True)
-
-
-def _counts(progress: Progress) -> str:
-    return f", {progress.reached} reached, {progress.hits} hits"
-
-
-@contextlib.contextmanager
-def _bar() -> Iterator[Callable[[Progress], None]]:
-    """A bar with the rate and the time left."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        SpinnerColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    console = Console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        MofNCompleteColumn(),
-        BarColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[counts]}"),
-    )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task: Any = None
-
-        def show(progress: Any) -> None:  # noqa: ANN401  rich has a class of this name, too
-            nonlocal task
-            if progress.note:
-                console.print(safe(f"note: {progress.note}"), markup=False, highlight=False)
-            if task is None:
-                task = bar.add_task("runs", total=progress.of, rate="", counts="")
-            speed = bar.tasks[0].speed
-            bar.update(
-                task,
-                completed=progress.done,
-                rate="" if speed is None else f"{speed:.1f} runs/s",
-                counts=_counts(progress).removeprefix(", "),
-            )
-
-        yield show
-
-
-def _show(document: Mapping[str, Any]) -> None:
-    """Prints the table in short."""
-    rows = [("row", "runs", "reached", "95 %", "hits", "adjustments", "synthesis", "overall")]
-    for row in document["rows"]:
-        reach, adjusted = row["reach_rate"], row["adjustments"]
-        synthesis, overall = row["synthesis_s"], row["overall_s"]
-        rows.append(
-            (
-                row["id"],
-                str(row["runs"]),
-                "" if reach is None else f"{reach:.1%}",
-                f"{row['reach_low']:.1%} to {row['reach_high']:.1%}",
-                str(row["hits"]),
-                "" if adjusted is None else f"{adjusted['avg']:.2f}",
-                "" if synthesis is None else f"{synthesis['avg']:.3f} s",
-                "" if overall is None else f"{overall['avg']:.1f} s",
-            )
-        )
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for cells in rows:
-        first, *others = zip(cells, widths, strict=True)
-        echo("  ".join([first[0].ljust(first[1]), *(c.rjust(w) for c, w in others)]).rstrip())
+    return ended(made(experiment, folder, how), folder)

@@ -65,6 +65,11 @@ def needle_options(command: Callable[..., int | None]) -> Callable[..., int | No
     return _with_options(command, [p for p in PARAMETERS if p.field.startswith(f"{NEEDLE}.")])
 
 
+def sweeping_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Adds all options but the seed, in the same way: a sweep has many seeds."""
+    return _with_options(command, [p for p in PARAMETERS if p.field != f"{NEEDLE}.seed"])
+
+
 def _with_options(
     command: Callable[..., int | None], parameters: Sequence[Parameter]
 ) -> Callable[..., int | None]:

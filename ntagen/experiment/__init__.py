@@ -11,6 +11,7 @@ of the table. A *block* is some runs of a row that one worker makes one after th
     crew, local, dask_crew   who makes the blocks
     campaign      all together: what is missing is made, and the table is written
     statistics, table, paper, writing, pictures, report, results   from records to what people read
+    sweeps, one_sweep   rows that differ in one quantity, and an experiment that is nothing else
     scripting     all of it as a function for scripts
 
 What always holds: a run is on the disk, its log first, before anybody is told of it; and the table

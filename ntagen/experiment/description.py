@@ -49,6 +49,14 @@ class Row:
         given.append(Given(BY_FIELD["needle.seed"], seed, "row"))
         return configure((*task.given, *given), task.scene, self.known, self.needle)
 
+    def numbers(self) -> dict[str, float]:
+        """The settings that are quantities, by words and usual unit, in this unit."""
+        return {
+            BY_FIELD[field].words_and_unit: BY_FIELD[field].in_usual_unit(value)
+            for field, value in self.values.items()
+            if BY_FIELD[field].is_quantity and not isinstance(value, tuple)
+        }
+
     def shown_values(self) -> dict[str, str]:
         """The settings by their words, as a person writes them."""
         return {

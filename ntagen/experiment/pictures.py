@@ -70,6 +70,46 @@ def over_depth(document: Mapping[str, Any], row: str) -> Figure:
     return figure
 
 
+def sensitivity(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> Figure:
+    """Rates and margins over a quantity.
+
+    Args:
+        document: The table.
+        sweep: One of its ``sweeps``.
+    """
+    figure = _figure(5.2, 0.8)
+    figure.subplots_adjust(hspace=0.12, wspace=0.22)
+    (reach, hit), (clear, inside) = figure.subplots(2, 2, sharex=True)
+    rows = {row["id"]: row for row in document["rows"]}
+    places = list(zip(sweep["values"], sweep["rows"], strict=True))
+    for axes, name in ((reach, "reach"), (hit, "hit")):
+        found = [(x, rows[row]) for x, row in places if rows[row][f"{name}_rate"] is not None]
+        lines = [[100.0 * row[f"{name}_{k}"] for _, row in found] for k in ("low", "high", "rate")]
+        _draw_band(axes, [x for x, _ in found], lines[0], lines[1], "95 % interval")
+        axes.plot([x for x, _ in found], lines[2], "o-", color=_LINE, label="runs")
+        axes.legend(frameon=False, fontsize=8)
+    reach.set_ylim(-3.0, 103.0)
+    hit.set_ylim(bottom=-0.03 * hit.get_ylim()[1])
+    runs = {row: _runs(document, row) for _, row in places}
+    margins = {x: [one["clearance_mm"] for one in runs[row]] for x, row in places}
+    depths = {x: [-one["target_mm"] for one in runs[row] if one["is_reached"]] for x, row in places}
+    for axes, values in ((clear, margins), (inside, depths)):
+        kept = {x: [one for one in found if one is not None] for x, found in values.items()}
+        _draw_bands(axes, {x: found for x, found in kept.items() if found}, min, "o")
+        axes.set_xlabel(sweep["over"])
+        if axes.lines:
+            axes.axhline(0.0, color=_HIT, linewidth=1.0)
+    reach.set_ylabel("target reached [%]")
+    hit.set_ylabel("critical region hit [%]")
+    clear.set_ylabel("least distance to\ncritical regions [mm]")
+    inside.set_ylabel("depth in the target,\nif it was reached [mm]")
+    for axes in figure.axes:
+        axes.grid(True, color=_GRID)
+        axes.set_axisbelow(True)
+    figure.align_ylabels()
+    return figure
+
+
 def felt(document: Mapping[str, Any], row: str, scene: Scene) -> Figure:
     """Where the force rose, in two projections; regions that are not convex are drawn as convex."""
     figure = _figure(4.6)
@@ -163,6 +203,7 @@ def _draw_bands(
     axes: Any,  # noqa: ANN401  matplotlib's own stubs leave axes open
     values: Mapping[int, Sequence[float]],
     worst: Any,  # noqa: ANN401  min or max
+    marker: str = "",
 ) -> None:
     if not values:
         axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color=_PAPER)
@@ -173,10 +214,20 @@ def _draw_bands(
     low, middle, high = zip(
         *(np.percentile(values[depth], (5.0, 50.0, 95.0)) for depth in depths), strict=True
     )
-    axes.fill_between(depths, low, high, color=_BAND, alpha=0.6, linewidth=0, label="5 to 95 %")
-    axes.plot(depths, middle, color=_LINE, label="median")
+    _draw_band(axes, depths, low, high, "5 to 95 %")
+    axes.plot(depths, middle, marker=marker, color=_LINE, label="median")
     axes.plot(depths, [worst(values[d]) for d in depths], ":", color=_HIT, label="worst run")
     axes.legend(frameon=False, fontsize=8)
+
+
+def _draw_band(
+    axes: Any,  # noqa: ANN401
+    x: Sequence[float],
+    low: Sequence[float],
+    high: Sequence[float],
+    label: str,
+) -> None:
+    axes.fill_between(x, low, high, color=_BAND, alpha=0.6, linewidth=0, label=label)
 
 
 def _outline(region: Region, across: int, depth: int, colour: str) -> Any:  # noqa: ANN401

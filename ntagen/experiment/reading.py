@@ -30,7 +30,7 @@ ERRORS: Final = {
     for parameter in BY_WORDS.values()
     if parameter.field.startswith(f"{NEEDLE}.") and parameter.words != "seed"
 }
-"""The keys of a row for the errors of the virtual needle."""
+"""The keys of a row for the errors of a simulated needle."""
 
 DRIVE: Final = {parameter.words: parameter for parameter in STEERING}
 """The keys of the table ``drive`` of a row: the words of ``drive { … }``."""
@@ -62,7 +62,19 @@ def read_experiment(path: Path, runs: int | None = None) -> Experiment:
         raise InputError(f"{path}: this is no text in UTF-8: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: {error}\nhint: the file is written in TOML") from error
-    reader = _Reader(path, text, runs)
+    return _checked(_Reader(path, text, runs), document)
+
+
+def experiment_of(document: Mapping[str, Any]) -> Experiment:
+    """The experiment of a document that no file holds; paths are relative to this process.
+
+    Raises:
+        InputError: It or one of its scenes has mistakes; the message has all of them.
+    """
+    return _checked(_Reader(Path(), "", None), document)
+
+
+def _checked(reader: _Reader, document: Mapping[str, Any]) -> Experiment:
     experiment = reader.experiment(document)
     if reader.mistakes:
         raise InputError("\n".join(dict.fromkeys(reader.mistakes)))
@@ -143,9 +155,13 @@ class _Reader:
             self._note(number, "known", *_split(str(error).replace(" in --known", "")))
             return None
         try:
-            row.configuration(task, seeds[0])
+            configuration = row.configuration(task, seeds[0])
         except InputError as error:
             self._note(number, "drive", *_split(str(error)))
+            return None
+        for key in (key for key in chosen if configuration.needle.ignores(_field_of(key))):
+            cause = f"it means nothing to {configuration.needle.kind}"
+            self._note(number, key, cause, "leave it out, or choose another needle")
             return None
         return replace(row, digest=digest_of(row, task))
 
@@ -191,6 +207,9 @@ class _Reader:
             except ValueError as error:
                 cause, _, hint = str(error).partition("; ")
                 self._note(number, key, cause, hint)
+        for one in (one for place, one in enumerate(found) if one in found[:place]):
+            cause = f"{parameter.shown(one)} stands there twice"
+            self._note(number, key, cause, "leave one of them out")
         return found
 
     def _seeds(self, number: int, table: Mapping[str, Any]) -> tuple[int, ...] | None:
@@ -303,7 +322,9 @@ class _Reader:
         place = f"{self.path}:{line}" if line else str(self.path)
         row = f"row {where + 1}: " if isinstance(where, int) else ""
         label = f"`{key}`: " if key and "unknown key" not in cause and key != "row" else ""
-        self.mistakes.append(f"{place}: {row}{label}{cause}" + (f"\nhint: {hint}" if hint else ""))
+        # What no file holds has no place.
+        where_it_is = f"{place}: {row}" if self.path.name else ""
+        self.mistakes.append(where_it_is + label + cause + (f"\nhint: {hint}" if hint else ""))
 
 
 def _with_defaults(defaults: Mapping[str, Any], table: Mapping[str, Any]) -> dict[str, Any]:
@@ -349,7 +370,8 @@ def _from(found: Sequence[int], runs: int) -> tuple[int, ...]:
 
 def _slug(text: str) -> str:
     """The text as a part of a file's name."""
-    return re.sub(r"[^A-Za-z0-9._+-]+", "_", text.replace(" mm", "mm").replace(" deg", "deg"))
+    joined = re.sub(r" (mm|deg|s)$", r"\1", text.replace(" %", "pct"))
+    return re.sub(r"[^A-Za-z0-9._+-]+", "_", joined)
 
 
 def _split(message: str) -> tuple[str, str]:

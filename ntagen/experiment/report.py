@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from ntagen.experiment import pictures
+from ntagen.experiment.sweeps import conclusions_of
 from ntagen.experiment.writing import HEADINGS, NOTE, lines_of
 from ntagen.scene import Scene
 
@@ -45,6 +46,7 @@ def report_of(document: Mapping[str, Any], scenes: Mapping[str, Scene]) -> str:
         *_lost(document),
         "<h2>Rates</h2><p>Dots: what was counted. Bars: 95 % intervals. Diamonds: the paper.</p>",
         pictures.svg_of(pictures.rates(document)),
+        *_sweeps(document),
     ]
     for row in document["rows"]:
         if row["runs"]:
@@ -82,6 +84,17 @@ def worst_of(document: Mapping[str, Any], row: str, count: int = _WORST) -> list
         )
 
     return sorted((run for run in document["runs"] if run["row"] == row), key=badness)[:count]
+
+
+def _sweeps(document: Mapping[str, Any]) -> Iterator[str]:
+    """The part of the page about rows that differ in one quantity only."""
+    if document["sweeps"]:
+        yield "<h2>Sensitivity</h2><p>Each value with the same seeds. Shaded: 95 % intervals of "
+        yield "rates; 5 to 95 % of runs. Between the dots, nothing was tried.</p>"
+    for sweep in document["sweeps"]:
+        yield f"<h3>{html.escape(sweep['name'])}</h3>"
+        yield f"<p>{'<br>'.join(map(html.escape, conclusions_of(document, sweep)))}</p>"
+        yield pictures.svg_of(pictures.sensitivity(document, sweep))
 
 
 def _section(

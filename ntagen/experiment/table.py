@@ -16,6 +16,7 @@ from ntagen.experiment.identity import identity
 from ntagen.experiment.paper import PAPER
 from ntagen.experiment.record import Run
 from ntagen.experiment.statistics import Spread, rate_of, spread_of
+from ntagen.experiment.sweeps import sweeps_of
 
 FORMAT_VERSION: Final = 1
 
@@ -54,6 +55,7 @@ def document_of(
             for seed in sorted(row.seeds)
             if (row.id, seed) in runs
         ],
+        "sweeps": [sweep.to_json() for sweep in sweeps_of(experiment.rows)],
         "lost": [
             {"row": row, "seed": seed, "reason": reason}
             for (row, seed), reason in sorted(lost.items())
@@ -80,6 +82,7 @@ def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
         "known": row.known,
         "needle": row.needle,
         "settings": row.shown_values(),
+        "values": row.numbers(),
         "wanted": len(row.seeds),
         "runs": len(runs),
         "reached": reach.count,

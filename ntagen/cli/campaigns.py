@@ -1,0 +1,243 @@
+"""What `ntagen experiment` and `ntagen sweep` share: options, progress, the table, the end."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from ntagen.cli.terminal import echo, safe
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.experiment.campaign import Progress
+    from ntagen.experiment.description import Experiment
+    from ntagen.experiment.results import Campaign
+
+_LOST: Final = 1
+"""The exit code if some runs could not be made."""
+
+EPILOG: Final = """\
+Exit codes: 0 all runs were made, 1 some could not be made or the driver broke in them, 2 the input
+is wrong or a result cannot be written, 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """How the runs of a campaign are made; see the help of the options.
+
+    Attributes:
+        workers: So many processes; None for one on each core.
+        dask: The address of a Dask scheduler, or None.
+        resume: Whether finished runs are kept.
+        logs: Whether each run has a log.
+        quiet: Whether no progress is printed.
+    """
+
+    workers: int | None
+    dask: str | None
+    resume: bool
+    logs: bool
+    quiet: bool
+
+
+_OPTIONS: Final = (
+    click.option(
+        "--workers",
+        metavar="N",
+        type=click.IntRange(1, 1024),
+        help="Use this many processes of this machine.  [default: one for each core]",
+    ),
+    click.option(
+        "--dask",
+        metavar="ADDRESS",
+        help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They must "
+        "have the same ntagen, and see the same files.",
+    ),
+    click.option(
+        "--resume",
+        is_flag=True,
+        help="Go on with an experiment that was interrupted. Finished runs are kept.",
+    ),
+    click.option("--no-logs", is_flag=True, help="Write no log of each run."),
+    click.option("--quiet", is_flag=True, help="Print no progress, only the table."),
+)
+
+
+def campaign_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Adds the options; the command gets their values as `how`."""
+
+    @functools.wraps(command)
+    def with_how(
+        *,
+        workers: int | None,
+        dask: str | None,
+        resume: bool,
+        no_logs: bool,
+        quiet: bool,
+        **values: object,
+    ) -> int | None:
+        return command(how=How(workers, dask, resume, not no_logs, quiet), **values)
+
+    decorated: Callable[..., int | None] = with_how
+    for option in reversed(_OPTIONS):
+        decorated = option(decorated)
+    return decorated
+
+
+def made(experiment: Experiment, folder: Path, how: How) -> Campaign:
+    """Makes a campaign, with its progress, and prints its table.
+
+    Raises:
+        InputError: The folder cannot be used, or somebody cannot work.
+    """
+    from ntagen.experiment.campaign import carry_out
+    from ntagen.experiment.scripting import crew_of
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is no folder\nhint: choose another one with -o")
+    try:
+        with _progress(how.quiet) as notify:
+            campaign = carry_out(
+                experiment,
+                folder,
+                crew_of(how.workers, how.dask),
+                resume=how.resume,
+                logs=how.logs,
+                notify=notify,
+            )
+    except KeyboardInterrupt:
+        echo(f"finished runs are kept in {folder}; go on with --resume", err=True)
+        raise
+    _show(campaign.document)
+    for sweep in campaign.document["sweeps"]:
+        _conclude(campaign.document, sweep)
+    return campaign
+
+
+def ended(campaign: Campaign, folder: Path, *more: Path) -> int:
+    """Says what was written and what could not be made; returns the exit code."""
+    from ntagen.experiment.results import FILES
+
+    document = campaign.document
+    echo(f"wrote {folder / FILES[0]}, {', '.join([*FILES[1:], *map(str, more)])}")
+    broken = sum(row["outcomes"].get("failed", 0) for row in document["rows"])
+    for lost in document["lost"]:
+        echo(f"not made: seed {lost['seed']} of {lost['row']}: {lost['reason']}", err=True)
+    if broken:
+        echo(f"the driver broke in {broken} runs: see `reason` in table.json", err=True)
+    return _LOST if document["lost"] or broken else 0
+
+
+def _conclude(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> None:
+    """Prints what a sweep shows."""
+    from ntagen.experiment.sweeps import conclusions_of
+
+    if len(document["sweeps"]) > 1:
+        echo(f"{sweep['name']}:")
+    for line in conclusions_of(document, sweep):
+        echo(line)
+
+
+@contextlib.contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """Gives what shows the progress: a bar on a terminal, else a line for each tenth."""
+    if quiet:
+        yield lambda _: None
+    elif sys.stderr.isatty():
+        with _bar() as show:
+            yield show
+    else:
+        yield _Lines().show
+
+
+class _Lines:
+    """Progress for a file: a line whenever another tenth is done."""
+
+    def __init__(self) -> None:
+        self._tenth = -1
+
+    def show(self, progress: Progress) -> None:
+        """Prints a line if there is something new."""
+        if progress.note:
+            echo(f"note: {progress.note}", err=True)
+        tenth = 10 * progress.done // max(1, progress.of)
+        if tenth > self._tenth:
+            self._tenth = tenth
+            echo(f"{progress.done} of {progress.of} runs{_counts(progress)}", err=True)
+
+
+def _counts(progress: Progress) -> str:
+    return f", {progress.reached} reached, {progress.hits} hits"
+
+
+@contextlib.contextmanager
+def _bar() -> Iterator[Callable[[Progress], None]]:
+    """A bar with the rate and the time left."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    columns = (
+        SpinnerColumn(),
+        MofNCompleteColumn(),
+        BarColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[counts]}"),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task: Any = None
+
+        def show(progress: Any) -> None:  # noqa: ANN401  rich has a class of this name, too
+            nonlocal task
+            if progress.note:
+                console.print(safe(f"note: {progress.note}"), markup=False, highlight=False)
+            if task is None:
+                task = bar.add_task("runs", total=progress.of, rate="", counts="")
+            speed = bar.tasks[0].speed
+            bar.update(
+                task,
+                completed=progress.done,
+                rate="" if speed is None else f"{speed:.1f} runs/s",
+                counts=_counts(progress).removeprefix(", "),
+            )
+
+        yield show
+
+
+def _show(document: Mapping[str, Any]) -> None:
+    """Prints the table in short."""
+    rows = [("row", "runs", "reached", "95 %", "hits", "adjustments", "synthesis", "overall")]
+    for row in document["rows"]:
+        reach, adjusted = row["reach_rate"], row["adjustments"]
+        synthesis, overall = row["synthesis_s"], row["overall_s"]
+        rows.append(
+            (
+                row["id"],
+                str(row["runs"]),
+                "" if reach is None else f"{reach:.1%}",
+                f"{row['reach_low']:.1%} to {row['reach_high']:.1%}",
+                str(row["hits"]),
+                "" if adjusted is None else f"{adjusted['avg']:.2f}",
+                "" if synthesis is None else f"{synthesis['avg']:.3f} s",
+                "" if overall is None else f"{overall['avg']:.1f} s",
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for cells in rows:
+        first, *others = zip(cells, widths, strict=True)
+        echo("  ".join([first[0].ljust(first[1]), *(c.rjust(w) for c, w in others)]).rstrip())

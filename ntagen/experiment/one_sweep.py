@@ -1,0 +1,112 @@
+"""The experiment that is one sweep: a task, a quantity, and its values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from ntagen.errors import InputError
+from ntagen.experiment.description import Experiment
+from ntagen.experiment.reading import ERRORS, experiment_of
+from ntagen.nsl.diagnostics import suggest
+from ntagen.parameters import BY_WORDS, MEASURES, NEEDLE, Parameter
+
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_USUAL: Final = ("noise", "radius error", "roll lag", "delay")
+
+
+def sweep_of_task(
+    task: Path,
+    over: Parameter,
+    values: str,
+    *,
+    known: str,
+    needle: str,
+    runs: int,
+    settings: Mapping[str, str],
+) -> Experiment:
+    """A sweep as an experiment: a row for each value.
+
+    Args:
+        task: The file of the task.
+        over: What is swept.
+        values: Its values, as in ``0, 0.5, 1 mm``.
+        known: The critical regions that the driver knows.
+        needle: The name of the simulated needle.
+        runs: The number of runs for each value: their seeds are 1, 2, …
+        settings: The other settings, by their words.
+
+    Raises:
+        InputError: Something in it is wrong, or cannot be driven.
+    """
+    if over.words in settings:
+        raise InputError(
+            f"{over.flag} fixes what is swept\nhint: leave it out, or sweep something else"
+        )
+    row: dict[str, object] = {"scenario": str(task), "known": known, "needle": needle}
+    row["seeds"] = runs
+    drive: dict[str, object] = {}
+    for words, value in {**settings, over.words: listed_values(over, values)}.items():
+        key = words.replace(" ", "_")
+        if key in ERRORS:
+            row[key] = value
+        else:
+            drive[words] = value
+    return experiment_of(
+        {"name": f"{task.stem} over {over.words}", "row": [row | {"drive": drive}]}
+    )
+
+
+def quantity_of(text: str) -> Parameter:
+    """The setting that can be swept and that a person calls so.
+
+    Raises:
+        InputError: There is none.
+    """
+    words = re.sub(r"[\s_-]+", " ", text.strip().removeprefix("--"))
+    options = {one.flag.removeprefix("--").replace("-", " "): one for one in BY_WORDS.values()}
+    found = BY_WORDS.get(words) or options.get(words)
+    if found is None:
+        near = suggest(words, BY_WORDS)
+        hint = f"did you mean {_as_option(near)}?" if near else f"choose from {_usual()}"
+        more = "; `ntagen drive --help` lists all settings"
+        raise InputError(f"there is no setting '{text}'\nhint: {hint}{more}")
+    if not found.is_quantity or found.field == f"{NEEDLE}.seed":
+        kind = "the seeds are the same for all values" if found.is_quantity else "it is no quantity"
+        raise InputError(f"`{found.words}` cannot be swept: {kind}\nhint: choose from {_usual()}")
+    return found
+
+
+def listed_values(over: Parameter, text: str) -> list[str]:
+    """The values of a list with commas; the unit of the last one holds for numbers without one.
+
+    Raises:
+        InputError: There are fewer than two, or it cannot be told which unit a number has.
+    """
+    values = [one.strip() for one in text.split(",")]
+    unit = MEASURES[over.kind].unit
+    hint = f"\nhint: write for example --values 1,2,3{unit}"
+    if "" in values:
+        raise InputError(f"--values: a value is missing in '{text}'{hint}")
+    if len(values) == 1:
+        raise InputError(f"--values: one value is no sweep{hint}")
+    plain = [one for one in values if _NUMBER.fullmatch(one)]
+    last = _NUMBER.match(values[-1])
+    if len(plain) == len(values) or last is None:
+        return values
+    if values[-1] in plain:
+        raise InputError(
+            f"--values: it cannot be told which unit {values[-1]} has\n"
+            f"hint: give each value a unit, or only the last one, as in 1,2,3{unit}"
+        )
+    return [one + values[-1][last.end() :] if one in plain else one for one in values]
+
+
+def _as_option(words: str) -> str:
+    return words.replace(" ", "-")
+
+
+def _usual() -> str:
+    return ", ".join(map(_as_option, _USUAL))
