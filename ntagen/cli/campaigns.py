@@ -116,8 +116,7 @@ def made(experiment: Experiment, folder: Path, how: How) -> Campaign:
         echo(f"finished runs are kept in {folder}; go on with --resume", err=True)
         raise
     _show(campaign.document)
-    for sweep in campaign.document["sweeps"]:
-        _conclude(campaign.document, sweep)
+    _conclude(campaign.document)
     return campaign
 
 
@@ -135,14 +134,16 @@ def ended(campaign: Campaign, folder: Path, *more: Path) -> int:
     return _LOST if document["lost"] or broken else 0
 
 
-def _conclude(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> None:
-    """Prints what a sweep shows."""
+def _conclude(document: Mapping[str, Any]) -> None:
+    """Prints what the sweeps show, each kind of rows with its name if there are several."""
     from ntagen.experiment.sweeps import conclusions_of
 
-    if len(document["sweeps"]) > 1:
-        echo(f"{sweep['name']}:")
-    for line in conclusions_of(document, sweep):
-        echo(line)
+    names = [sweep["name"] for sweep in document["sweeps"]]
+    for number, sweep in enumerate(document["sweeps"]):
+        if len(set(names)) > 1 and names[number] not in names[max(0, number - 1) : number]:
+            echo(f"{names[number]}:")
+        for line in conclusions_of(document, sweep):
+            echo(line)
 
 
 @contextlib.contextmanager

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 from ntagen.errors import InputError
-from ntagen.experiment.description import Experiment
+from ntagen.experiment.description import Experiment, Row
 from ntagen.experiment.reading import ERRORS, experiment_of
+from ntagen.nsl import load_task
 from ntagen.nsl.diagnostics import suggest
 from ntagen.parameters import BY_WORDS, MEASURES, NEEDLE, Parameter
 
@@ -54,9 +56,22 @@ def sweep_of_task(
             row[key] = value
         else:
             drive[words] = value
-    return experiment_of(
-        {"name": f"{task.stem} over {over.words}", "row": [row | {"drive": drive}]}
-    )
+    row["drive"] = drive
+    experiment = experiment_of({"name": f"{task.stem} over {over.words}", "row": [row]})
+    for one in experiment.rows:
+        _require_effect(one, over)
+    return experiment
+
+
+def _require_effect(row: Row, over: Parameter) -> None:
+    """Refuses a value in whose place the driver uses another one."""
+    used = row.configuration(load_task(row.scenario), row.seeds[0]).value(over)
+    wanted = row.values[over.field]
+    if isinstance(used, float | int) and not math.isclose(used, float(wanted)):  # type: ignore[arg-type]
+        raise InputError(
+            f"`{over.words}` cannot be {over.shown(wanted)} here: {over.shown(used)} follows from "
+            "the needle and the scene\nhint: choose other values, or sweep something else"
+        )
 
 
 def quantity_of(text: str) -> Parameter:
@@ -70,9 +85,9 @@ def quantity_of(text: str) -> Parameter:
     found = BY_WORDS.get(words) or options.get(words)
     if found is None:
         near = suggest(words, BY_WORDS)
-        hint = f"did you mean {_as_option(near)}?" if near else f"choose from {_usual()}"
-        more = "; `ntagen drive --help` lists all settings"
-        raise InputError(f"there is no setting '{text}'\nhint: {hint}{more}")
+        others = f"choose from {_usual()}, and the settings of `ntagen sweep --help`"
+        hint = f"did you mean {_as_option(near)}?" if near else others
+        raise InputError(f"there is no setting '{text}'\nhint: {hint}")
     if not found.is_quantity or found.field == f"{NEEDLE}.seed":
         kind = "the seeds are the same for all values" if found.is_quantity else "it is no quantity"
         raise InputError(f"`{found.words}` cannot be swept: {kind}\nhint: choose from {_usual()}")

@@ -92,7 +92,7 @@ def _sweeps(document: Mapping[str, Any]) -> Iterator[str]:
         yield "<h2>Sensitivity</h2><p>Each value with the same seeds. Shaded: 95 % intervals of "
         yield "rates; 5 to 95 % of runs. Between the dots, nothing was tried.</p>"
     for sweep in document["sweeps"]:
-        yield f"<h3>{html.escape(sweep['name'])}</h3>"
+        yield f"<h3>{html.escape(sweep['over'])}: {html.escape(sweep['name'])}</h3>"
         yield f"<p>{'<br>'.join(map(html.escape, conclusions_of(document, sweep)))}</p>"
         yield pictures.svg_of(pictures.sensitivity(document, sweep))
 

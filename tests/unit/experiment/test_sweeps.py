@@ -237,6 +237,7 @@ def test_the_same_sweep_from_a_file_has_the_same_runs(tmp_path: Path) -> None:
         ("noise", "0,1mm", {"known": "C9"}, "C9"),
         ("noise", "0,1mm", {"settings": {"noise": "1mm"}}, "--noise fixes what is swept"),
         ("push", "2,20mm", {}, "must be greater than `push`"),
+        ("force noise", "0.1,0.2N", {}, "cannot be 0.1 N here: 0.02 N follows from the needle"),
         ("radius error", "0,1%", {"settings": {"true radius": "9mm"}}, "both say"),
     ],
 )
