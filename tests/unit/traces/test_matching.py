@@ -10,12 +10,18 @@ import numpy as np
 import pytest
 
 import ntagen
+from ntagen import checker
 from ntagen.errors import InputError
 from ntagen.needle.kinematics import push, roll
+from ntagen.needle.vectors import add, cross, scale, subtract, unit
 from ntagen.plan.actions import Roll
+from ntagen.plan.extract import leads_to_target
+from ntagen.render import render
+from ntagen.scene import Vector
 from ntagen.traces.grid import GRID_DEG, _nearest, frame_at
 from ntagen.traces.matching import Match, Options, match_trace
 from ntagen.traces.search import Space, Start
+from tests.steering import sphere
 from tests.traces import BENCH, FOLDER, MAKE, points_of, trace
 
 STEP_MM = 2.0
@@ -210,3 +216,31 @@ def test_what_is_no_trace_is_refused(points: object) -> None:
 def test_files_can_be_given_by_their_paths() -> None:
     found = ntagen.match(FOLDER / "bench.nsl", str(FOLDER / "two_rolls.csv"))
     check_rolls(found, MAKE.make("two_rolls", 1).rolls)
+
+
+ROUNDED_MM = 4.0
+"""The model rounds each push to thousandths of a mm and of a radian; in 50 pushes, that adds up."""
+
+
+@pytest.mark.parametrize("kind", MAKE.KINDS)
+def test_the_generated_model_can_make_a_matched_plan(kind: str) -> None:
+    made = MAKE.make(kind, 1, noise_mm=0.05)
+    found = ntagen.match(BENCH, np.array(made.points), radius="fit")
+    start_mm, end_mm = found.needle.tip.position_mm, found.plan.end(found.needle).position_mm
+    # The model gives up a path that goes back along the axis; a trace of 100 mm turns by 95 deg.
+    axis = unit(subtract(end_mm, start_mm))
+
+    def makes(target_mm: Vector) -> tuple[bool, float]:
+        target = sphere("T1", "target", target_mm, ROUNDED_MM)
+        scene = replace(BENCH, needle=found.needle, axis=axis, targets=(target,))
+        walk = checker.load(render(scene.expected(), only_plans=True)).walk("interpreter")
+        leads = leads_to_target(walk, found.plan, scene)
+        return leads, walk.variables["needle_progress"] / scene.resolution_per_mm
+
+    is_made, depth_mm = makes(end_mm)
+    assert is_made
+    # It ends with the first push into the target, from where less than its diameter is left.
+    assert found.plan.length_mm - 2.5 * ROUNDED_MM < depth_mm <= found.plan.length_mm
+    tip = found.plan.end(found.needle)
+    beside_mm = add(end_mm, scale(15.0, cross(tip.heading, tip.bevel)))
+    assert not makes(beside_mm)[0]
