@@ -70,6 +70,15 @@ _FIRST: Final = "20mm"
     "deviation by 40 %, at most those of the environment]",
 )
 @click.option(
+    "--from",
+    "from_mm",
+    metavar="LENGTH",
+    type=LENGTH,
+    default="0mm",
+    help="Match the trace from this depth on, for example after what was no insertion yet. All "
+    "other depths are counted from there.",
+)
+@click.option(
     "--until",
     "until_mm",
     metavar="LENGTH",
@@ -106,6 +115,7 @@ def command(
     first_mm: float,
     radius: Any,  # noqa: ANN401  one of the choices
     rolls: int | None,
+    from_mm: float,
     until_mm: float | None,
     predict: bool,
     columns: str | None,
@@ -137,11 +147,11 @@ def command(
     task = load_task(environment, include=include)
     show_warnings([warning.render() for warning in task.warnings])
     options = Options(start=start, radius=radius, rolls=rolls, first_mm=first_mm)
-    upto_mm = math.inf if until_mm is None else until_mm
+    part_mm = (math.inf if until_mm is None else until_mm, from_mm)
     found = []
     for path in traces:
         try:
-            one = _matched(task.scene, path, Columns(columns, unit), options, upto_mm, predict)
+            one = _matched(task.scene, path, Columns(columns, unit), options, part_mm, predict)
         except InputError as error:
             # The other traces are matched all the same.
             echo(f"error: {error}", err=True)
@@ -158,16 +168,21 @@ def command(
 
 
 def _matched(
-    scene: Scene, path: Path, columns: Columns, options: Options, until_mm: float, predicts: bool
+    scene: Scene,
+    path: Path,
+    columns: Columns,
+    options: Options,
+    part_mm: tuple[float, float],
+    predicts: bool,
 ) -> Matched:
-    """The match of a file, with predictions if they are wanted."""
+    """The match of a file, or of its part up to a depth and from another one on."""
     from ntagen.cli.match_tables import Matched
     from ntagen.traces.matching import match_trace
     from ntagen.traces.prediction import predict
     from ntagen.traces.reading import read_samples
     from ntagen.traces.trace import trace_of
 
-    trace = trace_of(read_samples(path, columns), until_mm)
+    trace = trace_of(read_samples(path, columns), *part_mm)
     match = match_trace(scene, trace, options)
     return Matched(path, match, predict(scene, trace, options) if predicts else None)
 

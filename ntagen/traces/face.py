@@ -24,6 +24,7 @@ def match(
     rolls: int | None = None,
     first_mm: float = FIRST_MM,
     until_mm: float = math.inf,
+    from_mm: float = 0.0,
     columns: str | None = None,
 ) -> Match:
     """The pushes, rolls and start of a needle that explain a measured trace of its tip best.
@@ -37,6 +38,7 @@ def match(
         rolls: The number of rolls; None for as many as explain much more.
         first_mm: The length of the first part that gives the start, unless it is free.
         until_mm: The trace is matched up to this depth.
+        from_mm: The trace is matched from this depth on; all other depths are counted from there.
         columns: Which columns of a file are x, y and z.
 
     Returns:
@@ -55,7 +57,7 @@ def match(
     else:
         samples = samples_of(points)
     options = Options(start=start, radius=radius, rolls=rolls, first_mm=first_mm)
-    return match_trace(scene, trace_of(samples, until_mm), options)
+    return match_trace(scene, trace_of(samples, until_mm, from_mm), options)
 
 
 def samples_of(points_mm: ArrayLike) -> Samples:

@@ -71,6 +71,10 @@ class Samples:
         """The first samples."""
         return replace(self, points_mm=self.points_mm[:count], lines=self.lines[:count])
 
+    def beyond(self, count: int) -> Samples:
+        """All but the first samples."""
+        return replace(self, points_mm=self.points_mm[count:], lines=self.lines[count:])
+
     def place(self, index: int) -> str:
         """Where a sample stands, for messages."""
         separator = ":" if self.word == "line" else f": {self.word} "
@@ -103,18 +107,20 @@ class Trace:
         return float(self.depths_mm[-1]) if len(self.depths_mm) else 0.0
 
 
-def trace_of(samples: Samples, until_mm: float = math.inf) -> Trace:
+def trace_of(samples: Samples, until_mm: float = math.inf, from_mm: float = 0.0) -> Trace:
     """Makes samples ready.
 
     Args:
         samples: The samples.
         until_mm: Samples from this depth on are left out.
+        from_mm: Samples before the first one at this depth are left out; all other depths are
+            counted from there.
 
     Raises:
         InputError: There are too few, they are no insertion, or the needle goes back.
     """
     _require_numbers(samples)
-    trace = _prepared(samples)
+    trace = _prepared(_without_beginning(samples, from_mm) if from_mm > 0.0 else samples)
     trace = _shortened(trace, until_mm) if trace.length_mm > until_mm else trace
     _require_insertion(trace)
     _require_forward(trace)
@@ -165,6 +171,22 @@ def _prepared(samples: Samples, last: int | None = None) -> Trace:
         outliers=outliers,
         pulled_out_at=None if end is None else int(kept[end]),
     )
+
+
+def _without_beginning(samples: Samples, from_mm: float) -> Samples:
+    """The samples from the first one at a depth on.
+
+    Raises:
+        InputError: None is so deep.
+    """
+    kept = np.flatnonzero(~_outliers(samples.points_mm))
+    depths_mm = _depths(samples.points_mm[kept])
+    if depths_mm[-1] < from_mm:
+        raise InputError(
+            f"{samples.name}: the trace has {depths_mm[-1]:.1f} mm, and it should begin at a depth "
+            f"of {from_mm:g} mm\nhint: give a smaller --from"
+        )
+    return samples.beyond(int(kept[np.argmax(depths_mm >= from_mm)]))
 
 
 def _shortened(trace: Trace, until_mm: float) -> Trace:
@@ -260,7 +282,7 @@ def _require_insertion(trace: Trace) -> None:
         raise InputError(
             f"{samples.place(trace.pulled_out_at)}: the tip jumps back by more than {JUMP_MM:g} mm "
             f"after {length_mm:.1f} mm, and at least {SHORTEST_MM:g} mm of insertion are needed\n"
-            "hint: delete what was measured before the insertion"
+            "hint: --from LENGTH leaves out what was measured before the insertion"
         )
     extent_mm = float(np.linalg.norm(samples.points_mm - samples.points_mm[0], axis=1).max())
     if 1e-3 * SHORTEST_MM <= extent_mm < _METRES_MM:
@@ -299,6 +321,6 @@ def _require_forward(trace: Trace) -> None:
             raise InputError(
                 f"{trace.samples.place(trace.indices[foremost])}: the trace turns back at a depth "
                 f"of {depth_mm:.1f} mm\n"
-                f"hint: --until {math.floor(depth_mm):d}mm matches what comes before it; or delete "
-                "what is no insertion"
+                f"hint: --until {math.floor(depth_mm):d}mm matches what comes before it, and a "
+                "greater --from LENGTH what comes after it; or delete what is no insertion"
             )

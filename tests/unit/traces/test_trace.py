@@ -79,6 +79,23 @@ def test_a_trace_may_end_at_a_depth() -> None:
     assert 24.0 <= found.length_mm <= 25.0
 
 
+def test_a_trace_may_begin_at_a_depth_and_other_depths_count_from_there() -> None:
+    unsteady = np.vstack([line(12.0), line(12.0)[::-1], line(60.0)])
+    with pytest.raises(InputError, match=r"turns back(.|\n)*--from LENGTH"):
+        trace_of(samples_of(unsteady))
+    found = trace_of(samples_of(unsteady), until_mm=20.0, from_mm=30.0)
+    assert 19.0 <= found.length_mm <= 20.0
+    # The rest is the line alone, and its first sample is where the depth begins.
+    assert found.depths_mm[0] == 0.0
+    assert found.samples.lines[0] > 2 * len(line(12.0))
+    assert len(found.samples.points_mm) < len(line(60.0))
+
+
+def test_a_beginning_beyond_the_end_is_refused() -> None:
+    with pytest.raises(InputError, match=r"has 40.0 mm(.|\n)*smaller --from"):
+        trace_of(samples_of(line(40.0)), from_mm=50.0)
+
+
 def test_the_first_part_ends_at_its_depth() -> None:
     part, end_mm = first_part(trace(points_of("arc")), 30.0)
     assert 30.0 <= end_mm <= 32.0
