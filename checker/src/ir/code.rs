@@ -31,7 +31,7 @@ pub struct Register(pub u32);
 pub struct BlockId(pub u32);
 
 /// What happens where the result of integer arithmetic does not fit into 32 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Overflow {
     /// It wraps round, as in two's complement, which is noted: what UPPAAL does.
     #[default]
@@ -52,7 +52,7 @@ pub enum RegisterType {
 }
 
 /// A function.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Function {
     /// Its name, for diagnostics: `step`, or `template Gate, edge Free → Occ, guard`.
     pub name: String,
@@ -69,7 +69,7 @@ pub struct Function {
 }
 
 /// A basic block.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Block {
     /// What is done, in order.
     pub instructions: Vec<Instruction>,
@@ -78,7 +78,7 @@ pub struct Block {
 }
 
 /// Where execution continues.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Terminator {
     /// To a block.
     Jump(BlockId),
@@ -115,7 +115,7 @@ pub enum Base {
 }
 
 /// A clock: `first + index`. The index was checked before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ClockOperand {
     /// The first clock; 0 where the register holds the clock itself (a clock parameter of a
     /// function).
@@ -124,14 +124,31 @@ pub struct ClockOperand {
     pub index: Option<Register>,
 }
 
+/// A double constant; two are equal if all their bits are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct DoubleBits(u64);
+
+impl DoubleBits {
+    /// The double.
+    pub fn value(self) -> f64 {
+        f64::from_bits(self.0)
+    }
+}
+
+impl From<f64> for DoubleBits {
+    fn from(value: f64) -> DoubleBits {
+        DoubleBits(value.to_bits())
+    }
+}
+
 /// An instruction. Registers named `target` are written, all others read.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the fields are operands")]
 pub enum Instruction {
     /// An integer constant.
     Integer { target: Register, value: i32 },
     /// A double constant.
-    Double { target: Register, value: f64 },
+    Double { target: Register, value: DoubleBits },
     /// A copy between registers of one type.
     Copy { target: Register, source: Register },
     /// Integer arithmetic.

@@ -172,7 +172,7 @@ impl Display for Instruction {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         match self {
             Instruction::Integer { target, value } => write!(f, "{target} = {value}"),
-            Instruction::Double { target, value } => write!(f, "{target} = {value:?}"),
+            Instruction::Double { target, value } => write!(f, "{target} = {:?}", value.value()),
             Instruction::Copy { target, source } => write!(f, "{target} = {source}"),
             Instruction::Arithmetic {
                 operator,

@@ -7,5 +7,6 @@ mod corpus;
 mod models;
 mod operators;
 mod random;
+mod sharing;
 mod support;
 mod validation;

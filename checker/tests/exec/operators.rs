@@ -169,7 +169,10 @@ fn load_doubles(operands: &[f64]) -> Vec<Instruction> {
     (0..)
         .map(Register)
         .zip(operands)
-        .map(|(target, &value)| Instruction::Double { target, value })
+        .map(|(target, &value)| Instruction::Double {
+            target,
+            value: value.into(),
+        })
         .collect()
 }
 
@@ -534,7 +537,7 @@ fn ldexp_scales_by_powers_of_two() {
         let code = vec![
             Instruction::Double {
                 target: Register(1),
-                value,
+                value: value.into(),
             },
             Instruction::Math {
                 function: MathFunction::Ldexp,

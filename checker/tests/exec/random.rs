@@ -195,7 +195,7 @@ impl<'a> Lowering<'a> {
         }
         for index in 0..DOUBLES {
             let target = Register(self.doubles + index);
-            let value = 0.75 * f64::from(index);
+            let value = (0.75 * f64::from(index)).into();
             self.push(Instruction::Double { target, value });
         }
         for index in 0..ADDRESSES {
@@ -327,7 +327,7 @@ impl<'a> Lowering<'a> {
                 self.push(Instruction::Integer { target, value });
             }
             2 | 3 => {
-                let (target, value) = (self.double(a), double);
+                let (target, value) = (self.double(a), double.into());
                 self.push(Instruction::Double { target, value });
             }
             4 => self.copy(a, b, c),

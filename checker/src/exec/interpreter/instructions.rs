@@ -65,7 +65,7 @@ impl Execution<'_, '_> {
     fn compute(&mut self, active: Activation, instruction: &Instruction) {
         match *instruction {
             Instruction::Integer { target, value } => self.set_integer(active, target, value),
-            Instruction::Double { target, value } => self.set_double(active, target, value),
+            Instruction::Double { target, value } => self.set_double(active, target, value.value()),
             Instruction::Copy { target, source } => {
                 let value = self.register(active, source);
                 self.set_register(active, target, value);

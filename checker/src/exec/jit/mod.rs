@@ -8,7 +8,7 @@
 //!
 //! Invariants
 //! * Compiled code is never moved or freed before the engine is dropped; queries that come later
-//!   only add to it.
+//!   only add to it. Engines share the code of equal functions (`pool`).
 //! * `unsafe` is confined to this module: calling compiled code, what compiled code calls back, and
 //!   freeing it.
 //! * The code that is compiled is trusted as the interpreter trusts it not, and so it is validated
@@ -18,6 +18,7 @@
 
 mod compiler;
 mod needs;
+mod pool;
 mod runtime;
 mod translate;
 
@@ -36,6 +37,7 @@ use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, va
 pub use compiler::JitError;
 
 use compiler::Compiler;
+use pool::locked;
 use runtime::{NativeContext, result_of_status};
 
 /// A function is compiled after this number of interpreted instructions. They take about as long as
@@ -144,10 +146,7 @@ impl Jit {
     /// Compiles a function now, whether it is worth it or not.
     pub fn compile_function(&self, function: FunctionId) -> Result<(), JitError> {
         let entry = &self.entries[function.0 as usize];
-        let mut compiler = self
-            .compiler
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut compiler = locked(&self.compiler);
         if !entry.code.load(Ordering::Acquire).is_null() {
             return Ok(());
         }
@@ -167,10 +166,7 @@ impl Jit {
     /// would cost more, as long as this takes no more than some milliseconds in all.
     pub fn prepare(&self, functions: impl IntoIterator<Item = FunctionId>) {
         for function in functions {
-            let mut compiler = self
-                .compiler
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut compiler = locked(&self.compiler);
             if compiler.compiled() > MOST_PREPARED {
                 return;
             }

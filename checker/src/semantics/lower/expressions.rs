@@ -12,7 +12,7 @@ impl Builder<'_> {
             Kind::Int(value) => self.integer(*value),
             Kind::Double(value) => {
                 let target = self.register(RegisterType::Double);
-                let value = *value;
+                let value = (*value).into();
                 self.emit(Instruction::Double { target, value });
                 target
             }

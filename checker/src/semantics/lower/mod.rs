@@ -330,7 +330,10 @@ impl<'n> Builder<'n> {
     fn zero(&mut self, ty: RegisterType) -> Register {
         if ty == RegisterType::Double {
             let target = self.register(ty);
-            self.emit(Instruction::Double { target, value: 0.0 });
+            self.emit(Instruction::Double {
+                target,
+                value: 0.0.into(),
+            });
             return target;
         }
         self.integer(0)

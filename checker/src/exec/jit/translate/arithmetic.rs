@@ -18,7 +18,9 @@ impl Translator<'_> {
     pub(super) fn compute(&mut self, instruction: &Instruction) {
         let (target, value) = match *instruction {
             Instruction::Integer { target, value } => (target, self.integer(value)),
-            Instruction::Double { target, value } => (target, self.builder.ins().f64const(value)),
+            Instruction::Double { target, value } => {
+                (target, self.builder.ins().f64const(value.value()))
+            }
             Instruction::Copy { target, source } => (target, self.get(source)),
             Instruction::CompareIntegers {
                 relation,

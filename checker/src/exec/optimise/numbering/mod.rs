@@ -341,7 +341,10 @@ impl Numbering<'_> {
         let target = self.new_register(kind);
         self.output.push(match literal {
             Number::Integer(value) => Instruction::Integer { target, value },
-            Number::Double(value) => Instruction::Double { target, value },
+            Number::Double(value) => Instruction::Double {
+                target,
+                value: value.into(),
+            },
         });
         self.literals.insert(target, literal);
         self.known.expressions.insert(expression, target);

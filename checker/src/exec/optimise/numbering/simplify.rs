@@ -10,7 +10,7 @@ impl Numbering<'_> {
     pub(super) fn simplify(&mut self, instruction: Instruction) -> Simplified {
         match instruction {
             Instruction::Integer { value, .. } => Simplified::Literal(Number::Integer(value)),
-            Instruction::Double { value, .. } => Simplified::Literal(Number::Double(value)),
+            Instruction::Double { value, .. } => Simplified::Literal(Number::Double(value.value())),
             Instruction::Copy { source, .. } => Simplified::Value(source),
             Instruction::Arithmetic { .. } => self.simplify_arithmetic(instruction),
             Instruction::CompareIntegers {
