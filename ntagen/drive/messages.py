@@ -46,6 +46,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
 )
 """All kinds of records, in the order of the file of descriptors."""
 
+_FIELDS: Final = {kind: tuple(f.name for f in dataclasses.fields(kind)) for kind in KINDS}
 _FIELD: Final = descriptor_pb2.FieldDescriptorProto
 _SCALARS: Final = {
     float: _FIELD.TYPE_DOUBLE,
@@ -62,14 +63,9 @@ def message_class(kind: type[Record]) -> type[Message]:
 
 def encode(record: Record, sequence: int) -> bytes:
     """The message of a record."""
-    message: Any = message_class(type(record))()
-    setattr(message, SEQUENCE, sequence)
-    for field in dataclasses.fields(record):
-        value = getattr(record, field.name)
-        if isinstance(value, tuple):
-            getattr(message, field.name).extend(value)
-        else:
-            setattr(message, field.name, value)
+    kind = type(record)
+    values = {name: getattr(record, name) for name in _FIELDS[kind]}
+    message: Any = message_class(kind)(**{SEQUENCE: sequence}, **values)
     encoded: bytes = message.SerializeToString()
     return encoded
 
@@ -89,9 +85,9 @@ def decode(name: str, data: bytes) -> tuple[int, Record]:
     message: Any = message_class(kind)()
     message.ParseFromString(data)
     values: dict[str, Any] = {}
-    for field in dataclasses.fields(kind):
-        value = getattr(message, field.name)
-        values[field.name] = value if isinstance(value, float | int | str) else tuple(value)
+    for field in _FIELDS[kind]:
+        value = getattr(message, field)
+        values[field] = value if isinstance(value, float | int | str) else tuple(value)
     return int(getattr(message, SEQUENCE)), kind(**values)
 
 

@@ -137,13 +137,13 @@ class Arc:
         """
         ends = (
             Nearest(distance(self.start.position_mm, point_mm), 0.0),
-            Nearest(distance(self.end.position_mm, point_mm), self.length_mm),
+            Nearest(distance(self.position_at(self.length_mm), point_mm), self.length_mm),
         )
         best = min(ends, key=lambda nearest: nearest.distance_mm)
         at_mm = self._foot_mm(point_mm)
         if not at_mm < self.length_mm:
             return best
-        foot = Nearest(distance(self.pose_at(at_mm).position_mm, point_mm), at_mm)
+        foot = Nearest(distance(self.position_at(at_mm), point_mm), at_mm)
         return min(foot, best, key=lambda nearest: nearest.distance_mm)
 
     def enters_at(self, center_mm: Vector, radius_mm: float) -> float | None:
@@ -159,7 +159,7 @@ class Arc:
         low_mm, high_mm = self._farthest_before(nearest.at_mm), nearest.at_mm
         for _ in range(_BISECTIONS):
             middle_mm = 0.5 * (low_mm + high_mm)
-            inside = distance(self.pose_at(middle_mm).position_mm, center_mm) <= radius_mm
+            inside = distance(self.position_at(middle_mm), center_mm) <= radius_mm
             low_mm, high_mm = (low_mm, middle_mm) if inside else (middle_mm, high_mm)
         return high_mm
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ntagen.needle.kinematics import Arc, Nearest, circle_center, roll
+from ntagen.needle.vectors import distance
 from ntagen.scene import Pose, Vector
 from ntagen.values import dataclass
 
@@ -112,7 +113,7 @@ class Path:
 
 def nearest_on(arcs: tuple[Arc, ...], entry_mm: Vector, point_mm: Vector) -> Nearest:
     """The smallest distance of a chain of arcs to a point; without arcs that of the entry."""
-    best = Arc(Pose(entry_mm, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 1.0, 0.0).nearest_to(point_mm)
+    best = Nearest(distance(entry_mm, point_mm), 0.0)
     start_mm = 0.0
     for arc in arcs:
         nearest = arc.nearest_to(point_mm)

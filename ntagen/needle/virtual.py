@@ -19,10 +19,10 @@ import numpy as np
 from ntagen.errors import DeviceError
 from ntagen.needle.answering import Answers
 from ntagen.needle.breathing import BreathWitness
+from ntagen.needle.cut import CutClearance
 from ntagen.needle.errors import Errors as Errors
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.nearest import nearest_to
 from ntagen.needle.obstacle import Obstacle as Obstacle
 from ntagen.needle.path import Path
 from ntagen.scene import Needle, Pose
@@ -92,8 +92,8 @@ class VirtualNeedle:
         self._factor = 1.0
         self._left: list[Arc] = []
         self._witness = BreathWitness(obstacles)
-        # An arc stays as it is when the next one begins, so its clearance is computed once.
-        self._clearances_mm: dict[tuple[Arc, ...], float] = {}
+        still = [one.region.shape for one in obstacles if one.region.motion is None]
+        self._clearance = CutClearance(needle.tip.position_mm, still)
 
     def now_s(self) -> float:
         """Simulated seconds."""
@@ -200,19 +200,7 @@ class VirtualNeedle:
 
         Infinite without critical regions, negative if one was pierced.
         """
-        known_mm = self._clearances_mm
-        cut: list[tuple[Arc, ...]] = [(arc,) for arc in self.pierced] or [()]
-        self._clearances_mm = {
-            arcs: known_mm[arcs] if arcs in known_mm else self._clearance_mm(arcs) for arcs in cut
-        }
-        return min(self._witness.clearance_mm(), *self._clearances_mm.values())
-
-    def _clearance_mm(self, arcs: tuple[Arc, ...]) -> float:
-        """The smallest distance of these arcs, or of the entry, to any region that stands still."""
-        entry_mm = self._needle.tip.position_mm
-        shapes = [one.region.shape for one in self._obstacles if one.region.motion is None]
-        distances_mm = (nearest_to(arcs, entry_mm, shape).distance_mm for shape in shapes)
-        return min(distances_mm, default=math.inf)
+        return min(self._witness.clearance_mm(), self._clearance.of(self.pierced))
 
     def _turn(self, angle_rad: float, error_rad: float) -> None:
         self._path = self._path.roll(angle_rad + error_rad)
