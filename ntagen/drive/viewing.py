@@ -133,7 +133,8 @@ class Shaft:
         match record:
             case Measured():
                 self._depth_mm = record.depth_mm
-                self._points = [p for p in self._points if p[0] <= 0.0 or p[0] < record.depth_mm]
+                while len(self._points) > 1 and self._points[-1][0] >= record.depth_mm:
+                    self._points.pop()
                 if record.depth_mm > 0.0:
                     self._points.append((record.depth_mm, record.position_mm))
             case Predicted() | Estimated() if self._depth_mm > 0.0:

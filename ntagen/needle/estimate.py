@@ -30,12 +30,13 @@ from numpy.typing import NDArray
 from ntagen.needle.channels import ENTRY, MEMORY_MM, STRETCH_MM, Channel, Placed, Stretch, place
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
-from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push
+from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push, pushed_to
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
 from ntagen.needle.priors import Priors as Priors
 from ntagen.needle.residuals import Problem, Reading
+from ntagen.needle.vectors import subtract
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
@@ -253,8 +254,8 @@ class Estimator:
                 number = channel.stretch_at(along_mm)
                 part = placed[reading.channel][number]
                 along_mm -= channel.stretches[number].offset_mm
-            expected, _ = part.positions(np.array([along_mm]))
-            differences.append(np.array(reading.measurement.position_mm) - expected[0])
+            expected_mm = pushed_to(part.start, part.radius_mm, along_mm)
+            differences.append(subtract(reading.measurement.position_mm, expected_mm))
         return float(np.linalg.norm(np.mean(differences, axis=0)))
 
     def _unknown(self, std: float) -> int:

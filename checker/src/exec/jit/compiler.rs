@@ -6,7 +6,6 @@
 //!
 //! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
 
-use std::fmt;
 use std::sync::{Arc, Mutex};
 
 use cranelift_module::FuncId;
@@ -15,26 +14,9 @@ use crate::exec::optimise::Optimiser;
 use crate::ir::{Constants, Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
+use super::error::JitError;
 use super::needs::AllNeeds;
 use super::pool::{Pool, locked};
-
-/// Why there is no native code.
-#[derive(Clone, Debug)]
-pub struct JitError(String);
-
-impl JitError {
-    pub(super) fn new(cause: impl fmt::Display) -> JitError {
-        JitError(cause.to_string())
-    }
-}
-
-impl fmt::Display for JitError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "cannot generate native code: {}", self.0)
-    }
-}
-
-impl std::error::Error for JitError {}
 
 /// A compiled function as it is called from outside.
 #[derive(Clone, Copy, Debug)]

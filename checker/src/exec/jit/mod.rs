@@ -17,6 +17,7 @@
 //!   not call themselves.
 
 mod compiler;
+mod error;
 mod needs;
 mod pool;
 mod runtime;
@@ -34,7 +35,7 @@ use crate::tuning::Tuning;
 
 use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, validate};
 
-pub use compiler::JitError;
+pub use error::JitError;
 
 use compiler::Compiler;
 use pool::locked;

@@ -8,7 +8,7 @@
 //! * Functions share native code only if all that it depends on is equal: registers, frame, all
 //!   instructions bit by bit, the code of what they call, and the rule for overflows. Constant
 //!   memory and states are reached through the context and the arguments of a call.
-//! * Code is never moved or freed while an engine holds its pool. An engine keeps its pool for life.
+//! * Code is never moved or freed while an engine holds its pool, which it keeps for life.
 //! * What a function calls is compiled before it.
 //!
 //! Cost: of a function that is known, that of comparing it.
@@ -26,7 +26,7 @@ use cranelift_module::{FuncId, Module, default_libcall_names};
 
 use crate::ir::{Function, FunctionId, Instruction, Overflow};
 
-use super::compiler::JitError;
+use super::error::JitError;
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
 
 /// New engines begin a new pool after so many instructions, which take some megabytes.
