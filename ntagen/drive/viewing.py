@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from functools import cache
 from typing import Any, Final, cast
 
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -19,8 +20,10 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.Pose_pb2 import Pose as PoseMessage
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.PosesInFrame_pb2 import PosesInFrame
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntityDeletion_pb2 import SceneEntityDeletion
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -124,6 +127,7 @@ class Shaft:
     """
 
     def __init__(self, entry_mm: Vector) -> None:
+        # Places with their depths, at least a spacing apart.
         self._points: list[tuple[float, Vector]] = [(0.0, entry_mm)]
         self._depth_mm = 0.0
         self._shown: list[tuple[float, Vector]] = []
@@ -135,34 +139,24 @@ class Shaft:
                 self._depth_mm = record.depth_mm
                 while len(self._points) > 1 and self._points[-1][0] >= record.depth_mm:
                     self._points.pop()
-                if record.depth_mm > 0.0:
+                if record.depth_mm - self._points[-1][0] >= _SHAFT_SPACING_MM:
                     self._points.append((record.depth_mm, record.position_mm))
-            case Predicted() | Estimated() if self._depth_mm > 0.0:
+            case Predicted() | Estimated() if self._points[-1][0] == self._depth_mm > 0.0:
                 self._points[-1] = (self._depth_mm, record.position_mm)
             case _:
                 return
-        line = _thinned(self._points, _SHAFT_SPACING_MM)
-        if line == self._shown:
+        if self._points == self._shown:
             return
-        self._shown = line
+        self._shown = self._points.copy()
         update = SceneUpdate()
         stamp = _stamp(record.time_s)
         entity = update.entities.add(id="shaft", frame_id=_FRAME, timestamp=stamp)
         drawn = entity.lines.add(thickness=4.0, scale_invariant=True, color=_colour(_SHAFT_COLOUR))
         drawn.pose.orientation.w = 1.0
-        for _, position_mm in line:
+        for _, position_mm in self._points:
             x, y, z = (c * _M_PER_MM for c in position_mm)
             drawn.points.add(x=x, y=y, z=z)
         yield "/scene", update
-
-
-def _thinned(points: list[tuple[float, Vector]], spacing_mm: float) -> list[tuple[float, Vector]]:
-    """Points with depths, at least so far apart."""
-    kept = points[:1]
-    for point in points[1:]:
-        if point[0] - kept[-1][0] >= spacing_mm:
-            kept.append(point)
-    return kept
 
 
 def show_record(record: Record) -> Shown:
@@ -171,9 +165,10 @@ def show_record(record: Record) -> Shown:
         case Measured():
             yield "/needle/measured", _cloud(record)
         case Predicted() | Estimated():
-            pose = Pose(record.position_mm, record.heading, record.bevel)
-            yield "/needle/tip", _pose_in_frame(pose, record.time_s)
-            yield "/tf", _transform(pose, record.time_s)
+            pose = _pose(Pose(record.position_mm, record.heading, record.bevel))
+            stamp = _stamp(record.time_s)
+            yield "/needle/tip", PoseInFrame(timestamp=stamp, frame_id=_FRAME, pose=pose)
+            yield "/tf", _transform(pose, stamp)
         case Learned():
             update = SceneUpdate()
             ball = Sphere(record.center_mm, record.radius_mm)
@@ -249,45 +244,43 @@ def _id(kind: str, name: str) -> str:
 
 
 def _cloud(record: Measured) -> PointCloud:
+    cloud = PointCloud()
+    cloud.CopyFrom(_point())
+    cloud.timestamp.CopyFrom(_stamp(record.time_s))
+    cloud.data = struct.pack("<4f", *(c * _M_PER_MM for c in record.position_mm), record.force_n)
+    return cloud
+
+
+@cache
+def _point() -> PointCloud:
+    """A cloud of one point, without its numbers."""
     names = ("x", "y", "z", "force_n")
-    cloud = PointCloud(
-        timestamp=_stamp(record.time_s),
-        frame_id=_FRAME,
-        point_stride=4 * len(names),
-        data=struct.pack("<4f", *(c * _M_PER_MM for c in record.position_mm), record.force_n),
-    )
+    cloud = PointCloud(frame_id=_FRAME, point_stride=4 * len(names))
     cloud.pose.orientation.w = 1.0
     for index, name in enumerate(names):
         cloud.fields.add(name=name, offset=4 * index, type=PackedElementField.FLOAT32)
     return cloud
 
 
-def _pose_in_frame(pose: Pose, time_s: float) -> PoseInFrame:
-    return PoseInFrame(timestamp=_stamp(time_s), frame_id=_FRAME, pose=_pose(pose))
-
-
-def _transform(pose: Pose, time_s: float) -> FrameTransforms:
+def _transform(pose: PoseMessage, stamp: Timestamp) -> FrameTransforms:
     message = FrameTransforms()
-    transform = message.transforms.add(
-        timestamp=_stamp(time_s), parent_frame_id=_FRAME, child_frame_id="tip"
+    message.transforms.add(
+        timestamp=stamp,
+        parent_frame_id=_FRAME,
+        child_frame_id="tip",
+        translation=pose.position,
+        rotation=pose.orientation,
     )
-    own = _pose(pose)
-    transform.rotation.CopyFrom(own.orientation)
-    position = own.position
-    transform.translation.x = position.x
-    transform.translation.y = position.y
-    transform.translation.z = position.z
     return message
 
 
 def _pose(pose: Pose) -> PoseMessage:
-    message = PoseMessage()
-    x, y, z = (c * _M_PER_MM for c in pose.position_mm)
-    message.position.x, message.position.y, message.position.z = x, y, z
+    x, y, z = pose.position_mm
     qx, qy, qz, qw = quaternion(pose)
-    message.orientation.x, message.orientation.y = qx, qy
-    message.orientation.z, message.orientation.w = qz, qw
-    return message
+    return PoseMessage(
+        position=Vector3(x=x * _M_PER_MM, y=y * _M_PER_MM, z=z * _M_PER_MM),
+        orientation=Quaternion(x=qx, y=qy, z=qz, w=qw),
+    )
 
 
 def quaternion(pose: Pose) -> tuple[float, float, float, float]:
