@@ -290,12 +290,17 @@ class GrblActuator:
         self._link.command(f"G91 G21 G1 {word}", watch=watch)
 
     def _follow(self, goal: _Goal, watch: Watch) -> None:
-        """Watches a motion until the axis stands at its end."""
+        """Watches a motion until the axis stands at its end.
+
+        A report is at least as new as the question for it. How late it is read says nothing about
+        the axis: a computer may be busy in between.
+        """
         began_s = changed_s = self.now_s()
         seconds = goal.motor.seconds(goal.way, goal.speed)
         latest_s = began_s + _LATE_RATIO * seconds + _LATE_S
         last = goal.start[goal.motor.index]
         while True:
+            asked_s = self.now_s()
             status = self._status(watch)
             now_s, here = self.now_s(), position_of(status)[goal.motor.index]
             self._require_on_way(goal, status)
@@ -305,11 +310,11 @@ class GrblActuator:
                 if abs(here - goal.end[goal.motor.index]) <= goal.motor.tolerance:
                     self._expected = goal.end
                     return
-                if here != goal.start[goal.motor.index] or now_s > began_s + _BEGIN_S:
+                if here != goal.start[goal.motor.index] or asked_s > began_s + _BEGIN_S:
                     raise self._wrong(goal, status, "ended too early")
-            elif now_s > changed_s + _STALL_S:
+            elif asked_s > changed_s + _STALL_S:
                 raise self._wrong(goal, status, "is stuck")
-            elif now_s > latest_s:
+            elif asked_s > latest_s:
                 raise self._wrong(goal, status, "is too slow")
             left_s = began_s + seconds - now_s
             self._link.pause(max(_SOONEST_POLL_S, min(POLL_S, left_s)), watch)

@@ -175,6 +175,32 @@ def test_what_the_watch_raises_stops_the_needle_first(dialect: Dialect) -> None:
     assert bench.plant.sums["X"] == stopped_mm
 
 
+class BusyPort(SimulatedPort):
+    """A port of a computer that is busy once, between a report about a motion and its reader."""
+
+    def __init__(self, emulator: Emulator, seconds: float) -> None:
+        super().__init__(emulator)
+        self._its = emulator
+        self.seconds = seconds
+
+    def read(self, timeout_s: float) -> bytes:
+        data = super().read(timeout_s)
+        if b"<Jog" in data:
+            seconds, self.seconds = self.seconds, 0.0
+            self._its.advance(self._its.now_s + seconds)
+        return data
+
+
+@BOTH
+def test_a_report_that_is_read_late_is_no_fault_of_the_axis(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    port = BusyPort(bench.emulator, 10.0)
+    actuator = GrblActuator(port, bench.axes)
+    actuator.push(2.0)
+    assert port.seconds == 0.0
+    assert bench.plant.sums["X"] == pytest.approx(2.0)
+
+
 def freeze(bench: Bench) -> None:
     bench.emulator.faults.pace = 0.0
 
