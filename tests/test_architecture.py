@@ -69,9 +69,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "traces": BASE | {"files", "needle", "nsl", "plan", "tracking"},
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
-    "lab": BASE | {"needle", "grbl", "drive", "openigtlink", "tracking"},
+    "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "plan", "drive", "traces"},
-    "experiment": BASE | {"files", "needle", "nsl", "plan", "drive", "version"},
+    "experiment": BASE | {"files", "grbl", "needle", "nsl", "plan", "drive", "lab", "version"},
     "cli": BASE
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}

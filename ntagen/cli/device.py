@@ -14,9 +14,9 @@ from ntagen.cli.effects import say_idle
 from ntagen.cli.lab import command as simulate
 from ntagen.cli.plugins import check_plugin, installed, is_plugin
 from ntagen.cli.plugins import command as test
-from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import look_at
+from ntagen.drive.steppers import axes_for, described
 from ntagen.errors import DeviceError, InputError
 
 if TYPE_CHECKING:

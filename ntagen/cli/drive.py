@@ -28,7 +28,7 @@ from ntagen.cli.steering import say_idle_errors, show_settings, steering_options
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
-from ntagen.errors import ModelError, NtagenError
+from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
@@ -157,8 +157,14 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.knowledge import told
+    from ntagen.drive.needles import LAB
     from ntagen.nsl import load_task
 
+    if needle == LAB:
+        raise InputError(
+            "a needle in a lab is driven by its port and its tracker\n"
+            "hint: `ntagen device simulate ENV.nsl` opens a lab, and prints the command"
+        )
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
     task = load_task(environment, include=include)
@@ -254,14 +260,17 @@ def _real_needle(
     run: _Run, needle: str, baud_rate: int
 ) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
     """What moves a real needle, and what measures it."""
-    from ntagen.cli.steppers import described, opened_plugin, opened_steppers
     from ntagen.drive.needles import REAL
+    from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
+    from ntagen.grbl.port import SerialPort
 
     settings, scene = run.configuration.settings, run.scene
     name, _, argument = needle.partition(":")
     if name == REAL:
         device = described(run.task, run.environment)
-        opening = opened_steppers(argument, baud_rate, device, scene.needle, settings)
+        axes = axes_for(device, scene.needle, settings)
+        port = SerialPort(argument or device.port, baud_rate)
+        opening = opened_steppers(port, axes, scene.needle, settings)
     else:
         say_idle({"baud_rate": "--baud"}, "with a plugin")
         opening = opened_plugin(name, argument, scene.needle, settings)

@@ -33,12 +33,14 @@ def command(file: Path, runs: int | None, folder: Path | None, how: How) -> int:
     seeds. The folder gets the table (table.json, .csv, .md, .tex), a report with pictures
     (report.html), and the log of each run (runs/).
 
-    The same file gives the same table on any number of workers, except for times. Ctrl-C ends the
-    experiment; --resume goes on with it.
+    The same file gives the same table on any number of workers, except for times, and for needles
+    in a lab, whose controller and tracker take real time. Ctrl-C ends the experiment; --resume goes
+    on with it.
 
     \b
     Examples:
       ntagen experiment examples/experiments/virtual.toml --runs 5
+      ntagen experiment examples/experiments/real.toml --runs 1
       ntagen experiment examples/experiments/virtual.toml -o virtual --workers 8
       ntagen experiment examples/experiments/virtual.toml -o virtual --resume
       ntagen experiment examples/experiments/virtual.toml -o virtual --dask tcp://head:8786

@@ -16,8 +16,9 @@ import click
 from ntagen.cli.models import include_option
 from ntagen.cli.signals import handled
 from ntagen.cli.steering import needle_options, say_idle_errors
-from ntagen.cli.steppers import axes_for, described
 from ntagen.cli.terminal import echo
+from ntagen.drive.steppers import axes_for, described
+from ntagen.lab.speeds import FASTEST, SLOWEST
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -33,7 +34,6 @@ _LOOK_S: Final = 0.1
 """How often it is asked whether the lab should end."""
 
 _RATE_HZ: Final = 40.0
-_FASTEST: Final = 100.0
 
 
 @click.command("simulate", epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.")
@@ -51,7 +51,7 @@ _FASTEST: Final = 100.0
     metavar="N",
     default=1.0,
     show_default=True,
-    type=click.FloatRange(min=0.01, max=_FASTEST),
+    type=click.FloatRange(min=SLOWEST, max=FASTEST),
     help="How many times as fast time passes in the lab, for axes, needle and tracker.",
 )
 @click.option(

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.steppers import axes_for, described, speeds_for
 from ntagen.cli.terminal import echo
+from ntagen.drive.steppers import axes_for, described, speeds_for
 from ntagen.errors import DeviceError, InputError
 from ntagen.extensions import DEVICES, TRACKERS, find, names, package
 from ntagen.extensions import described as listed

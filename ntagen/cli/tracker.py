@@ -165,6 +165,7 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
 
             yield lambda needle: stack.enter_context(SimulatedTracker(needle, needle.now_s))
             return
+        from ntagen.tracking.opening import require_force
         from ntagen.tracking.plausible import Plausible
         from ntagen.tracking.spec import open_tracker
 
@@ -172,7 +173,7 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
         sensor = stack.enter_context(
             open_tracker(tracking.tracker, tracking.transform, lambda: needles[0].now_s())
         )
-        _require_force(tracking, sensor.measures_force, watches_force)
+        require_force(tracking.text, sensor.measures_force, watches_force)
 
         def sense(needle: Device) -> Sensor:
             needles.append(needle)
@@ -203,25 +204,20 @@ def opened_live(
         InputError: The tracker cannot be used so.
         DeviceError: It cannot be reached.
     """
-    from ntagen.tracking.plausible import LivePlausible
-    from ntagen.tracking.playback import Playback
-    from ntagen.tracking.spec import open_tracker
+    from ntagen.tracking import opening
 
     if tracking.tracker is None:
         raise AssertionError("a real needle has a tracker (`tracking_of`)")
-    with open_tracker(tracking.tracker, tracking.transform, now_s) as sensor:
-        if isinstance(sensor, Playback):
-            raise AssertionError("recordings are refused before (`tracking_of`)")
-        _require_force(tracking, sensor.measures_force, watches_force)
-        yield LivePlausible(sensor, entry, now_s, force_varies=watches_force and force_varies)
-
-
-def _require_force(tracking: Tracking, measures_force: bool, watches_force: bool) -> None:
-    if watches_force and not measures_force:
-        raise InputError(
-            f"the tracker {tracking.text} measures no force, and the driver watches the force\n"
-            "hint: name a sensor with force=DEVICE, or add --force-sensing off"
-        )
+    with opening.opened_live(
+        tracking.text,
+        tracking.tracker,
+        tracking.transform,
+        entry,
+        now_s,
+        watches_force=watches_force,
+        force_varies=force_varies,
+    ) as sensor:
+        yield sensor
 
 
 def look_at(text: str, seconds: float, *, as_json: bool) -> int:

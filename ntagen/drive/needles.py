@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 NAMES: Final = ("virtual", "phantom", "grbl+sim")
 """The simulated needles; the last is a phantom behind an emulated stepper controller."""
 
+LAB: Final = "lab"
+"""A phantom needle in a lab of its own (`ntagen.lab`): it is driven as a real needle is."""
+
 REAL: Final = "grbl"
 """A needle behind a GRBL controller: `grbl:PORT`, or `grbl` for the port in the task."""
 
@@ -56,7 +59,7 @@ class Chosen:
     @property
     def is_real(self) -> bool:
         """Whether it is no simulation."""
-        return self.name not in NAMES
+        return self.name not in (*NAMES, LAB)
 
     @property
     def kind(self) -> str:
@@ -88,8 +91,8 @@ class Chosen:
 
     @property
     def make(self) -> Maker | None:
-        """Makes it; None for a real needle. What it takes is imported now."""
-        if self.is_real:
+        """Makes it; None for a real needle and a lab. What it takes is imported now."""
+        if self.is_real or self.name == LAB:
             return None
         from ntagen.drive.simulate import phantom, virtual
         from ntagen.drive.stepped import stepped
@@ -101,14 +104,16 @@ class Chosen:
 
     def usual(self, settings: Settings, scene: Scene) -> Settings:
         """The settings with which this needle is driven if nobody says otherwise."""
-        if self.is_real:
+        if self.is_real or self.name == LAB:
             way_mm = overrun_mm(scene.needle.speed_mm_per_s)
-            return replace(
+            settings = replace(
                 settings,
                 overrun_mm=way_mm,
                 roll_rad_per_s=_REAL_ROLL_RAD_PER_S,
                 ranking=ROBUST_RANKING,
             )
+        if self.is_real:
+            return settings
         if self.parameters is None:
             return settings
         # Half of the rise to be detected is slack: layers never add to the sum of the test.
@@ -142,8 +147,8 @@ def choose(name: str, errors: Errors) -> Chosen:
     """The needle of a name.
 
     Args:
-        name: One of `NAMES`, or a real needle: `REAL`, or the name of a plugin, both perhaps with a
-            colon and more.
+        name: One of `NAMES`, `LAB`, or a real needle: `REAL`, or the name of a plugin, both perhaps
+            with a colon and more.
         errors: The errors of a simulated needle.
 
     Raises:
@@ -152,7 +157,7 @@ def choose(name: str, errors: Errors) -> Chosen:
     kind, _, _ = name.partition(":")
     if kind == REAL:
         return Chosen(name, errors)
-    if name not in NAMES:
+    if name not in (*NAMES, LAB):
         if kind in names(DEVICES):
             return Chosen(name, errors)
         raise InputError(

@@ -35,22 +35,26 @@ from ntagen.scene import Needle, Pose, Scene
 _NO_REGION_MM: Final = 1e9
 
 
-class Simulated(Device, Protocol):
+class Knowing(Protocol):
+    """What knows the truth about a needle."""
+
+    @property
+    def true_tip(self) -> Pose:
+        """The true pose of the tip."""
+
+    def true_clearance_mm(self) -> float:
+        """The smallest distance of all that was cut to any actual critical region."""
+
+
+class Simulated(Device, Knowing, Protocol):
     """A simulated needle: a device that knows the truth."""
 
     def roll_on(self, angle_rad: float) -> None:
         """Goes on with the last roll: no error is added."""
 
     @property
-    def true_tip(self) -> Pose:
-        """The true pose of the tip."""
-
-    @property
     def pierced(self) -> tuple[Arc, ...]:
         """All arcs that were cut."""
-
-    def true_clearance_mm(self) -> float:
-        """The smallest distance of these arcs to any actual critical region."""
 
 
 Maker = Callable[[Needle, tuple[Obstacle, ...], int], Simulated]
@@ -175,7 +179,7 @@ def simulate(
     if settings.compensated_lag_rad > 0.0:
         actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
     device = Assembly(actuator, sensor)
-    witness = _Witness(needle, journal)
+    witness = Witness(needle, journal)
     counter = SynthesisCounter()
     controller = Controller(
         told(scene, known),
@@ -225,20 +229,21 @@ def _load() -> None:
     gc.freeze()
 
 
-class _Witness:
+class Witness:
     """Adds the truth to a journal, at each measurement and at the end.
 
     Attributes:
         watched_s: The time from the first to the last measurement.
     """
 
-    def __init__(self, needle: Simulated, journal: Journal) -> None:
+    def __init__(self, needle: Knowing, journal: Journal) -> None:
         self._needle = needle
         self._journal = journal
         self._first_s: float | None = None
         self.watched_s = 0.0
 
     def record(self, record: Record) -> None:
+        """Adds the truth to it, if it is a measurement or the end."""
         if isinstance(record, Measured):
             self._first_s = record.time_s if self._first_s is None else self._first_s
             self.watched_s = record.time_s - self._first_s

@@ -7,12 +7,15 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ntagen.drive.configure import Configuration, configure
 from ntagen.drive.scene_json import scene_to_json
 from ntagen.nsl import Task
 from ntagen.parameters import BY_FIELD, Given, Value
+
+SPEED: Final = "speed"
+"""The key of a row for the speed of a lab."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +26,13 @@ class Row:
         id: Its name in the experiment, which is also a part of file names.
         scenario: The file of the scene; absolute.
         known: The critical regions that the driver knows (`ntagen.drive.knowledge.told`).
-        needle: The name of the simulated needle (`ntagen.drive.needles`).
+        needle: The name of the simulated needle (`ntagen.drive.needles`), or that of the lab.
         values: The settings that the file gives, by field, in the unit of the field.
         seeds: The seeds, in the order of the file; none twice.
         paper: The name of the paper's line to compare with, or empty.
-        digest: Two rows with the same digest give the same runs for the same seeds.
+        digest: Two rows with the same digest give the same runs for the same seeds; in a lab, runs
+            of the same kind.
+        speed: How many seconds pass in the lab in one second; None without a lab.
     """
 
     id: str
@@ -38,6 +43,7 @@ class Row:
     seeds: tuple[int, ...]
     paper: str = ""
     digest: str = ""
+    speed: float | None = None
 
     def configuration(self, task: Task, seed: int) -> Configuration:
         """The settings of a run: defaults, the scene's, the row's; a later one wins.
@@ -59,7 +65,8 @@ class Row:
 
     def shown_values(self) -> dict[str, str]:
         """The settings by their words, as a person writes them."""
-        return {
+        shown = {} if self.speed is None else {SPEED: f"{self.speed:g} x"}
+        return shown | {
             BY_FIELD[field].words: BY_FIELD[field].shown(value)
             for field, value in self.values.items()
         }
@@ -94,6 +101,7 @@ def digest_of(row: Row, task: Task) -> str:
     facts: dict[str, Any] = {
         "known": row.known,
         "needle": row.needle,
+        "speed": row.speed,
         "values": dict(sorted(row.values.items())),
         "scene": scene_to_json(task.scene),
         "given": [[one.parameter.field, one.value] for one in task.given],

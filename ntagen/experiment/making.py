@@ -12,8 +12,9 @@ from pathlib import Path
 
 from ntagen.drive.log import Log
 from ntagen.drive.log_facts import facts_of
+from ntagen.drive.outcome import Driven
 from ntagen.drive.records import Journal, JournalError, Journals
-from ntagen.drive.simulate import Result, simulate, synthesiser_for
+from ntagen.drive.simulate import simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.experiment.description import Row, digest_of
@@ -104,7 +105,8 @@ def _made(block: Block, task: Task, seed: int) -> Run:
 
 def _logged(block: Block, task: Task, seed: int) -> Run:
     configuration = block.row.configuration(task, seed)
-    facts = facts_of(block.row.scenario, task.scene, configuration, block.row.known)
+    tracker = "" if block.row.speed is None else "openigtlink, that of the lab"
+    facts = facts_of(block.row.scenario, task.scene, configuration, block.row.known, tracker)
     with new_log(block.folder, block.row.id, seed) as (path, name):
         try:
             with Log(path, *facts, is_kept_up=False) as log:
@@ -123,6 +125,15 @@ def _driven(row: Row, task: Task, seed: int, logs: Sequence[Journal], name: str)
     configuration = row.configuration(task, seed)
     observer = Observer(task.scene)
     try:
+        if row.speed is not None:
+            # A lab opens ports: what that takes is imported for its rows only.
+            from ntagen.experiment.in_lab import driven_in_lab
+
+            journal = Journals(*logs, observer)
+            made = driven_in_lab(task, configuration, row.known, row.speed, journal)
+            truth = made.truth
+            true = (truth.clearance_mm, truth.target_distance_mm)
+            return _run(row, seed, made.driven, true, observer, name)
         result = simulate(
             task.scene,
             synthesiser_for(configuration.settings),
@@ -137,29 +148,41 @@ def _driven(row: Row, task: Task, seed: int, logs: Sequence[Journal], name: str)
         raise
     except Exception as error:  # a bug in one run must not end a campaign of thousands
         return _broken(row, seed, error, name)
-    return _run(row, seed, result, observer, name)
+    true = (result.clearance_mm, result.target_distance_mm)
+    return _run(row, seed, result, true, observer, name)
 
 
-def _run(row: Row, seed: int, result: Result, observer: Observer, log: str) -> Run:
-    """What is kept of a run. The truth is that of the needle, which knows its own path."""
-    ended = result.ended
+def _run(
+    row: Row,
+    seed: int,
+    driven: Driven,
+    true: tuple[float, float],
+    observer: Observer,
+    log: str,
+) -> Run:
+    """What is kept of a run.
+
+    The truth is that of the needle, which knows its own path: its clearance, and the distance of
+    its tip to the target.
+    """
+    ended = driven.ended
     says_reached = ended.outcome == State.TARGET_REACHED.value
-    clear_mm = result.clearance_mm
+    clear_mm, target_mm = true
     return Run(
         row=row.id,
         seed=seed,
         outcome=ended.outcome,
         reason=ended.reason,
-        is_reached=says_reached and result.target_distance_mm <= 0.0,
+        is_reached=says_reached and target_mm <= 0.0,
         is_hit=clear_mm <= 0.0,
         clearance_mm=clear_mm if math.isfinite(clear_mm) else None,
-        target_mm=result.target_distance_mm,
+        target_mm=target_mm,
         depth_mm=ended.depth_mm,
         adjustments=ended.adjustments,
         needle_s=ended.time_s,
         syntheses=tuple(
             Synthesised(one.found, one.hold, one.engine_seconds, one.loop_seconds)
-            for one in result.syntheses
+            for one in driven.syntheses
         ),
         profile=observer.profile,
         felt=observer.felt,

@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.drive.knowledge import told
-from ntagen.drive.needles import NAMES
+from ntagen.drive.needles import LAB, NAMES
 from ntagen.drive.settings import STEERING
 from ntagen.errors import InputError
-from ntagen.experiment.description import Experiment, Row, digest_of
+from ntagen.experiment.description import SPEED, Experiment, Row, digest_of
+from ntagen.experiment.lab_rows import mistake_in_lab, mistake_in_speeds, speed_of
 from ntagen.experiment.paper import PAPER
 from ntagen.files import read_file
 from ntagen.nsl import Task, load_task
@@ -36,7 +37,8 @@ DRIVE: Final = {parameter.words: parameter for parameter in STEERING}
 """The keys of the table ``drive`` of a row: the words of ``drive { … }``."""
 
 _TOP: Final = ("name", "defaults", "row")
-_ROW: Final = ("id", "scenario", "known", "needle", "seeds", "paper", "drive", *ERRORS)
+_NEEDLES: Final = (*NAMES, LAB)
+_ROW: Final = ("id", "scenario", "known", "needle", SPEED, "seeds", "paper", "drive", *ERRORS)
 _MAX_BYTES: Final = 2**20
 _MAX_SEEDS: Final = 1_000_000
 _MAX_ROWS: Final = 10_000
@@ -147,8 +149,9 @@ class _Reader:
         if task is None:
             return None
         known, needle = str(chosen.pop("known")), str(chosen.pop("needle"))
+        speed = speed_of(needle, chosen.pop(SPEED, None))
         values = {_field_of(key): value for key, value in chosen.items()}
-        row = Row(name, scenario, known, needle, values, seeds, paper)
+        row = Row(name, scenario, known, needle, values, seeds, paper, speed=speed)
         try:
             told(task.scene, known)
         except InputError as error:
@@ -158,6 +161,10 @@ class _Reader:
             configuration = row.configuration(task, seeds[0])
         except InputError as error:
             self._note(number, "drive", *_split(str(error)))
+            return None
+        wrong = mistake_in_lab(row, task, configuration)
+        if wrong is not None:
+            self._note(number, *wrong)
             return None
         for key in (key for key in chosen if configuration.needle.ignores(_field_of(key))):
             cause = f"it means nothing to {configuration.needle.kind}"
@@ -176,10 +183,16 @@ class _Reader:
             "needle": self._texts(number, "needle", table.get("needle", "virtual")),
         }
         for needle in axes["needle"]:
-            if needle not in NAMES:
-                near = suggest(needle, NAMES)
-                hint = f"did you mean '{near}'?" if near else f"choose from {', '.join(NAMES)}"
+            if needle not in _NEEDLES:
+                near = suggest(needle, _NEEDLES)
+                hint = f"did you mean '{near}'?" if near else f"choose from {', '.join(_NEEDLES)}"
                 self._note(number, "needle", f"there is no simulated needle '{needle}'", hint)
+        if SPEED in table:
+            speeds = table[SPEED]
+            axes[SPEED] = speeds if isinstance(speeds, list) else [speeds]
+            wrong = mistake_in_speeds(axes[SPEED])
+            if wrong is not None:
+                self._note(number, SPEED, *wrong)
         for key, parameter in ERRORS.items():
             if key in table:
                 axes[key] = self._values(number, key, parameter, table[key])
@@ -279,6 +292,7 @@ class _Reader:
                 value = chosen[key]
                 parameter = ERRORS.get(key) or DRIVE.get(key)
                 shown = Path(value).stem if key == "scenario" else str(value)
+                shown = f"{key} {value}" if key == SPEED else shown
                 parts.append(f"{key} {parameter.shown(value)}" if parameter else shown)
         return "-".join(_slug(part) for part in parts)
 

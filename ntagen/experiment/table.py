@@ -81,6 +81,7 @@ def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
         "scenario": row.scenario.stem,
         "known": row.known,
         "needle": row.needle,
+        "speed": row.speed,
         "settings": row.shown_values(),
         "values": row.numbers(),
         "wanted": len(row.seeds),

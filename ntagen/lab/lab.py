@@ -103,6 +103,11 @@ class Lab:
         self._stack.close()
 
     @property
+    def speed(self) -> float:
+        """How many seconds pass in the lab in one second outside."""
+        return self._speed
+
+    @property
     def port(self) -> str:
         """The serial port of the controller."""
         return self._terminal.name

@@ -65,7 +65,7 @@ def test_the_table_has_rates_and_spreads(whole: tuple[Path, Mapping[str, Any]]) 
     assert free["adjustments"] == {"min": 0, "avg": 0.0, "max": 0}
     assert json.loads((folder / "table.json").read_bytes()) == json.loads(json.dumps(document))
     lines = (folder / "table.csv").read_text("utf-8").splitlines()
-    assert lines[0].startswith("id,scenario,known,needle,settings.noise,")
+    assert lines[0].startswith("id,scenario,known,needle,speed,settings.noise,")
     assert len(lines) == 3
 
 

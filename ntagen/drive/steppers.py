@@ -1,4 +1,4 @@
-"""Opens what moves a real needle, as the command line and the task describe it."""
+"""Opens what moves a real needle, as the user and the task describe it."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ntagen.drive.plugin import Speeds
     from ntagen.drive.settings import Settings
     from ntagen.grbl.axes import Axes
+    from ntagen.grbl.port import Port
     from ntagen.hardware import GrblDevice
     from ntagen.nsl import Task
     from ntagen.scene import Needle
@@ -55,14 +56,13 @@ def axes_for(device: GrblDevice, needle: Needle, settings: Settings) -> Axes:
 
 @contextlib.contextmanager
 def opened_steppers(
-    port: str, baud_rate: int, device: GrblDevice, needle: Needle, settings: Settings
+    wire: Port, axes: Axes, needle: Needle, settings: Settings
 ) -> Iterator[WatchedActuator]:
     """Connects to the controller that moves the needle, until the end of the block.
 
     Args:
-        port: The port; empty for that of the device.
-        baud_rate: The port's speed.
-        device: The device in the task.
+        wire: The port, which is closed at the end.
+        axes: Which axis does what, and how fast.
         needle: The needle.
         settings: How to drive.
 
@@ -73,10 +73,8 @@ def opened_steppers(
     from ntagen.drive.fitting import overrun_mm
     from ntagen.drive.real import require_overrun
     from ntagen.grbl.actuator import GrblActuator
-    from ntagen.grbl.port import SerialPort
 
-    axes = axes_for(device, needle, settings)
-    with contextlib.closing(SerialPort(port or device.port, baud_rate)) as wire:
+    with contextlib.closing(wire):
         actuator = GrblActuator(wire, axes)
         needs_mm = overrun_mm(needle.speed_mm_per_s, actuator.ramp_mm_per_s2)
         require_overrun(settings, needs_mm)
