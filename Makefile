@@ -40,6 +40,19 @@ demo: $(INSTALLED) ## Run the main job on the paper's environment; results in de
 	  '  demo/scene.png   the scene and the ten best plans' \
 	  '  demo/run.mcap    the run; see it with `$(BIN)/ntagen replay demo/run.mcap`, or in Foxglove'
 
+.PHONY: experiments
+experiments: $(INSTALLED) ## Make the paper's three experiments with few seeds (some minutes); tables and reports in demo/experiments/
+	@rm -rf demo/experiments
+	@mkdir -p demo/experiments/traces
+	@for kind in arc drift one_roll two_rolls irregular; do \
+	  $(BIN)/python examples/traces/make_trace.py $$kind --seed 1 > demo/experiments/traces/$$kind.csv; done
+	$(BIN)/ntagen match examples/traces/bench.nsl demo/experiments/traces/*.csv -o demo/experiments/match.png \
+	  | tee demo/experiments/match.txt
+	$(BIN)/ntagen experiment examples/experiments/virtual.toml --runs 5 -o demo/experiments/virtual
+	$(BIN)/ntagen experiment examples/experiments/real.toml --runs 2 -o demo/experiments/real
+	$(BIN)/ntagen sweep examples/experiments/scenes/surface_crs.nsl --over delay --values 0,0.2,0.5,1s --runs 4 \
+	  -o demo/experiments/delay
+
 .PHONY: test
 test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && cd checker && cargo test --locked --quiet

@@ -103,3 +103,14 @@ def test_links_lead_somewhere(document: Path) -> None:
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_files_and_folders_that_are_named_are_there(document: Path, files: set[str]) -> None:
     assert list(missing_names(document, files)) == []
+
+
+@pytest.mark.parametrize("name", ["match.txt", "virtual.md", "real.md"])
+def test_tables_in_the_readme_are_those_that_commands_wrote(name: str) -> None:
+    text = (ROOT / "examples" / "experiments" / "tables" / name).read_text("utf-8")
+    lines = [line.rstrip() for line in text.splitlines()]
+    if name.endswith(".md"):
+        lines = [line for line in lines if line.startswith("|")]
+    lines = [line for line in lines if line and not line.startswith("wrote ")]
+    assert len(lines) > 5
+    assert "\n".join(lines) in (ROOT / "README.md").read_text("utf-8")
