@@ -49,7 +49,7 @@ experiments: $(INSTALLED) ## Make the paper's three experiments with few seeds (
 	$(BIN)/ntagen match examples/traces/bench.nsl demo/experiments/traces/*.csv -o demo/experiments/match.png \
 	  | tee demo/experiments/match.txt
 	$(BIN)/ntagen experiment examples/experiments/virtual.toml --runs 5 -o demo/experiments/virtual
-	$(BIN)/ntagen experiment examples/experiments/real.toml --runs 2 -o demo/experiments/real
+	$(BIN)/ntagen experiment examples/experiments/real.toml --runs 1 -o demo/experiments/real
 	$(BIN)/ntagen sweep examples/experiments/scenes/surface_crs.nsl --over delay --values 0,0.2,0.5,1s --runs 4 \
 	  -o demo/experiments/delay
 

@@ -106,4 +106,8 @@ def digest_of(row: Row, task: Task) -> str:
         "scene": scene_to_json(task.scene),
         "given": [[one.parameter.field, one.value] for one in task.given],
     }
+    if row.speed is not None and task.device is not None:
+        # A lab has the axes of the task's device; its port is that of the hardware.
+        axes = (task.device.insert, task.device.roll)
+        facts["axes"] = [[axis.letter, axis.steps_per_unit] for axis in axes]
     return hashlib.sha256(json.dumps(facts).encode()).hexdigest()

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
+from ntagen.drive.needles import LAB
 from ntagen.errors import InputError
 from ntagen.experiment.description import Experiment, Row
 from ntagen.experiment.reading import ERRORS, experiment_of
@@ -46,6 +47,12 @@ def sweep_of_task(
     if over.words in settings:
         raise InputError(
             f"{over.flag} fixes what is swept\nhint: leave it out, or sweep something else"
+        )
+    if needle == LAB:
+        raise InputError(
+            "--needle lab: a sweep cannot say how fast its lab runs\n"
+            'hint: write a row with needle = "lab", speed and a list of values in a file for '
+            "`ntagen experiment`"
         )
     row: dict[str, object] = {"scenario": str(task), "known": known, "needle": needle}
     row["seeds"] = runs

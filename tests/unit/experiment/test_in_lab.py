@@ -57,6 +57,20 @@ def test_the_speed_is_in_the_name_the_digest_and_the_settings(tmp_path: Path) ->
     assert alone.digest == rows[0].digest
 
 
+def test_the_digest_of_a_lab_has_the_axes_of_its_controller(tmp_path: Path) -> None:
+    row = ROW.replace("no_cr", "near")
+
+    def digest(device: str) -> str:
+        (tmp_path / "near.nsl").write_text(f"{NEAR.rstrip()[:-1]}{device}\n}}\n", "utf-8")
+        (found,) = read_experiment(written(tmp_path, row)).rows
+        return found.digest
+
+    axes = 'device grbl "{}" {{ insert X {} steps/mm  roll A 10 steps/deg }}'
+    digests = [digest(axes.format(*one)) for one in (("a", 1000), ("b", 1000), ("a", 500))]
+    assert digests[0] == digests[1] != digests[2]
+    assert digest("") not in digests
+
+
 def test_a_lab_is_driven_with_the_settings_of_its_needle(tmp_path: Path) -> None:
     (row,) = read_experiment(written(tmp_path, ROW + 'noise = "0.3 mm"\n')).rows
     settings = row.configuration(load_task(row.scenario), 1).settings

@@ -211,6 +211,11 @@ def test_a_sweep_of_a_task_has_a_row_for_each_value_with_the_same_seeds() -> Non
     assert len(sweeps_of(experiment.rows)) == 1
 
 
+def test_a_sweep_of_a_task_has_no_lab_whose_speed_it_cannot_say() -> None:
+    with pytest.raises(InputError, match=r"how fast its lab runs\nhint: write a row"):
+        asked("noise", "0,1mm", needle="lab")
+
+
 def test_the_same_sweep_from_a_file_has_the_same_runs(tmp_path: Path) -> None:
     text = (
         '[[row]]\nscenario = "small_mid_cr.nsl"\nneedle = "phantom"\n'
