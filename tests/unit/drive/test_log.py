@@ -29,7 +29,14 @@ from ntagen.cli import main
 from ntagen.drive.log import ACTUAL, Log, metadata_of, topic_of
 from ntagen.drive.messages import KINDS, decode, encode
 from ntagen.drive.reading import read_log
-from ntagen.drive.records import Command, JournalError, Record, Transition
+from ntagen.drive.records import (
+    Command,
+    JournalError,
+    Measured,
+    Predicted,
+    Record,
+    Transition,
+)
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings
 from ntagen.drive.viewing import quaternion
@@ -149,6 +156,40 @@ def test_common_readers_read_the_log(tmp_path: Path) -> None:
             m for _, c, _, m in reader.iter_decoded_messages() if c.topic == topic_of(Command)
         ]
     assert [command.value for command in commands] == [0.25] * len(MANY)
+
+
+def test_a_log_that_is_not_kept_up_shows_the_needle_seldom_and_has_all_records(
+    tmp_path: Path,
+) -> None:
+    records = [
+        record
+        for i in range(41)
+        for record in (
+            Measured(0.125 * i, 0.25 * i, (0.0, -0.25 * i, 0.0), 0.0, (), ()),
+            Predicted(0.125 * i, (0.0, -0.25 * i, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), 0.0),
+        )
+    ]
+
+    def shown(name: str, *, is_kept_up: bool) -> dict[str, list[float]]:
+        path = tmp_path / name
+        with Log(path, {}, {}, is_kept_up=is_kept_up) as log:
+            log.started(PAPER)
+            for record in records:
+                log.record(record)
+        assert read_log(path).records == tuple(records)
+        seen: dict[str, list[float]] = {}
+        with path.open("rb") as stream:
+            for _, channel, message in make_reader(stream).iter_messages():
+                seen.setdefault(channel.topic, []).append(message.log_time / 1e9)
+        return seen
+
+    watched = shown("watched.mcap", is_kept_up=True)
+    alone = shown("alone.mcap", is_kept_up=False)
+    every_half_second = [0.5 * i for i in range(11)]
+    for topic in ("/needle/measured", "/needle/tip", "/tf"):
+        assert watched[topic] == [0.125 * i for i in range(41)]
+        assert alone[topic] == every_half_second
+    assert alone["/scene"] == watched["/scene"]
 
 
 def test_equal_runs_give_equal_files(tmp_path: Path) -> None:
