@@ -47,7 +47,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
     | {"checker.strategy", "_checker"},
-    "checker.options": {"checker.strategy"},
+    "checker.options": {"checker.queries", "checker.strategy"},
     "checker.query_form": {"_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}

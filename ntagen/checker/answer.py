@@ -52,6 +52,8 @@ class Place:
 class Answer:
     """The answer to a query.
 
+    An answer is neither true nor false: `satisfied` says whether the query is.
+
     Attributes:
         query: The query as given.
         verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
@@ -107,6 +109,28 @@ class Answer:
         self.plans_stop = raw.plans_stop
         self.verified = raw.verified
         self.verification = tuple(raw.verification())
+
+    def __repr__(self) -> str:
+        states = "1 state" if self.explored == 1 else f"{self.explored} states"
+        facts = [f"{self.query.strip()} is {self.verdict}"]
+        if self.value is not None:
+            facts.append(f"value {json.dumps(self.value)}")
+        if self.stop is not None:
+            facts.append(f"stopped by the {self.limit_text}")
+        if self.message:
+            facts.append(self.message.partition("\n")[0])
+        return f"<Answer: {', '.join(facts)}; {states} explored in {1000 * self.seconds:.1f} ms>"
+
+    def __bool__(self) -> bool:
+        raise ValueError(
+            f"an answer is neither true nor false; this one is {self.verdict!r}\n"
+            "hint: ask for answer.satisfied, or compare answer.verdict"
+        )
+
+    @property
+    def satisfied(self) -> bool | None:
+        """Whether the query is satisfied; ``None`` without a verdict: see `verdict`."""
+        return {"satisfied": True, "not satisfied": False}.get(self.verdict)
 
     @property
     def limit_text(self) -> str:

@@ -181,7 +181,7 @@ class Model:
         is first used, within the limits of that query.
 
         Args:
-            query: The query in UPPAAL's language.
+            query: The query in UPPAAL's language, or one of `queries`.
             options: How it is to be answered, given as keywords.
 
         Returns:
@@ -207,7 +207,7 @@ class Model:
         If the controller cannot win, it is the environment's strategy; `Strategy.winning` tells.
 
         Args:
-            query: A control query, such as ``control: A<> Gate.Open``.
+            query: A control query, such as ``control: A<> Gate.Open``, or one of `queries`.
             options: How it is to be answered, given as keywords: the fields of `Options`.
 
         Raises:
@@ -300,7 +300,14 @@ class Model:
             holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
         return Verification(holds, tuple(lines))
 
-    def simulate(self, steps: int = 100, seed: int = 0, choose: Choose | None = None) -> Run:
+    def simulate(
+        self,
+        steps: int = 100,
+        seed: int = 0,
+        choose: Choose | None = None,
+        *,
+        strategy: Strategy | None = None,
+    ) -> Run:
         """Makes a run with exact times from the initial state.
 
         Without `choose`, each transition that is possible now or later is equally likely, and so is
@@ -311,14 +318,24 @@ class Model:
             seed: The same seed gives the same run.
             choose: Gets each state and its choices. Returns the index of a choice, with a delay or
                 without (then the delay is random), or ``None`` to end the run.
+            strategy: A strategy of this model, which the run follows; its opponent moves at random.
+                The run also ends when play is decided.
 
         Raises:
-            ValueError: `choose` returns a delay that is too fine a fraction of the unit.
+            ValueError: `choose` returns a delay that is too fine a fraction of the unit, or is
+                given together with `strategy`.
             IndexError: `choose` returns a choice that is not possible.
             ModelError: The model has a run-time error.
+            InputError: The strategy does not belong to a model like this one.
         """
         from ntagen.checker.runs import simulated
 
+        if strategy is not None:
+            if choose is not None:
+                raise ValueError("give either choose or strategy: both say what happens next")
+            if not strategy.fits(self._raw):
+                raise InputError("the strategy does not belong to this model")
+            return strategy.simulate(steps, seed)
         with failing():
             return simulated(_checker.walk_exactly(self._raw), steps, seed, choose)
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Concatenate, Literal, ParamSpec, TypeVar
 
+from ntagen.checker.queries import Query
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -158,9 +159,12 @@ Result = TypeVar("Result")
 def by_keywords(
     options: Callable[Keywords, Options],
 ) -> Callable[
-    [Callable[[Asked, str, Options], Result]], Callable[Concatenate[Asked, str, Keywords], Result]
+    [Callable[[Asked, str, Options], Result]],
+    Callable[Concatenate[Asked, str | Query, Keywords], Result],
 ]:
     """Lets a method about a query take the fields of its options as keywords.
+
+    The query may also be one of a file.
 
     Args:
         options: `Options`, whose fields become the keywords.
@@ -168,12 +172,12 @@ def by_keywords(
 
     def decorate(
         method: Callable[[Asked, str, Options], Result],
-    ) -> Callable[Concatenate[Asked, str, Keywords], Result]:
+    ) -> Callable[Concatenate[Asked, str | Query, Keywords], Result]:
         @functools.wraps(method)
         def with_keywords(
-            asked: Asked, query: str, /, *args: Keywords.args, **keywords: Keywords.kwargs
+            asked: Asked, query: str | Query, /, *args: Keywords.args, **keywords: Keywords.kwargs
         ) -> Result:
-            return method(asked, query, options(*args, **keywords))
+            return method(asked, str(query), options(*args, **keywords))
 
         first = list(inspect.signature(method).parameters.values())[:2]
         fields = inspect.signature(options).parameters.values()

@@ -17,10 +17,10 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ntagen import _checker
-from ntagen.checker.runs import Edge, State, edge_of, state_of
+from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of, state_of
 from ntagen.errors import InputError, ModelError
 
-__all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window"]
+__all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window", "played"]
 
 _OPEN_UNITS = 5
 """In a window without end, a random delay is within this many units of its start."""
@@ -281,6 +281,41 @@ class Play:
                 )
             except OverflowError:
                 raise InputError(f"the delay {exact} is too long or too fine a fraction") from None
+
+
+def played(play: Play, steps: int, seed: int) -> Run:
+    """The run of a play of at most `steps` steps, in which the opponent moves at random.
+
+    Raises:
+        InputError: A common unit of all delays would be too fine.
+        ModelError: The model fails in a state of the play.
+    """
+    chance = Chance(seed)
+    while len(play) < steps:
+        situation = play.situation()
+        then = situation.next
+        if situation.winner is not None:
+            break
+        chosen = chance.choose(situation)
+        if chosen is not None:
+            move, delay = chosen
+            if move in situation.replies:
+                play.reply(situation.replies.index(move), delay)
+            else:
+                play.allow(situation.allowed.index(move), delay)
+        elif then.kind == "acts":
+            play.follow()
+        elif then.kind == "won" and then.delay:
+            play.wait(then.delay)
+        else:
+            break
+    text = play.trace_json()
+    if text is None:
+        raise InputError(
+            "the delays of this run have no common unit that is not too fine\n"
+            "hint: ask for fewer steps, or for another seed"
+        )
+    return runs_of(json.loads(text))[0]
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from typing import Any
 
 from ntagen.values import dataclass
@@ -16,11 +17,20 @@ class Query:
         comment: The comment of the query.
         expect: The verdict that the file states, the number that ``sup`` or ``inf`` should give, or
             ``None``.
+        path: The file that has the query.
+        line: The line of the file in which the formula begins, from 1.
+        column: Where it begins in this line, from 1.
     """
 
     text: str
     comment: str
     expect: str | float | None = None
+    path: str = field(default="", compare=False)
+    line: int = field(default=0, compare=False)
+    column: int = field(default=0, compare=False)
+
+    def __str__(self) -> str:
+        return self.text
 
 
 def queries_from(entries: list[dict[str, Any]]) -> tuple[Query, ...]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from ntagen import _checker
-from ntagen.checker.play import Play
+from ntagen.checker.play import Play, played
 from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.files import write_files
@@ -272,7 +272,7 @@ class Strategy:
         except LookupError as error:
             raise self._undecided(given, error) from None
         except ValueError as error:
-            raise InputError(f"{error}\n{_STATE_HINT}") from None
+            raise InputError(f"{error}\n{self._way_out(error, given)}") from None
         except _checker.FailedError as error:
             raise ModelError(error.args[0]) from None
         if raw["over"]:
@@ -329,6 +329,28 @@ class Strategy:
         with _rejecting():
             return Play(self._raw.play(self.query, self.forced, self.priorities))
 
+    def simulate(self, steps: int = 100, seed: int = 0) -> Run:
+        """Makes a run that follows the strategy; its opponent moves at random.
+
+        A permissive strategy also makes random moves of those that it allows.
+
+        Args:
+            steps: The run ends after this many steps, or when play is decided.
+            seed: The same seed gives the same run.
+
+        Raises:
+            InputError: The strategy's query does not fit the model, or the delays have no common
+                unit.
+            ModelError: The model has a run-time error.
+        """
+        return played(self.play(), steps, seed)
+
+    def fits(self, model: _checker.Model) -> bool:
+        """Whether a model has the processes and clocks that the strategy speaks of."""
+        facts = json.loads(model.facts_json())
+        names = (frozenset(one["name"] for one in facts[kind]) for kind in ("processes", "clocks"))
+        return tuple(names) == (self._processes, self._clocks - {_TIME})
+
     def _given(self, state: StateLike | Discrete) -> dict[str, Any]:
         """The state as the engine reads it."""
         clocks: Mapping[str, Any] = {}
@@ -366,7 +388,16 @@ class Strategy:
         except LookupError as error:
             raise self._undecided(given, error) from None
         except ValueError as error:
-            raise InputError(f"{error}\n{_STATE_HINT}") from None
+            raise InputError(f"{error}\n{self._way_out(error, given)}") from None
+
+    def _way_out(self, error: ValueError, given: dict[str, Any]) -> str:
+        """The hint for a state that does not fit the model."""
+        for name in (*given["variables"], *given["clocks"]):
+            full = sorted(clock for clock in self._clocks if clock.endswith(f".{name}"))
+            if full and str(error).endswith((f"no variable {name}", f"no clock {name}")):
+                shown = " or ".join(full)
+                return f"hint: a clock of a process is named together with it: {shown}"
+        return _STATE_HINT
 
     def _undecided(self, given: dict[str, Any], error: LookupError) -> UndecidedError:
         places = " ".join(f"{process}.{place}" for process, place in given["locations"].items())
