@@ -24,7 +24,7 @@ from ntagen.cli.models import include_option
 from ntagen.cli.operator import SignalledOperator, signalled_operator
 from ntagen.cli.report import lines, report, summary
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.steering import say_idle_errors, show_settings, steering_options
+from ntagen.cli.steering import known_option, say_idle_errors, show_settings, steering_options
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
@@ -77,13 +77,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 )
 @tracker_options
 @course_options
-@click.option(
-    "--known",
-    metavar="all|none|NAME,…",
-    default="all",
-    show_default=True,
-    help="The critical regions that the driver knows at the start. It must feel the others.",
-)
+@known_option
 @click.option(
     "--breath-phase",
     "breath_phase_deg",

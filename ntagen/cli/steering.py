@@ -70,6 +70,16 @@ def sweeping_options(command: Callable[..., int | None]) -> Callable[..., int | 
     return _with_options(command, [p for p in PARAMETERS if p.field != f"{NEEDLE}.seed"])
 
 
+known_option = click.option(
+    "--known",
+    metavar="all|none|NAME,…",
+    default="all",
+    show_default=True,
+    help="The critical regions that the driver knows at the start. It must feel the others.",
+)
+"""What the driver is told at the start."""
+
+
 def _with_options(
     command: Callable[..., int | None], parameters: Sequence[Parameter]
 ) -> Callable[..., int | None]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
-from ntagen.cli.steering import sweeping_options
+from ntagen.cli.steering import known_option, sweeping_options
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 
@@ -46,13 +46,7 @@ if TYPE_CHECKING:
     help="The simulated needle: phantom drifts, lags and is measured as real needles are; virtual "
     "bends exactly as planned; grbl+sim is a phantom behind an emulated stepper controller.",
 )
-@click.option(
-    "--known",
-    metavar="all|none|NAME,…",
-    default="all",
-    show_default=True,
-    help="The critical regions that the driver knows at the start. It must feel the others.",
-)
+@known_option
 @click.option(
     "-o",
     "--output",

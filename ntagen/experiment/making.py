@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ntagen.drive.configure import Configuration
 from ntagen.drive.log import Log
 from ntagen.drive.log_facts import facts_of
 from ntagen.drive.outcome import Driven
@@ -99,18 +100,21 @@ def _task(path: Path) -> Task:
 def _made(block: Block, task: Task, seed: int) -> Run:
     """Makes a run with its log, if one is wanted."""
     since = time.perf_counter()
-    run = _logged(block, task, seed) if block.logs else _driven(block.row, task, seed, (), "")
+    configuration = block.row.configuration(task, seed)
+    if block.logs:
+        run = _logged(block, task, configuration, seed)
+    else:
+        run = _driven(block.row, task, configuration, seed, (), "")
     return replace(run, seconds=time.perf_counter() - since)
 
 
-def _logged(block: Block, task: Task, seed: int) -> Run:
-    configuration = block.row.configuration(task, seed)
+def _logged(block: Block, task: Task, configuration: Configuration, seed: int) -> Run:
     tracker = "" if block.row.speed is None else "openigtlink, that of the lab"
     facts = facts_of(block.row.scenario, task.scene, configuration, block.row.known, tracker)
     with new_log(block.folder, block.row.id, seed) as (path, name):
         try:
             with Log(path, *facts, is_kept_up=False) as log:
-                return _driven(block.row, task, seed, (log,), name)
+                return _driven(block.row, task, configuration, seed, (log,), name)
         except JournalError as error:
             # The message names the file as it is called now, and has a hint for a single run.
             reason = str(error).partition("\nhint: ")[0].rpartition(": ")[2]
@@ -120,9 +124,15 @@ def _logged(block: Block, task: Task, seed: int) -> Run:
             ) from error
 
 
-def _driven(row: Row, task: Task, seed: int, logs: Sequence[Journal], name: str) -> Run:
+def _driven(
+    row: Row,
+    task: Task,
+    configuration: Configuration,
+    seed: int,
+    logs: Sequence[Journal],
+    name: str,
+) -> Run:
     """Drives, and keeps what counts. If the driver breaks, that is a result, too."""
-    configuration = row.configuration(task, seed)
     observer = Observer(task.scene)
     try:
         if row.speed is not None:

@@ -47,7 +47,7 @@ def sweeps_of(rows: Sequence[Row]) -> list[Sweep]:
         for field in row.values:
             if BY_FIELD[field].is_quantity:
                 rest = tuple(sorted((k, v) for k, v in row.values.items() if k != field))
-                key = (field, row.scenario, row.known, row.needle, row.seeds, rest)
+                key = (field, row.scenario, row.known, row.needle, row.speed, row.seeds, rest)
                 groups.setdefault(key, []).append(row)
     return [
         _sweep(BY_FIELD[field], group)

@@ -15,21 +15,9 @@ from typing import Any
 import pytest
 
 from ntagen.cli import main
-from ntagen.experiment import local
-from ntagen.experiment.crew import Here
 from tests.unit.experiment.files import written
 
 LONG = '[[row]]\nscenario = "large_mid_cr.nsl"\nnoise = 0.1\nseeds = 200\n'
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No processes."""
-
-    def crew(_: int) -> Here:
-        return Here()
-
-    monkeypatch.setattr(local, "LocalCrew", crew)
 
 
 @pytest.mark.usefixtures("here")

@@ -8,22 +8,10 @@ from pathlib import Path
 import pytest
 
 from ntagen.cli import main
-from ntagen.experiment import local
-from ntagen.experiment.crew import Here
 from tests.unit.experiment.files import SCENARIOS
 
 QUICK = ["sweep", str(SCENARIOS / "no_cr.nsl"), "--needle", "virtual", "--runs", "1", "--no-logs"]
 NOISE = ["--over", "noise", "--values", "0.1,0.5mm"]
-
-
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No processes."""
-
-    def crew(_: int) -> Here:
-        return Here()
-
-    monkeypatch.setattr(local, "LocalCrew", crew)
 
 
 @pytest.mark.usefixtures("here")

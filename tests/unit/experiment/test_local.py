@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from ntagen.drive.records import Journal
+from ntagen.drive.configure import Configuration
 from ntagen.experiment import local
 from ntagen.experiment.campaign import Progress, carry_out
 from ntagen.experiment.crew import Crew, Done, Here
@@ -92,10 +92,10 @@ def deadly_block(block: Block) -> list[Run]:
 
     drive = making._driven
 
-    def driven(row: Row, task: Task, seed: int, logs: Sequence[Journal], name: str) -> Run:
+    def driven(row: Row, task: Task, configuration: Configuration, seed: int, *rest: object) -> Run:
         if (row.scenario.stem, seed) == ("no_cr", 3):
             os.kill(os.getpid(), signal.SIGKILL)
-        return drive(row, task, seed, logs, name)
+        return drive(row, task, configuration, seed, *rest)  # type: ignore[arg-type]
 
     making._driven = driven
     return making.make_block(block)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -52,6 +53,18 @@ def test_each_line_of_a_grid_is_a_sweep() -> None:
     assert {sweep.name.rpartition(", ")[2] for sweep in sweeps_of(rows)} == {
         *("noise 0 mm", "noise 0.5 mm", "delay 0 s", "delay 0.1 s", "delay 0.2 s")
     }
+
+
+def test_labs_of_two_speeds_are_two_sweeps() -> None:
+    rows = [
+        dataclasses.replace(row(f"{speed}-{noise_mm}", noise_mm=noise_mm), speed=speed)
+        for speed in (1.0, 5.0)
+        for noise_mm in (0.1, 0.2)
+    ]
+    assert [sweep.rows for sweep in sweeps_of(rows)] == [
+        ("1.0-0.1", "1.0-0.2"),
+        ("5.0-0.1", "5.0-0.2"),
+    ]
 
 
 @pytest.mark.parametrize(
