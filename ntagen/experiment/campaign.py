@@ -23,8 +23,9 @@ _DEATHS: Final = 2
 _BLOCK_RUNS: Final = 10
 """Most runs in a block. To hand over a block takes milliseconds, a run a quarter of a second."""
 
-_BLOCKS_PER_WORKER: Final = 8
-"""So many blocks a worker, at least: so the last worker does not end long after the others."""
+_SHARES: Final = 8
+"""A block has at most this share of what one worker still has to do. So blocks become smaller, and
+the last worker does not end long after the others."""
 
 Key = tuple[str, int]
 
@@ -128,11 +129,12 @@ class _Work:
     def _blocks(self, workers: int) -> Iterator[Block]:
         """The missing runs, in blocks."""
         missing = self.experiment.runs - len(self.runs)
-        size = max(1, min(_BLOCK_RUNS, missing // (workers * _BLOCKS_PER_WORKER)))
         for row in self.experiment.rows:
-            seeds = [seed for seed in row.seeds if (row.id, seed) not in self.runs]
-            for start in range(0, len(seeds), size):
-                part = tuple(seeds[start : start + size])
+            seeds = tuple(seed for seed in row.seeds if (row.id, seed) not in self.runs)
+            while seeds:
+                size = max(1, min(_BLOCK_RUNS, missing // (workers * _SHARES)))
+                part, seeds = seeds[:size], seeds[size:]
+                missing -= len(part)
                 yield Block(row, part, self.folder, identity(), self.logs)
 
     def _add(self, runs: list[Run]) -> None:

@@ -139,6 +139,8 @@ def felt(document: Mapping[str, Any], row: str, scene: Scene) -> Figure:
 
 def times(document: Mapping[str, Any], row: str) -> Figure:
     """How long syntheses took, and whole runs."""
+    import numpy as np
+
     figure = _figure(2.5)
     short, long = figure.subplots(1, 2)
     runs = _runs(document, row)
@@ -149,7 +151,9 @@ def times(document: Mapping[str, Any], row: str) -> Figure:
         (long, overall, "overall time of a run [s]"),
     ):
         if values:
-            axes.hist(values, bins=_BINS, color=_BAND, edgecolor=_LINE, linewidth=0.6)
+            # One outline is drawn much faster than thirty bars.
+            counts, edges = np.histogram(values, _BINS)
+            axes.stairs(counts, edges, fill=True, facecolor=_BAND, edgecolor=_LINE, linewidth=0.6)
         axes.set_xlabel(label)
         axes.grid(True, axis="y", color=_GRID)
         axes.set_axisbelow(True)
