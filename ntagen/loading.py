@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ntagen import checker
 from ntagen.checker import Model, OverflowRule
+from ntagen.errors import InputError
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -82,7 +83,12 @@ def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
         OSError: The file cannot be read.
     """
     if path.suffix.lower() != ".nsl":
-        return Loaded(checker.load_file(path))
+        try:
+            return Loaded(checker.load_file(path))
+        except checker.RejectedError as error:
+            if message := _other_kind(path, error):
+                raise InputError(message) from None
+            raise
     from ntagen.nsl import load_task
     from ntagen.render import render
 
@@ -90,3 +96,27 @@ def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
     text = render(task.scene, source=path.name)
     model = checker.load(text, path=str(path.with_suffix(".xml")))
     return Loaded(model, task, tuple(warning.render() for warning in task.warnings))
+
+
+_MODEL_SUFFIXES = (".xml", ".xta", ".ta")
+
+_NOT_A_MODEL = "error[E0121]: "
+"""The diagnostic of a file that is no model at all."""
+
+
+def _other_kind(path: Path, error: checker.RejectedError) -> str | None:
+    """The message about a file of another kind, on one line; ``None`` if it may be a model.
+
+    A file with another ending that is wrong from its first character on is none: its mistakes say
+    nothing.
+    """
+    first = error.diagnostics[0].partition("\n")[0]
+    suffix = path.suffix.lower()
+    if suffix == ".q":
+        return f"{path} is a list of queries; write the model before it: MODEL.xml {path}"
+    _, is_other, reason = first.partition(_NOT_A_MODEL)
+    if not is_other:
+        if suffix in _MODEL_SUFFIXES or not first.startswith(f"{path}:1:1: "):
+            return None
+        reason = "this is no model"
+    return f"{path}: {reason}; expected is a UPPAAL model (.xml, .xta) or an environment (.nsl)"

@@ -39,6 +39,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.errors": {"errors", "_checker"},
     "checker.picture": set(),
     "checker.queries": set(),
+    "checker.expectation": {"checker.queries"},
     "checker.facts": {"checker.picture", "checker.queries"},
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
     "checker.runs": set(),
@@ -54,6 +55,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
     | {"checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
+    | {"checker.expectation"}
     | {"checker.options", "checker.query_form", "checker.states"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},

@@ -326,18 +326,19 @@ impl fmt::Display for Rendered<'_> {
             Severity::Error => "error",
             Severity::Warning => "warning",
         };
-        let path = if source.path.is_empty() {
-            "<text>"
-        } else {
-            &source.path
+        // A text that is in no file is named by its place, or not at all.
+        let (path, place) = match (&*source.path, source.place.as_str()) {
+            ("", "") => ("<text>", ""),
+            ("", place) => (place, ""),
+            named => named,
         };
         writeln!(
             f,
             "{path}:{}:{}: {severity}[{}]: {}",
             position.line, position.column, diagnostic.code.code, diagnostic.message
         )?;
-        if !source.place.is_empty() {
-            writeln!(f, "  in {}", source.place)?;
+        if !place.is_empty() {
+            writeln!(f, "  in {place}")?;
         }
         let start = floor_char_boundary(&source.text, diagnostic.span.start as usize);
         let line_start = source.text[..start].rfind('\n').map_or(0, |i| i + 1);
@@ -356,7 +357,7 @@ impl fmt::Display for Rendered<'_> {
             writeln!(f, "  note: {note}")?;
         }
         if let Some(help) = &diagnostic.help {
-            writeln!(f, "  help: {help}")?;
+            writeln!(f, "  hint: {help}")?;
         }
         Ok(())
     }

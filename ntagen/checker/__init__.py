@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from ntagen.checker.answer import Answer, Extreme, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
+from ntagen.checker.expectation import Expected, expected_of, is_as_expected, remark_of
 from ntagen.checker.model import (
     HEURISTICS,
     Model,
@@ -47,6 +48,7 @@ __all__ = [
     "EngineEdge",
     "EnginePlan",
     "EngineStep",
+    "Expected",
     "Extreme",
     "Model",
     "Options",
@@ -64,9 +66,12 @@ __all__ = [
     "Value",
     "Verdict",
     "diagnostic_pages",
+    "expected_of",
     "form_of",
+    "is_as_expected",
     "load",
     "load_file",
+    "remark_of",
 ]
 
 

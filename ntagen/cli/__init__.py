@@ -6,7 +6,8 @@ its exit code (nothing means 0). If it raises an error, this module prints one m
 
 Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
 evidence does not hold), 2 the input or the command line is wrong, 3 stopped by a limit, 4 run-time
-error in the model, 5 device fault, 70 internal error, 130 interrupted, 143 ended by SIGTERM.
+error in the model, 5 device fault, 70 internal error, 130 interrupted, 141 nobody reads the output
+any more, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -51,6 +52,8 @@ COMMANDS: Final = {
 
 INTERNAL_ERROR: Final = 70
 INTERRUPTED: Final = 130
+PIPE_CLOSED: Final = 141
+"""The code that a shell gives a program that SIGPIPE ends."""
 
 _OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Modules, models and plans are many objects, none of them garbage. At Python's usual number, 700,
@@ -172,10 +175,10 @@ def _report(error: BaseException) -> int:
         case KeyboardInterrupt() | EOFError() | click.Abort():
             _say("interrupted")
             return INTERRUPTED
-        case BrokenPipeError():
+        case BrokenPipeError() if error.filename is None:
+            # As in `ntagen … | head -1`: the reader has what it wants.
             _abandon_output()
-            _say("error: the program that reads the output has ended")
-            return InputError.exit_code
+            return PIPE_CLOSED
         case OSError():
             _abandon_output()
             _say(_with_severity(_describe(error)))

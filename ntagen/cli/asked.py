@@ -11,7 +11,7 @@ from ntagen.errors import InputError
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
-    from ntagen.checker import Model, QueryForm
+    from ntagen.checker import Expected, Model, QueryForm
     from ntagen.checker.facts import Query
 
 
@@ -27,9 +27,22 @@ class Asked:
     folder: Path | None = None
     """The folder of files that the query names; ``None`` is that of the model."""
 
+    remark: tuple[str, ...] = ()
+    """The lines of its comment, without its name and without what is expected."""
+
+    expected: Expected | None = None
+    """What the file says about the answer."""
+
+    place: tuple[str, int, int] | None = None
+    """File, line and column, from 1, if it stands in a file."""
+
 
 def queries_of(model: Model, asked: Sequence[str], file: Path | None) -> list[Asked]:
     """The queries to answer: those asked for, else those of the file, else those of the model."""
+    if file is not None and file.suffix.lower() in (".xml", ".xta", ".nsl"):
+        raise InputError(
+            f"{file} is a model, not a list of queries (.q); check one model at a time"
+        )
     known = [_asked(query) for query in model.queries]
     from_file = [_asked(one, file.parent) for one in model.read_queries(file)] if file else []
     if file and not from_file:
@@ -50,13 +63,15 @@ def is_used_by(query: Asked, later: Sequence[Asked]) -> bool:
 
 def _asked(query: Query, folder: Path | None = None) -> Asked:
     """A query of a file, named by the first line of its comment or by its strategy."""
-    from ntagen.checker import form_of
+    from ntagen.checker import expected_of, form_of, remark_of
 
-    first_line = query.comment.strip().splitlines()[0].strip() if query.comment.strip() else ""
+    remark = remark_of(query)
     form = form_of(query.text)
-    if re.fullmatch(r"[A-Za-z_]\w*", first_line):
-        return Asked(first_line, query.text, form, folder)
-    return Asked(form.defines if form else None, query.text, form, folder)
+    name = form.defines if form else None
+    if remark and re.fullmatch(r"[A-Za-z_]\w*", remark[0]):
+        name, remark = remark[0], remark[1:]
+    place = (query.path, query.line, query.column) if query.line else None
+    return Asked(name, query.text, form, folder, remark, expected_of(query), place)
 
 
 def _find(text: str, named: dict[str, Asked]) -> Asked:

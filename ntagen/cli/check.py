@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+import contextlib
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,7 +13,9 @@ import click
 
 from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.against import answer_of, defence_notes
-from ntagen.cli.asked import Asked, is_used_by, queries_of
+from ntagen.cli.answer_formats import FORMATS, Format, GitHub, JsonLines, JUnit, Sarif
+from ntagen.cli.answer_rows import Human
+from ntagen.cli.asked import is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
 from ntagen.cli.models import (
@@ -21,44 +24,46 @@ from ntagen.cli.models import (
     pointing_to_explanations,
     rank_option,
     show_warnings,
-    with_pointer,
 )
 from ntagen.cli.options import engine_options
+from ntagen.cli.outcomes import Outcome, exit_code
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
-from ntagen.cli.terminal import Styled, echo
+from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model, QueryForm
+    from ntagen.checker import QueryForm
 
-STOPPED: Final = 3
-"""Exit code after a limit or a ``maybe``."""
-
-MODEL_ERROR: Final = 4
-"""Exit code after a run-time error in the model."""
-
-_MARK: Final = {
-    "satisfied": ("yes", "green"),
-    "not satisfied": ("no", "red"),
-    "maybe": ("maybe", "yellow"),
-    "unknown": ("stopped", "yellow"),
-    "error": ("error", "red"),
-}
+_EXPECTED: Final = {"yes": "satisfied", "no": "not satisfied"}
+"""What ``--expect`` says about all queries; ``file`` stands for what the file says of each."""
 
 
-REJECTED_MARK: Final = ("refused", "red")
-"""The mark of a query that is rejected while others are answered."""
+class _CheckCommand(click.Command):
+    """The word after ``--expect`` belongs to it only if it is one of its values."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        joined: list[str] = []
+        for word in args:
+            if joined and joined[-1] == "--expect" and word in (*_EXPECTED, "file"):
+                joined[-1] = f"--expect={word}"
+            else:
+                joined.append(word)
+        return super().parse_args(
+            ctx, ["--expect=file" if word == "--expect" else word for word in joined]
+        )
 
 
 @click.command(
     "check",
-    epilog="Exit codes: 0 every query is satisfied, 1 some are not, 2 the input is rejected "
-    "(the other queries are still answered), 3 stopped by a limit, or the verdict is maybe, "
-    "4 run-time error in the model, 70 internal error (also if a strategy or trace fails its "
-    "check), 130 interrupted (the counters so far are printed), 143 ended by SIGTERM.",
+    cls=_CheckCommand,
+    epilog="Exit codes: 0 every query is satisfied (with --expect: as expected), 1 some are not, "
+    "2 the input is rejected (the other queries are still answered), 3 stopped by a limit, or the "
+    "verdict is maybe, 4 run-time error in the model, 70 internal error (also if a strategy or "
+    "trace fails its check), 130 interrupted (the counters so far are printed), 141 nobody reads "
+    "the output any more, 143 ended by SIGTERM.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
@@ -79,10 +84,26 @@ REJECTED_MARK: Final = ("refused", "red")
     "file after MODEL, without --queries.",
 )
 @click.option(
+    "--expect",
+    metavar="[yes|no|file]",
+    type=click.Choice(["yes", "no", "file"]),
+    help="Compare the answers with what is expected: each as the file says (--expect), or all "
+    "satisfied (--expect yes), or none (--expect no). A file says it by <expect> or <result> in "
+    "XML, or by a comment of the query such as // EXPECT:T or // false.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    help="How answers are printed: for people (human), one JSON object on a line for each query "
+    "(json), annotations of GitHub Actions (github), or a report for CI (junit, sarif).  "
+    "[default: human]",
+)
+@click.option(
     "--json",
     "as_json",
     is_flag=True,
-    help="Print one line for each query, a JSON object, and nothing else.",
+    help="The same as --format json.",
 )
 @click.option(
     "--trace",
@@ -141,6 +162,8 @@ def command(
     second_path: Path | None,
     asked: tuple[str, ...],
     query_file: Path | None,
+    expect: str | None,
+    form: str | None,
     as_json: bool,
     trace: str | None,
     wanted_trace: Any,  # noqa: ANN401  click gives a str where the engine wants literals
@@ -163,6 +186,8 @@ def command(
       ntagen check many.nsl --plans plans.jsonl --timeout 10min
       ntagen check model.xml --query "E<> Gate.Open" --trace -
       ntagen check model.xml model.q --json --timeout 60s
+      ntagen check model.xml --expect
+      ntagen check model.xml --expect --format junit > report.xml
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
       ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
       ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
@@ -184,10 +209,14 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.checker import Options
 
-    for option, target in (("--strategy", strategy), ("--plans", plans)):
-        if as_json and target == "-":
+    if as_json and form not in (None, "json"):
+        raise click.UsageError(f"--json and --format {form} exclude each other; give one")
+    is_human = not as_json and form in (None, "human")
+    for option, target in (("--strategy", strategy), ("--plans", plans), ("--trace", trace)):
+        if not is_human and target == "-":
+            option_given = "--json" if as_json else f"--format {form}"
             raise click.UsageError(
-                f"--json and {option} - both write to standard output; give {option} a FILE"
+                f"{option_given} and {option} - both write to standard output; give {option} a FILE"
             )
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
@@ -204,59 +233,92 @@ def command(
         certificate=certificate is not None,
         **given | most_plans(plans),
     )
-    worst = 0
-    with pointing_to_explanations(not as_json):
+    shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
+    outcomes: list[Outcome] = []
+    with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
         loaded = load_model(model_path, include, overflow)
         shown_already = len(loaded.model.warnings)
         todo = queries_of(loaded.model, asked, query_path)
+        if loaded.task is not None:
+            # The generated model is no file of the user's.
+            todo = [replace(query, place=None) for query in todo]
         show_warnings(loaded.model.warnings[shown_already:])
-        _say_idle_options(
-            [query.form for query in todo if query.form], is_environment=loaded.task is not None
+        if expect == "file" and not any(query.expected is not None for query in todo):
+            raise InputError(_NOTHING_EXPECTED)
+    _say_idle_options(
+        [query.form for query in todo if query.form], is_environment=loaded.task is not None
+    )
+    shown.loaded(model_path, loaded.model)
+    for number, query in enumerate(todo):
+        is_used = is_used_by(query, todo[number + 1 :])
+        outputs = replace(outputs, limits=list_limits(options, quiet=not is_human))
+        wanted = replace(
+            options,
+            strategy=is_used or outputs.wants_strategy,
+            folder=query.folder,
+            **for_task(options, loaded.task, query),
         )
-        if not as_json:
-            _header(model_path, loaded.model)
-        for number, query in enumerate(todo):
-            is_used = is_used_by(query, todo[number + 1 :])
-            outputs = replace(outputs, limits=list_limits(options, quiet=as_json))
-            wanted = replace(
-                options,
-                strategy=is_used or outputs.wants_strategy,
-                folder=query.folder,
-                **for_task(options, loaded.task, query),
-            )
-            try:
-                with shown_progress(query.text, quiet=as_json) as report:
-                    answer, found = answered(
-                        loaded, query, replace(wanted, progress=report), overflow
-                    )
-            except InputError as error:
-                if len(todo) == 1:
-                    raise
-                # The other queries may be right, and the user wants their answers.
-                echo(str(error) if as_json else with_pointer(str(error)), err=True)
-                if not as_json:
-                    _line(REJECTED_MARK, query)
-                worst = InputError.exit_code
-                continue
-            if answer.verified is False:
-                echo("\n".join([query.text, *answer.verification]), err=True)
-                return INTERNAL_ERROR
-            show_warnings(answer.warnings)
-            covered = answer.verification if verify else ()
-            notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
-            list_stop = outputs.stops.get(query.text)
-            if found is not None:
-                answer = answer_of(found)
-                notes += defence_notes(found, plans)
-                outputs.written.add("--plans")
-            if as_json:
-                echo(json.dumps(_record(answer, query, list_stop)))
-            else:
-                _row(answer, query, notes, trace_is_written=trace is not None)
-            severity = max(_severity(answer), STOPPED if list_stop else 0)
-            worst = max(worst, severity, key=_SEVERITIES.index)
+        expected = _EXPECTED.get(expect, query.expected) if expect else None
+        outcome = Outcome(query, None, is_compared=expect is not None, expected=expected)
+        try:
+            with shown_progress(query.text, quiet=not is_human) as report:
+                answer, found = answered(loaded, query, replace(wanted, progress=report), overflow)
+        except InputError as error:
+            # The other queries may be right, and the user wants their answers.
+            outcomes.append(replace(outcome, refusal=_with_severity(str(error))))
+            shown.one(outcomes[-1])
+            continue
+        if answer.verified is False:
+            echo("\n".join([query.text, *answer.verification]), err=True)
+            return INTERNAL_ERROR
+        show_warnings(answer.warnings)
+        covered = answer.verification if verify else ()
+        notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
+        list_stop = outputs.stops.get(query.text)
+        if found is not None:
+            answer = answer_of(found)
+            notes += defence_notes(found, plans)
+            outputs.written.add("--plans")
+        outcomes.append(replace(outcome, answer=answer, notes=tuple(notes), list_stop=list_stop))
+        shown.one(outcomes[-1])
+    shown.end(outcomes)
     say(unwritten(outputs.wanted(), outputs.written))
-    return worst
+    return exit_code(outcomes)
+
+
+_NOTHING_EXPECTED: Final = (
+    "no query says what is expected\n"
+    "hint: write // false above a query of a .q file, or give --expect yes or --expect no"
+)
+
+
+def _format(name: str, *, trace_is_written: bool) -> Format:
+    """How answers are printed."""
+    if name == "human":
+        return Human(trace_is_written=trace_is_written)
+    formats: dict[str, Callable[[], Format]] = {
+        "json": JsonLines,
+        "github": GitHub,
+        "junit": JUnit,
+        "sarif": Sarif,
+    }
+    return formats[name]()
+
+
+@contextlib.contextmanager
+def _rejections_in(shown: Format, path: Path) -> Iterator[None]:
+    """Also puts the rejection of a model or a list of queries into the output."""
+    try:
+        yield
+    except InputError as error:
+        shown.refused(path, str(error))
+        raise
+
+
+def _with_severity(rejection: str) -> str:
+    """A rejection with "error: " before it, unless its first line has the word already."""
+    first = rejection.partition("\n")[0]
+    return rejection if re.search(r"\berror\b", first) else f"error: {rejection}"
 
 
 def _criteria(text: str | None) -> tuple[str, ...]:
@@ -270,105 +332,3 @@ def _say_idle_options(queries: Sequence[QueryForm], *, is_environment: bool) -> 
     """Says which options of the command line have no effect."""
     values = click.get_current_context().params
     say(idle_options(given_options(), values, queries, ranks=is_environment))
-
-
-_SEVERITIES: Final = (0, 1, STOPPED, MODEL_ERROR, InputError.exit_code)
-"""Exit codes of single answers; the one that is last in this order decides."""
-
-
-def _severity(answer: Answer) -> int:
-    codes = {"satisfied": 0, "not satisfied": 1, "maybe": STOPPED, "unknown": STOPPED}
-    return codes.get(answer.verdict, MODEL_ERROR)
-
-
-def _record(answer: Answer, query: Asked, list_stop: str | None) -> dict[str, object]:
-    """The answer as the JSON object that the command line promises."""
-    return {
-        "query": query.text,
-        "name": query.name,
-        "verdict": answer.verdict,
-        "value": answer.value,
-        "message": answer.message,
-        "wrapped": None if answer.wrapped is None else asdict(answer.wrapped),
-        "stop": answer.stop or list_stop,
-        "explored": answer.explored,
-        "stored": answer.stored,
-        "seconds": answer.seconds,
-        "load_seconds": answer.load_seconds,
-        "peak_bytes": answer.peak_bytes,
-        "plans": answer.plan_count,
-    }
-
-
-def _header(path: Path, model: Model) -> None:
-    echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
-
-
-def _line(mark: tuple[str, str], query: Asked) -> None:
-    """Prints the first line of a query's row: the verdict in its colour, and the query."""
-    label = f"{query.name}: {query.text}" if query.name else query.text
-    echo("  ", Styled(f"{mark[0]:<8}", fg=mark[1], bold=True), label)
-
-
-def _row(answer: Answer, query: Asked, notes: Sequence[str], *, trace_is_written: bool) -> None:
-    _line(_MARK[answer.verdict], query)
-    facts = [f"{answer.explored} states explored", f"{answer.stored} stored"]
-    facts.append(f"{1000 * answer.seconds:.1f} ms")
-    facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
-    if answer.stop:
-        facts.insert(0, f"stopped by the {answer.limit_text}")
-    wrapped = []
-    if answer.wrapped is not None and answer.verdict != "error":
-        where = f"first at {answer.wrapped}"
-        wrapped = [f"a result does not fit into 32 bits and wraps round, {where}"]
-    way = [] if trace_is_written else _way_to_failure(answer)
-    shown = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
-    for line in [
-        *shown,
-        ", ".join(facts),
-        *([answer.message] if answer.message else []),
-        *wrapped,
-        *way,
-        *notes,
-    ]:
-        echo(f"          {line}")
-
-
-MOVES_SHOWN: Final = 12
-"""The last transitions before a run-time error that are shown; ``--trace`` shows all."""
-
-
-def _way_to_failure(answer: Answer) -> list[str]:
-    """The trace to a run-time error in short: transitions, and the state in which it happens."""
-    text = answer.trace_json() if answer.verdict == "error" else None
-    trace = json.loads(text) if text is not None else {}
-    if not trace.get("states"):
-        return []
-    moves, last = trace["transitions"], trace["states"][-1]
-    steps = "step" if len(moves) == 1 else "steps"
-    lines = [f"the way there, {len(moves)} {steps} (--trace - shows all states):"]
-    if len(moves) > MOVES_SHOWN:
-        lines.append(f"  … {len(moves) - MOVES_SHOWN} before")
-    first = max(0, len(moves) - MOVES_SHOWN)
-    lines += [f"  {first + 1 + i:>3}. {_move(move)}" for i, move in enumerate(moves[first:])]
-    places = [f"{process}.{location}" for process, location in last["locations"].items()]
-    values = [f"{name}={value}" for name, value in last["variables"].items()]
-    lines.append("in the state")
-    lines.append("  " + " ".join([*places, *values, *last["zone"]]))
-    if "failing" in trace:
-        lines += ["in the step", f"  {_move(trace['failing'])}"]
-    return lines
-
-
-def _move(edges: Sequence[dict[str, Any]]) -> str:
-    """A transition on one line: the edges that are taken together."""
-    return "  |  ".join(_edge(edge) for edge in edges)
-
-
-def _edge(edge: dict[str, Any]) -> str:
-    select = [f"{name}={value}" for name, value in edge["select"].items()]
-    labels = "; ".join(
-        label for label in (", ".join(select), edge["guard"], edge["sync"], edge["update"]) if label
-    )
-    arrow = f"{edge['process']}.{edge['source']} -> {edge['target']}"
-    return f"{arrow}  {{ {labels} }}" if labels else arrow

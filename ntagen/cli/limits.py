@@ -7,7 +7,7 @@ from typing import Final
 
 import click
 
-from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.quantities import COUNT, SIZE, TIME
 from ntagen.cli.rules import Decorator
 
 
@@ -20,8 +20,12 @@ def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
     return {
         "states": click.option(
             "--states",
-            type=click.IntRange(1),
-            help=about("Stop a search after this many stored states.  [default: no limit]"),
+            metavar="N",
+            type=COUNT,
+            help=about(
+                "Stop a search after this many stored states, for example 10k or 2M.  "
+                "[default: no limit]"
+            ),
         ),
         "memory_bytes": click.option(
             "--memory",
@@ -30,8 +34,7 @@ def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
             type=SIZE,
             callback=_whole,
             help=about(
-                "Stop a search that takes this much memory, for example 4GiB; a number without a "
-                "unit is in bytes.  [default: no limit]"
+                "Stop a search that takes this much memory, for example 4GiB.  [default: no limit]"
             ),
         ),
         "timeout_s": click.option(

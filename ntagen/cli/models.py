@@ -91,6 +91,11 @@ def pointing_to_explanations(wanted: bool) -> Iterator[None]:
 
 def with_pointer(rejection: str) -> str:
     """A rejection with the command that explains its first diagnostic, if it has one."""
+    pointer = pointer_to_page(rejection)
+    return f"{rejection}\n{pointer}" if pointer else rejection
+
+
+def pointer_to_page(rejection: str) -> str:
+    """The command that explains the first diagnostic of a text; empty if it has none."""
     code = re.search(r"\berror\[([A-Z]\d+)\]", rejection)
-    pointer = f"\nfor an example and how to fix it: ntagen explain {code[1]}" if code else ""
-    return rejection + pointer
+    return f"for an example and how to fix it: ntagen explain {code[1]}" if code else ""

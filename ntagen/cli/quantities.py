@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 from typing import Final
 
 import click
@@ -43,7 +44,51 @@ class _Quantity(click.ParamType[float]):
         return float(match[1]) * units[match[2].lower()]
 
 
-SIZE: Final = _Quantity("size", _BYTES_PER)
+LEAST_BYTES: Final = 2**16
+"""No search fits into less: who writes such a number has left out the unit."""
+
+
+class _Size(_Quantity):
+    """A size; a small number needs its unit."""
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        size = super().convert(value, param, ctx)
+        if size < LEAST_BYTES:
+            number = re.match(r"[\s0-9.]*", str(value))
+            meant = number[0].strip() if number else ""
+            self.fail(
+                f"{value!r} is {size:.0f} bytes, too little for any search; "
+                f"did you mean {meant}GiB or {meant}MiB?",
+                param,
+                ctx,
+            )
+        return size
+
+
+class _Count(click.ParamType[int]):
+    """A whole number from 1, also with a multiple: ``10k``, ``2M``, ``1e6`` or ``1_000_000``."""
+
+    name = "number"
+    _multiples: Final = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> int:
+        text = str(value).strip().lower().replace("_", "")
+        match = re.fullmatch(r"([0-9]{1,15}(?:\.[0-9]{1,9})?)(?:e([0-9]{1,2}))?([kmg]?)", text)
+        if match:
+            factor = 10 ** int(match[2] or 0) * self._multiples[match[3]]
+            number = Fraction(match[1]) * factor
+            if number.denominator == 1 and 1 <= number < 2**63:
+                return int(number)
+        self.fail(
+            f"{value!r} is not a whole number from 1; write for example 5000, 10k or 2M", param, ctx
+        )
+
+
+SIZE: Final = _Size("size", _BYTES_PER)
 """Such as ``4GiB``; in bytes."""
 
 TIME: Final = _Quantity("time", _SECONDS_PER)
@@ -51,3 +96,6 @@ TIME: Final = _Quantity("time", _SECONDS_PER)
 
 LENGTH: Final = _Quantity("length", {"": 1.0, **MM_PER})
 """Such as ``30mm``; in mm."""
+
+COUNT: Final = _Count()
+"""Such as ``10k``."""

@@ -240,20 +240,22 @@ class Diagnostic:
     hint: str | None = None
 
     def render(self) -> str:
-        """The lines for a terminal: message, source line, caret, notes and hint."""
+        """The lines for a terminal: message, source line, caret, notes and hint.
+
+        The engine's diagnostics of models and queries look the same.
+        """
         place = f"{self.path}:{self.line}:{self.column}" if self.line else self.path
         lines = [f"{place}: {self.severity}[{self.code}]: {self.message}"]
-        gutter = " " * len(str(self.line))
         if self.line:
             # A tab becomes one space, so that the caret stands below the right character.
             text, column = _clip(self.source_line, self.column)
             text = "".join(c if c.isprintable() else " " for c in text)
             length = max(1, min(self.length, len(text) - column + 1))
-            lines.append(f" {self.line} | {text}".rstrip())
-            lines.append(f" {gutter} | {' ' * (column - 1)}{'^' * length}")
-        lines += [f" {gutter} = note: {note}" for note in self.notes]
+            lines.append(f"  | {text}".rstrip())
+            lines.append(f"  | {' ' * (column - 1)}{'^' * length}")
+        lines += [f"  note: {note}" for note in self.notes]
         if self.hint is not None:
-            lines.append(f" {gutter} = hint: {self.hint}")
+            lines.append(f"  hint: {self.hint}")
         return "\n".join(lines)
 
 

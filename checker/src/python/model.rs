@@ -107,7 +107,7 @@ impl Model {
 
     /// The queries of the file, as JSON.
     fn queries_json(&self) -> String {
-        self.with(|model| json_list(model_json::queries(&model.queries)))
+        self.with(|model| json_list(model_json::queries(model, &model.queries)))
     }
 
     /// By process: its edges.
@@ -180,10 +180,11 @@ impl Model {
 
     /// Reads the queries of a `.q` file, as JSON.
     fn read_queries_json(&self, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<String> {
-        let queries = self
-            .with(|model| model.read_queries(path, data.as_bytes()))
-            .map_err(rejected)?;
-        Ok(json_list(model_json::queries(&queries)))
+        self.with(|model| {
+            let queries = model.read_queries(path, data.as_bytes())?;
+            Ok(json_list(model_json::queries(model, &queries)))
+        })
+        .map_err(rejected)
     }
 
     /// Checks a file with a certificate, a trace or a strategy: whether it holds (`None` if the

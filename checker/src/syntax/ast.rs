@@ -68,7 +68,7 @@ pub struct QueryText {
     pub text: String,
     /// The comment next to it, if any.
     pub comment: String,
-    /// The expected verdict, from `<expect>` or an `EXPECT:` comment.
+    /// The expected verdict, from `<expect>`, `<result>` or an `EXPECT:` comment.
     pub expect: Option<Expectation>,
 }
 

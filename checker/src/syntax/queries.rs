@@ -45,6 +45,10 @@ pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
     }
 }
 
+/// Path quantifiers as other tools write them, each with that of UPPAAL.
+const FOREIGN_QUANTIFIERS: [(&str, &str); 4] =
+    [("EF", "E<>"), ("AG", "A[]"), ("AF", "A<>"), ("EG", "E[]")];
+
 impl Parser<'_> {
     fn query(&mut self) -> Query {
         let span = self.here();
@@ -107,6 +111,8 @@ impl Parser<'_> {
             | TokenKind::AlwaysGlobally
             | TokenKind::ExistsFinally
             | TokenKind::ExistsGlobally => self.path_formula(),
+            TokenKind::Diamond => self.foreign_quantifier("E<>"),
+            TokenKind::Box => self.foreign_quantifier("A[]"),
             _ => self.word_query(),
         }
     }
@@ -204,10 +210,35 @@ impl Parser<'_> {
         self.leads_to()
     }
 
+    /// Reports a path quantifier of another notation, which is the next token, and says which query
+    /// is probably meant.
+    fn foreign_quantifier(&mut self, meant: &str) -> QueryKind {
+        let token = self.bump();
+        let operand = self.here();
+        while !self.at_end() && !self.at_word("under") {
+            self.bump();
+        }
+        let operand = self.since(operand);
+        let words = self.text[operand.start as usize..operand.end as usize].split_whitespace();
+        let operand = words.collect::<Vec<_>>().join(" ");
+        let operand = if operand.is_empty() { "p" } else { &operand };
+        let message = format!("`{}` is no path quantifier of UPPAAL", self.text_of(token));
+        self.report(
+            Diagnostic::new(codes::MISSING_PATH_QUANTIFIER, self.span_of(token), message)
+                .help(format!("did you mean `{meant} {operand}`?")),
+        );
+        QueryKind::Reachable(self.error_expr())
+    }
+
     fn leads_to(&mut self) -> QueryKind {
+        let (start, quantifier) = (self.checkpoint(), self.word());
         let left = self.expression();
         if self.eat(TokenKind::LeadsTo) {
             return QueryKind::LeadsTo(left, self.expression());
+        }
+        if let Some((_, meant)) = FOREIGN_QUANTIFIERS.iter().find(|one| one.0 == quantifier) {
+            self.rewind(&start);
+            return self.foreign_quantifier(meant);
         }
         if self.at_blank_path_quantifier(&left) {
             let span = self.here();

@@ -314,6 +314,8 @@ impl Reader<'_, '_> {
         let (start, end) = trimmed(text)?;
         let comment = child(query, "comment").and_then(|comment| comment.text());
         let expected = child(query, "expect").and_then(expected_outcome);
+        // UPPAAL keeps the last result of a query in the file.
+        let expected = expected.or_else(|| child(query, "result").and_then(expected_outcome));
         Some(QueryText {
             span: Span {
                 start: to_u32(start),

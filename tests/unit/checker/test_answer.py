@@ -59,6 +59,7 @@ def test_queries_of_a_file_can_be_asked_as_they_are() -> None:
     model = ntagen.load(GATE)
     answer = model.check(model.queries[0])
     assert (answer.query, answer.verdict) == ("E<> Gate.Open", "satisfied")
+    assert (model.queries[0].line, model.queries[0].column) == (6, 17)
 
 
 def test_a_simulation_can_follow_a_strategy() -> None:

@@ -160,7 +160,7 @@ def test_what_is_no_strategy_is_refused_with_its_file(tmp_path: Path, text: str,
         ntagen.load_strategy(path, ntagen.load(RACE))
     told = str(refused.value)
     assert told.startswith(f"{path}{said}")
-    assert "\n  help: " in told
+    assert "\n  hint: " in told
     assert "prelude" not in told
 
 

@@ -91,7 +91,8 @@ def test_mistakes_in_a_file_of_queries_are_shown_at_their_places(
     assert f"{file}:7:1: error[E0805]" in err
     assert f"division by zero, at {file}:8:5: " in out
     _, err = check_run(capsys, 2, gate, "--query", "E<> Gate.Opn")
-    assert err.startswith("<text>:1:10: error")
+    assert err.startswith("query:1:10: error")
+    assert "  in " not in err
 
 
 def test_json_has_the_promised_fields_and_nothing_else_is_printed(
@@ -287,6 +288,10 @@ def test_missing_files_and_folders_are_named(
         ("--query", ""),
         ("--queries", "none.q"),
         ("--memory", "4 parsecs"),
+        ("--memory", "4"),
+        ("--states", "0"),
+        ("--states", "1.5"),
+        ("--states", "many"),
         ("--timeout", "soon"),
         ("--engine", "steam"),
         (),
@@ -708,11 +713,15 @@ def test_queries_beside_a_rejected_one_are_answered(
     asked += ("--query", "A[] Gate.Closed")
     out, err = check_run(capsys, 2, gate, *asked, "--json")
     verdicts = [json.loads(line)["verdict"] for line in out.splitlines()]
-    assert verdicts == ["satisfied", "not satisfied"]
+    assert verdicts == ["satisfied", "refused", "not satisfied"]
+    refused = json.loads(out.splitlines()[1])
+    assert refused["place"] == "query:1:1"
+    assert refused["message"].startswith("query:1:1: error[E0274]: ")
     assert err.count("error[E0274]") == 1
     out, err = check_run(capsys, 2, gate, *asked)
     rows = [
         line.split()[0] for line in out.splitlines() if line.startswith("  ") and line[2:3] != " "
     ]
     assert rows == ["yes", "refused", "no"]
+    assert out.endswith("3 queries: 1 satisfied, 1 not satisfied, 1 refused\n")
     assert err.rstrip().endswith("ntagen explain E0274")

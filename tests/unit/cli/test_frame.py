@@ -53,7 +53,7 @@ def check_error(
         (FileNotFoundError(errno.ENOENT, "No such file or directory", "x"), 2, "x: no such file"),
         (PermissionError(errno.EACCES, "Permission denied", "/y"), 2, "/y: permission denied"),
         (OSError(errno.ENOSPC, "No space left on device"), 2, "error: no space left on device"),
-        (BrokenPipeError(errno.EPIPE, "Broken pipe"), 2, "program that reads the output has ended"),
+        (BrokenPipeError(errno.EPIPE, "Broken pipe"), 141, ""),
         (click.UsageError("no such option"), 2, "Error: no such option"),
         (KeyboardInterrupt(), 130, "interrupted\n"),
         (click.Abort(), 130, "interrupted\n"),

@@ -149,7 +149,7 @@ impl LoadedModel {
     pub fn read_strategy(&self, path: &str, bytes: &[u8]) -> Result<(String, Strategy), Rejection> {
         strategy_json::read(self.network(), bytes).map_err(|mismatch| {
             let code = codes::STRATEGY_FILE.code;
-            let help = mismatch.help.map(|help| format!("\n  help: {help}"));
+            let help = mismatch.help.map(|help| format!("\n  hint: {help}"));
             Rejection {
                 diagnostics: Vec::new(),
                 rendered: vec![format!(

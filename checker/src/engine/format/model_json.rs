@@ -21,7 +21,8 @@
 //!   `at`), or null.
 //! * `state`: the 32-bit `words` of the discrete state, and of these the `location_words`,
 //!   `variable_words`, `meta_words`.
-//! * `queries`: `text`, `comment`, `expect` (the verdict that the file states, or null).
+//! * `queries`: `text`, `comment`, `expect` (the verdict that the file states, or null), and where
+//!   the text begins: `path`, `line`, `column`.
 //! * `warnings` as text, and `load_seconds`.
 
 use serde_json::{Map, Value as Json, json};
@@ -53,7 +54,7 @@ pub fn facts(model: &LoadedModel) -> Json {
         "features": features(model),
         "scalar_sets": scalar_sets(model),
         "state": state(network),
-        "queries": queries(&model.queries),
+        "queries": queries(model, &model.queries),
         "warnings": model.warnings,
         "load_seconds": model.load_seconds,
     })
@@ -392,12 +393,13 @@ fn holds(shape: &Shape, wanted: fn(&Shape) -> bool) -> bool {
     in_parts || wanted(shape)
 }
 
-/// The queries of a file, as they stand in [`facts`].
-pub fn queries(queries: &[QueryText]) -> Vec<Json> {
-    queries.iter().map(query).collect()
+/// Queries of a file of the model, as they stand in [`facts`].
+pub fn queries(model: &LoadedModel, queries: &[QueryText]) -> Vec<Json> {
+    let one = |text| query(text, &model.sources);
+    queries.iter().map(one).collect()
 }
 
-fn query(query: &QueryText) -> Json {
+fn query(query: &QueryText, sources: &SourceMap) -> Json {
     let expect = query.expect.as_ref().map(|expect| match expect {
         Expectation::True => json!("satisfied"),
         Expectation::False => json!("not satisfied"),
@@ -406,5 +408,13 @@ fn query(query: &QueryText) -> Json {
         Expectation::Error => json!("error"),
         Expectation::Number(value) => json!(value),
     });
-    json!({ "text": query.text, "comment": query.comment, "expect": expect })
+    let place = sources.position(query.span);
+    json!({
+        "text": query.text,
+        "comment": query.comment,
+        "expect": expect,
+        "path": *sources.get(query.span.source).path,
+        "line": place.line,
+        "column": place.column,
+    })
 }

@@ -1,0 +1,123 @@
+"""The answers of `ntagen check` for people: a row for each query, and a last line for all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from ntagen.cli.models import pointer_to_page
+from ntagen.cli.outcomes import Outcome, summary
+from ntagen.cli.terminal import Styled, echo
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, Model
+
+_MARK: Final = {
+    "satisfied": ("yes", "green"),
+    "not satisfied": ("no", "red"),
+    "maybe": ("maybe", "yellow"),
+    "unknown": ("stopped", "yellow"),
+    "error": ("error", "red"),
+    "refused": ("refused", "red"),
+}
+
+REMARKS_SHOWN: Final = 4
+"""So many lines of a query's comment are shown."""
+
+
+class Human:
+    """Prints each answer as soon as it is there."""
+
+    def __init__(self, *, trace_is_written: bool) -> None:
+        self._trace_is_written = trace_is_written
+
+    def loaded(self, path: Path, model: Model) -> None:
+        """Prints which model is asked."""
+        echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
+
+    def refused(self, path: Path, rejection: str) -> None:
+        """Prints nothing: the rejection of the model is printed as any other error."""
+
+    def one(self, outcome: Outcome) -> None:
+        """Prints the row of a query."""
+        if outcome.answer is None:
+            echo(outcome.refusal, err=True)
+        mark, colour = _MARK[outcome.verdict]
+        query = outcome.query
+        label = f"{query.name}: {query.text}" if query.name else query.text
+        parts: list[str | Styled] = ["  ", Styled(f"{mark:<8}", fg=colour, bold=True), label]
+        if outcome.is_as_expected is not None:
+            is_right = outcome.is_as_expected
+            said = "as expected" if is_right else f"not as expected: {outcome.expected}"
+            parts += ["  ", Styled(f"({said})", fg="green" if is_right else "red")]
+        echo(*parts)
+        lines = [*query.remark[:REMARKS_SHOWN]]
+        if outcome.answer is not None:
+            lines += self._facts(outcome.answer)
+        for line in [*lines, *outcome.notes]:
+            echo(f"          {line}")
+
+    def end(self, outcomes: Sequence[Outcome]) -> None:
+        """Prints all queries on one line, and once how to learn more about a mistake."""
+        if len(outcomes) > 1:
+            echo(summary(outcomes))
+        refusals = "\n".join(one.refusal for one in outcomes if one.answer is None)
+        if pointer := pointer_to_page(refusals):
+            echo(pointer, err=True)
+
+    def _facts(self, answer: Answer) -> list[str]:
+        explored = "1 state" if answer.explored == 1 else f"{answer.explored} states"
+        facts = [f"{explored} explored", f"{answer.stored} stored"]
+        facts.append(f"{1000 * answer.seconds:.1f} ms")
+        facts.append(f"{answer.peak_bytes / 2**20:.1f} MiB")
+        if answer.stop:
+            facts.insert(0, f"stopped by the {answer.limit_text}")
+        lines = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
+        lines.append(", ".join(facts))
+        lines += [answer.message] if answer.message else []
+        if answer.wrapped is not None and answer.verdict != "error":
+            where = f"first at {answer.wrapped}"
+            lines.append(f"a result does not fit into 32 bits and wraps round, {where}")
+        return lines if self._trace_is_written else [*lines, *_way_to_failure(answer)]
+
+
+MOVES_SHOWN: Final = 12
+"""The last transitions before a run-time error that are shown; ``--trace`` shows all."""
+
+
+def _way_to_failure(answer: Answer) -> list[str]:
+    """The trace to a run-time error in short: transitions, and the state in which it happens."""
+    text = answer.trace_json() if answer.verdict == "error" else None
+    trace = json.loads(text) if text is not None else {}
+    if not trace.get("states"):
+        return []
+    moves, last = trace["transitions"], trace["states"][-1]
+    steps = "step" if len(moves) == 1 else "steps"
+    lines = [f"the way there, {len(moves)} {steps} (--trace - shows all states):"]
+    if len(moves) > MOVES_SHOWN:
+        lines.append(f"  … {len(moves) - MOVES_SHOWN} before")
+    first = max(0, len(moves) - MOVES_SHOWN)
+    lines += [f"  {first + 1 + i:>3}. {_move(move)}" for i, move in enumerate(moves[first:])]
+    places = [f"{process}.{location}" for process, location in last["locations"].items()]
+    values = [f"{name}={value}" for name, value in last["variables"].items()]
+    lines.append("in the state")
+    lines.append("  " + " ".join([*places, *values, *last["zone"]]))
+    if "failing" in trace:
+        lines += ["in the step", f"  {_move(trace['failing'])}"]
+    return lines
+
+
+def _move(edges: Sequence[dict[str, Any]]) -> str:
+    """A transition on one line: the edges that are taken together."""
+    return "  |  ".join(_edge(edge) for edge in edges)
+
+
+def _edge(edge: dict[str, Any]) -> str:
+    select = [f"{name}={value}" for name, value in edge["select"].items()]
+    labels = "; ".join(
+        label for label in (", ".join(select), edge["guard"], edge["sync"], edge["update"]) if label
+    )
+    arrow = f"{edge['process']}.{edge['source']} -> {edge['target']}"
+    return f"{arrow}  {{ {labels} }}" if labels else arrow
