@@ -44,10 +44,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
     "checker.runs": set(),
     "checker.machine": {"errors"},
+    "checker.story": {"checker.runs"},
     "checker.play": {"errors", "checker.runs", "_checker"},
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
-    | {"checker.strategy", "_checker"},
+    | {"checker.story", "checker.strategy", "_checker"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.query_form": {"_checker"},
     "checker.model": {"errors", "files", "_checker"}

@@ -208,6 +208,23 @@ class Answer:
         """The first of `runs`; ``None`` if there is none."""
         return next(iter(self.runs), None)
 
+    def trace_lines(self, most: int | None = None) -> list[str]:
+        """The trace for people, line by line: each step with its time, and only what it changes.
+
+        Empty without a trace.
+
+        Args:
+            most: Only so many of the last steps are told; ``None`` is all.
+        """
+        from ntagen.checker.story import told
+
+        traces = self.trace_json()
+        if traces is None:
+            return []
+        text = (self.trace_text() or "").splitlines()
+        missing = next((line for line in text if line.startswith("No exact times: ")), "")
+        return told(json.loads(traces), missing, most)
+
     def trace_text(self) -> str | None:
         """The witness, counterexample or trace to the failure as UPPAAL prints it, if any.
 

@@ -95,7 +95,7 @@ def _way_to_failure(answer: Answer) -> list[str]:
         return []
     moves, last = trace["transitions"], trace["states"][-1]
     steps = "step" if len(moves) == 1 else "steps"
-    lines = [f"the way there, {len(moves)} {steps} (--trace - shows all states):"]
+    lines = [f"the way there, {len(moves)} {steps} (--trace - shows all steps):"]
     if len(moves) > MOVES_SHOWN:
         lines.append(f"  … {len(moves) - MOVES_SHOWN} before")
     first = max(0, len(moves) - MOVES_SHOWN)

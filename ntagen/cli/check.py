@@ -198,8 +198,9 @@ def command(
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
 
     \b
-    A trace has two parts: symbolic states as UPPAAL prints them, and a run with exact times, which
-    an independent replay has checked. A file that ends in .json has both parts as JSON.
+    A trace is a run with exact times, which an independent replay has checked. Each step says when
+    it is, its edges, and only what it changes. A file that ends in .json has all states, and the
+    symbolic ones too.
 
     \b
     The value of sup and inf is a number, or "inf" if the clock has no limit. The value of bounds is

@@ -65,9 +65,9 @@ class Outputs:
 def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | None) -> list[str]:
     """Writes what was asked for; returns a line for the user about each output."""
     notes: list[str] = []
-    if outputs.trace and (text := answer.trace_text()) is not None:
+    if outputs.trace and (trace := answer.trace_json()) is not None:
         outputs.written.add("--trace")
-        notes += _write_trace(answer, query, outputs.trace, text)
+        notes += _write_trace(answer, query, outputs.trace, trace)
     certificate = answer.certificate_text() if outputs.certificate else None
     if outputs.certificate and certificate is not None:
         write_files({outputs.certificate: certificate})
@@ -88,13 +88,18 @@ def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | 
     return notes
 
 
-def _write_trace(answer: Answer, query: Asked, target: str, text: str) -> list[str]:
+def _write_trace(answer: Answer, query: Asked, target: str, as_json: str) -> list[str]:
     if target == "-":
-        echo(text)
+        echo(f"{query.text} is {answer.verdict}:")
+        for line in answer.trace_lines():
+            echo(line)
         return []
     path = Path(target)
-    as_json = answer.trace_json() if path.suffix == ".json" else None
-    write_files({path: f"{as_json}\n" if as_json else f"{query.text}\n\n{text}"})
+    if path.suffix == ".json":
+        text = as_json
+    else:
+        text = "\n".join([f"{query.text} is {answer.verdict}", "", *answer.trace_lines()])
+    write_files({path: f"{text}\n"})
     return [f"trace written to {path}"]
 
 

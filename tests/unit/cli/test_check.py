@@ -148,7 +148,7 @@ def test_traces_and_strategies_and_plans_are_written(
     gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, _ = check_run(capsys, 0, gate, "--query", "E<> Gate.Open", "--trace", "-")
-    assert "Driver.Here->Driver.There { 1, go!, 1 }" in out
+    assert "Driver.Here -> There go!" in out
     files = {name: tmp_path / f"{name}.json" for name in ("trace", "strategy", "plans")}
     options = [word for name, path in files.items() for word in (f"--{name}", str(path))]
     check_run(capsys, 0, gate, "--query", "E<> Gate.Open", *options)
@@ -545,7 +545,7 @@ def test_a_run_time_error_is_shown_with_the_way_to_it(
     lines = [" ".join(line.split()) for line in out.splitlines()]
     column = FAILING.splitlines()[7].index("1 / (") + 1
     assert f"division by zero, at {failing}:8:{column}: 1 / (n - 2)" in lines
-    assert "the way there, 2 steps (--trace - shows all states):" in lines
+    assert "the way there, 2 steps (--trace - shows all steps):" in lines
     assert lines.count("1. P.A -> A { x >= 2; x = 0, n = n + 1 }") == 1
     assert lines[lines.index("in the state") + 1].startswith("P.A n=2 a[0]=0 a[1]=0 a[2]=0")
     assert lines[lines.index("in the step") + 1] == "P.A -> B { n == 2; a[n] = 1 / (n - 2) }"
@@ -577,7 +577,7 @@ def test_the_trace_to_an_error_is_written(
     assert len(trace["transitions"]) == 2
     assert [edge["update"] for edge in trace["failing"]] == ["a[n] = 1 / (n - 2)"]
     out, _ = check_run(capsys, 4, failing, "--query", query, "--trace", "-")
-    assert "Fails in the transitions:\n  P.A->P.B { n == 2, tau, a[n] = 1 / (n - 2) }" in out
+    assert "fails in the next step:\n              P.A -> B\n              n = 2" in out
     assert "the way there" not in out
 
 
@@ -599,7 +599,7 @@ def test_an_error_in_the_initial_state_has_a_way_of_no_steps(
     assert f"array index out of bounds, at {path}:2:{column}: {place}" in out
     out, _ = check_run(capsys, 4, path, "--query", query)
     lines = [" ".join(line.split()) for line in out.splitlines()]
-    assert "the way there, 0 steps (--trace - shows all states):" in lines
+    assert "the way there, 0 steps (--trace - shows all steps):" in lines
     assert "k=2" in lines[lines.index("in the state") + 1]
     trace = json.loads((tmp_path / "trace.json").read_text())
     assert [state["locations"] for state in trace["states"]] == [{"P": "A"}]
