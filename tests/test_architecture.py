@@ -79,6 +79,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
+    "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},
 }
 """By room: the rooms that it may import. Each may import itself.
@@ -106,6 +107,7 @@ SPLIT = {"checker"}
 
 ONLY_IN: dict[str, set[str]] = {
     "click": {"cli"},
+    "pytest": {"pytest_plugin"},
     "rich": {"cli"},
     "jinja2": {"render"},
     "matplotlib": {"experiment", "plot"},

@@ -1,0 +1,84 @@
+"""The files by which other projects use ntagen in CI: hooks of pre-commit, the action."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ntagen.cli import main
+
+ROOT = Path(__file__).parents[2]
+GATE = "process Gate() { state Shut, Open; init Shut; trans Shut -> Open { }; }\nsystem Gate;\n"
+
+
+def test_hooks_are_commands_that_know_their_options(tmp_path: Path) -> None:
+    hooks = re.findall(
+        r"^  entry: ntagen (.+)$", (ROOT / ".pre-commit-hooks.yaml").read_text(), re.M
+    )
+    assert len(hooks) == 2
+    path = tmp_path / "paper.nsl"
+    path.write_bytes((ROOT / "examples" / "paper.nsl").read_bytes())
+    for words in hooks:
+        assert main([*words.split(), str(path)]) == 0
+    path.write_text(path.read_text().replace("  ", "     "))
+    assert main(["fmt", "--check", str(path)]) == 1
+
+
+def action_run(folder: Path, models: str, arguments: str = "--expect") -> tuple[int, str]:
+    """The exit code and the output of the action's last step."""
+    tools = folder / "tools"
+    tools.mkdir(exist_ok=True)
+    command = tools / "ntagen"
+    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m ntagen "$@"\n')
+    command.chmod(0o755)
+    found = subprocess.run(
+        ["bash", str(ROOT / ".ci" / "check_models.sh")],
+        cwd=folder,
+        env={
+            **os.environ,
+            "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",
+            "PYTHONPATH": str(ROOT),
+            "MODELS": models,
+            "ARGUMENTS": arguments,
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return found.returncode, found.stdout + found.stderr
+
+
+def test_the_action_checks_each_model_with_the_queries_beside_it(tmp_path: Path) -> None:
+    folder = tmp_path / "some models"
+    folder.mkdir()
+    for name, said in (("one", "true"), ("two", "false")):
+        (folder / f"{name}.xta").write_text(GATE)
+        (folder / f"{name}.q").write_text(f"E<> Gate.Open // {said}\n")
+    code, out = action_run(tmp_path, "  some models/o*.xta\n\n", "--expect --timeout 60s")
+    assert (code, out) == (
+        0,
+        "some models/one.xta: 1 query: 1 satisfied; 1 as expected, 0 not as expected\n",
+    )
+    code, out = action_run(tmp_path, "**/*.xta")
+    assert code == 1
+    assert "::error file=some models/two.q,line=1,col=1,title=E<> Gate.Open::" in out
+
+
+@pytest.mark.parametrize("models", ["", "none/*.xml"])
+def test_the_action_refuses_a_list_without_models(tmp_path: Path, models: str) -> None:
+    code, out = action_run(tmp_path, models)
+    assert (code, out.startswith("::error title=No model::")) == (2, True)
+
+
+def test_the_action_names_its_script_and_its_inputs() -> None:
+    action = (ROOT / "action.yml").read_text()
+    script = (ROOT / ".ci" / "check_models.sh").read_text()
+    assert "$GITHUB_ACTION_PATH/.ci/check_models.sh" in action
+    for name in ("models", "queries", "arguments"):
+        assert f"{name.upper()}: ${{{{ inputs.{name} }}}}" in action
+        assert f"${name.upper()}" in script or f"${{{name.upper()}:-}}" in script
