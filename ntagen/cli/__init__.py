@@ -25,7 +25,7 @@ from typing import Final
 import click
 
 from ntagen.cli.signals import TERMINATED, Terminated, termination
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError, NtagenError
 
 __all__ = ["main"]
@@ -219,7 +219,7 @@ def _internal(error: BaseException) -> str:
 def _say(message: str) -> None:
     """Prints to standard error, unless it is closed."""
     with contextlib.suppress(OSError):
-        echo(message, err=True)
+        echo_message(message)
 
 
 def _abandon_output() -> None:

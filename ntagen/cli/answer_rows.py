@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.models import pointer_to_page
 from ntagen.cli.outcomes import Outcome, summary
-from ntagen.cli.terminal import Styled, echo
+from ntagen.cli.terminal import Styled, echo, echo_message
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -43,7 +43,7 @@ class Human:
     def one(self, outcome: Outcome) -> None:
         """Prints the row of a query."""
         if outcome.answer is None:
-            echo(outcome.refusal, err=True)
+            echo_message(outcome.refusal)
         mark, colour = _MARK[outcome.verdict]
         query = outcome.query
         label = f"{query.name}: {query.text}" if query.name else query.text

@@ -12,7 +12,7 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.rules import Decorator
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wr
 def show_warnings(warnings: Sequence[str]) -> None:
     """Prints warnings to standard error."""
     for warning in warnings[:WARNINGS_SHOWN]:
-        echo(warning.rstrip(), err=True)
+        echo_message(warning.rstrip())
     if len(warnings) > WARNINGS_SHOWN:
         rest = len(warnings) - WARNINGS_SHOWN
         echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)

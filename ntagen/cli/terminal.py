@@ -73,6 +73,27 @@ def echo(*parts: str | Styled, err: bool = False, nl: bool = True) -> None:
     click.echo("".join(texts), err=err, nl=nl)
 
 
+_SEVERITY: Final = re.compile(r"\b(error|warning)(?:\[[A-Z]\d+\])?:|^ +(note|hint):|^hint:")
+_COLOURS: Final = {"error": "red", "warning": "yellow"}
+
+
+def echo_message(text: str) -> None:
+    """Prints diagnostics or another message for the user to standard error.
+
+    On a terminal the severity of each is coloured.
+    """
+    parts: list[str | Styled] = []
+    for index, line in enumerate(text.splitlines()):
+        parts += ["\n"] * (index > 0)
+        found = None if line.startswith("  | ") else _SEVERITY.search(line)
+        if found is None:
+            parts.append(line)
+            continue
+        word = Styled(found[0], fg=_COLOURS.get(found[1], "cyan"), bold=True)
+        parts += [line[: found.start()], word, line[found.end() :]]
+    echo(*parts, err=True)
+
+
 def echo_exactly(text: str, *, nl: bool = True) -> None:
     """Prints a document to standard output: unchanged, unless that is a terminal."""
     # Without `color`, click removes everything that looks like a colour from output to a file.

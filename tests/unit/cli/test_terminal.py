@@ -7,10 +7,11 @@ import re
 import sys
 from pathlib import Path
 
+import click
 import pytest
 
 from ntagen.cli import main
-from ntagen.cli.terminal import Styled, echo, echo_exactly, safe
+from ntagen.cli.terminal import Styled, echo, echo_exactly, echo_message, safe
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x7f\x08\u202e\u2066"
 """Control sequences in seven and eight bits, and what turns the direction of writing."""
@@ -97,3 +98,15 @@ def test_info_and_missing_files_command_nothing(
     main(["check", str(tmp_path / f"none{COMMANDS}.xta")])
     printed = capsys.readouterr()
     assert unsafe_in(printed.out + printed.err) == []
+
+
+def test_severities_are_coloured_on_a_terminal_only(capsys: pytest.CaptureFixture[str]) -> None:
+    text = "a.xml:1:2: error[E0201]: odd\n  | error: x\n  hint: a \x1b[31m\nwarning: none"
+    echo_message(text)
+    assert capsys.readouterr().err == safe(text) + "\n"
+    with click.Context(click.Command("check"), color=True):
+        echo_message(text)
+    coloured = capsys.readouterr().err
+    assert click.unstyle(coloured) == safe(text) + "\n"
+    assert "a.xml:1:2: \x1b[31m\x1b[1merror[E0201]:\x1b[0m odd\n  | error: x\n" in coloured
+    assert "\x1b[36m\x1b[1m  hint:\x1b[0m a \\u001b[31m\n\x1b[33m\x1b[1mwarning:" in coloured
