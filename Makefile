@@ -79,6 +79,10 @@ lint: $(INSTALLED) ## Check formats, lints and types
 	source $(RUST) && cd checker && cargo fmt --check
 	source $(RUST) && cd checker && cargo clippy --locked --all-targets --features python --quiet -- -D warnings
 
+.PHONY: docs
+docs: $(INSTALLED) ## Make the documentation site in build/docs; begin with build/docs/index.html
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs build/docs
+
 .PHONY: format
 format: $(INSTALLED) ## Format all sources, and fix what the linter can fix
 	$(BIN)/ruff check --fix .

@@ -33,6 +33,9 @@ FENCED = re.compile(r"^( *)(```|~~~).*?^\1\2", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^()\s]+)\)")
 CODE = re.compile(r"`([^`\n]+)`")
 PATH = re.compile(r"[\w.-]+(/[\w.-]+)*/?")
+SAVED = re.compile(r"[Ss]ave (?:this|it) as `([^`]+)`:")
+"""Files that a reader makes."""
+
 HEADING = re.compile(r"^#+ +(.+?) *$", re.MULTILINE)
 
 
@@ -61,7 +64,8 @@ def broken_links(document: Path) -> Iterator[str]:
 def names(document: Path) -> set[str]:
     """What is written as code and may be a path."""
     words = {word for span in CODE.findall(prose(document)) for word in span.split()}
-    return {word for word in words if PATH.fullmatch(word)}
+    made = set(SAVED.findall(document.read_text("utf-8")))
+    return {word for word in words - made if PATH.fullmatch(word)}
 
 
 @pytest.fixture(scope="module")
