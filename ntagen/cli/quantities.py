@@ -59,8 +59,7 @@ class _Size(_Quantity):
             number = re.match(r"[\s0-9.]*", str(value))
             meant = number[0].strip() if number else ""
             self.fail(
-                f"{value!r} is {size:.0f} bytes, too little for any search; "
-                f"did you mean {meant}GiB or {meant}MiB?",
+                f"{value!r} is less than any search needs; did you mean {meant}GiB or {meant}MiB?",
                 param,
                 ctx,
             )

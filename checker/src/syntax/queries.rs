@@ -215,13 +215,14 @@ impl Parser<'_> {
     fn foreign_quantifier(&mut self, meant: &str) -> QueryKind {
         let token = self.bump();
         let operand = self.here();
+        let is_missing = self.at_end() || self.at_word("under");
         while !self.at_end() && !self.at_word("under") {
             self.bump();
         }
         let operand = self.since(operand);
         let words = self.text[operand.start as usize..operand.end as usize].split_whitespace();
         let operand = words.collect::<Vec<_>>().join(" ");
-        let operand = if operand.is_empty() { "p" } else { &operand };
+        let operand = if is_missing { "p" } else { &operand };
         let message = format!("`{}` is no path quantifier of UPPAAL", self.text_of(token));
         self.report(
             Diagnostic::new(codes::MISSING_PATH_QUANTIFIER, self.span_of(token), message)

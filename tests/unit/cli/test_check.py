@@ -725,3 +725,22 @@ def test_queries_beside_a_rejected_one_are_answered(
     assert rows == ["yes", "refused", "no"]
     assert out.endswith("3 queries: 1 satisfied, 1 not satisfied, 1 refused\n")
     assert err.rstrip().endswith("ntagen explain E0274")
+
+
+@pytest.mark.parametrize(
+    ("query", "meant"),
+    [
+        ("EF Gate.Open", "E<> Gate.Open"),
+        ("AG(Gate.x < 7 && true)", "A[] (Gate.x < 7 && true)"),
+        ("AF Gate.Open", "A<> Gate.Open"),
+        ("EG  not   Gate.Open", "E[] not Gate.Open"),
+        ("<>Gate.Open under S", "E<> Gate.Open"),
+        ("[] not deadlock", "A[] not deadlock"),
+        ("<>", "E<> p"),
+    ],
+)
+def test_path_quantifiers_of_other_notations_get_that_of_uppaal(
+    gate: Path, capsys: pytest.CaptureFixture[str], query: str, meant: str
+) -> None:
+    _, err = check_run(capsys, 2, gate, "--query", query)
+    assert f"  hint: did you mean `{meant}`?\n" in err
