@@ -37,12 +37,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "files": {"errors"},
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
-    "checker.picture": set(),
+    "checker.picture": {"errors", "files"},
+    "checker.charts": {"errors", "checker.picture"},
     "checker.queries": set(),
     "checker.expectation": {"checker.queries"},
     "checker.facts": {"checker.picture", "checker.queries"},
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
-    "checker.runs": set(),
+    "checker.runs": {"checker.charts", "checker.picture"},
     "checker.machine": {"errors"},
     "checker.story": {"checker.runs"},
     "checker.play": {"errors", "checker.runs", "_checker"},
@@ -78,6 +79,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cli": BASE
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
+    | {"checker.picture"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},

@@ -11,7 +11,10 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+if TYPE_CHECKING:
+    from ntagen.checker.picture.page import Svg
 
 __all__ = [
     "Choice",
@@ -131,6 +134,26 @@ class Run:
     def duration(self) -> Fraction:
         """The time from the beginning to the end."""
         return sum((step.delay for step in self.steps), self.delay)
+
+    def gantt(self) -> Svg:
+        """The run as a Gantt chart: a row for each process, a bar for each stay in a location.
+
+        Raises:
+            InputError: The run has too many steps for a picture.
+        """
+        from ntagen.checker.charts import gantt_chart
+
+        return gantt_chart(self)
+
+    def sequence(self) -> Svg:
+        """The run as a sequence chart: a line for each process, and what passes between them.
+
+        Raises:
+            InputError: The run has too many steps for a picture.
+        """
+        from ntagen.checker.charts import sequence_chart
+
+        return sequence_chart(self)
 
     def __str__(self) -> str:
         lines = [f"{self.title}:"] if self.title else []

@@ -1,4 +1,4 @@
-"""`ntagen plot`: draws a scene with its plans, or a run."""
+"""`ntagen plot`: draws a scene with its plans, a run, or what a query of a model finds."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import include_option, rank_option
+from ntagen.cli.plot_models import KINDS, MODELS, plot_model
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -31,7 +32,7 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
     "3 the engine reached a limit.",
 )
-@click.argument("source", metavar="ENV.nsl|RUN.mcap", type=click.Path(path_type=Path))
+@click.argument("source", metavar="ENV.nsl|RUN.mcap|MODEL", type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--output",
@@ -57,6 +58,19 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     "wrote for this task, and do not look for one.",
 )
 @rank_option()
+@click.option(
+    "--as",
+    "kind",
+    type=click.Choice(list(KINDS)),
+    help="Of a model: " + "; ".join(f"{kind}: {what}" for kind, what in KINDS.items()) + ".  "
+    "[default for a UPPAAL model: gantt]",
+)
+@click.option(
+    "--query",
+    "asked",
+    metavar="TEXT|NAME",
+    help="Of a model: the query whose trace is drawn.  [default: the model's only query]",
+)
 @include_option()
 def command(
     source: Path,
@@ -64,9 +78,11 @@ def command(
     shown: int,
     tree_path: Path | None,
     ranking: str | None,
+    kind: str | None,
+    asked: str | None,
     include: tuple[Path, ...],
 ) -> None:
-    """Draw a scene with its plans, or a run from its log.
+    """Draw a scene with its plans, a run from its log, or what a query of a model finds.
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
     detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue,
@@ -74,14 +90,28 @@ def command(
     against it are drawn instead, the expected one thick. For a run, the picture also shows the true
     path, the measurements and what the driver learned.
 
+    Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
+    of a query, in a file that ends in .svg.
+
     \b
     Examples:
       ntagen plot examples/paper.nsl -o scene.pdf --plans 10
       ntagen plot run.mcap
+      ntagen plot model.xml --query "E<> Gate.Open" -o trace.svg
+      ntagen plot model.xml --query "E<> Gate.Open" --as sequence -o trace.svg
     """  # noqa: D301  click wants the control character
     from ntagen.plan.rank import parse_ranking
     from ntagen.plot.save import format_of, save
 
+    if kind is not None or source.suffix.lower() in MODELS:
+        _without_scene()
+        path = Path(f"{source.stem}.svg") if output is None else output
+        require_apart({"-o": path}, {"source": source})
+        plot_model(source, path, kind or "gantt", asked, include)
+        echo(f"wrote {path}")
+        return
+    if asked is not None:
+        say_idle({"asked": "--query"}, "without --as: the scene is drawn, not its model")
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
@@ -102,6 +132,12 @@ def command(
 
     save(draw(picture), path)
     echo(f"wrote {path}")
+
+
+def _without_scene() -> None:
+    """Says which options have no effect on the picture of a model."""
+    idle = {"shown": "--plans", "tree_path": "--strategy", "ranking": "--rank"}
+    say_idle(idle, "here: the model is drawn, not a scene")
 
 
 def _is_log(source: Path) -> bool:

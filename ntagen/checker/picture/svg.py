@@ -7,11 +7,9 @@ environment and legs of branch points are dashed. Each kind of label has its own
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Final
-from xml.sax.saxutils import escape
 
 from ntagen.checker.picture.diagram import BranchPoint, Diagram, Edge, LabelKind, Location, Point
 from ntagen.checker.picture.layout import (
@@ -24,6 +22,7 @@ from ntagen.checker.picture.layout import (
     text_height,
     text_width,
 )
+from ntagen.checker.picture.page import HEADING_HEIGHT, MARGIN, page, safe
 
 _COLORS: Final[dict[LabelKind, str]] = {
     "name": "#8b1a1a",
@@ -38,16 +37,11 @@ _COLORS: Final[dict[LabelKind, str]] = {
 _LINE_COLOR: Final = "#303030"
 _FILL: Final = "#dbe7f8"
 _FONT_SIZE: Final = 12
-_MARGIN: Final = 16
-_HEADING_HEIGHT: Final = 26
 _ARROW_LENGTH: Final = 9.0
 _ARROW_HALF_WIDTH: Final = 3.6
 _BEND_RADIUS: Final = 9.0
 _INITIAL_GAP: Final = 3.5
 """The distance between the two circles of the initial location."""
-
-_NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that an XML document must not contain."""
 
 
 def draw(diagram: Diagram) -> str:
@@ -59,21 +53,10 @@ def draw(diagram: Diagram) -> str:
     drawn = placed(diagram)
     left, top, right, bottom = _bounds(drawn)
     heading = _heading(diagram)
-    width = max(right - left, text_width(heading) * 1.2) + 2 * _MARGIN
-    height = bottom - top + 2 * _MARGIN + _HEADING_HEIGHT
-    x, y = left - _MARGIN, top - _MARGIN - _HEADING_HEIGHT
-    parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
-        f'viewBox="{x:.0f} {y:.0f} {width:.0f} {height:.0f}" '
-        f'font-family="Helvetica, Arial, sans-serif" font-size="{_FONT_SIZE}">',
-        f"<title>{_safe(heading)}</title>",
-        f'<rect x="{x:.0f}" y="{y:.0f}" width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
-        f'<text x="{left:.0f}" y="{y + _MARGIN + 6:.0f}" font-weight="bold" font-size="14" '
-        f'fill="#202020">{_safe(heading)}</text>',
-        *_body(drawn),
-        "</svg>",
-    ]
-    return "\n".join(parts) + "\n"
+    width = max(right - left, text_width(heading) * 1.2) + 2 * MARGIN
+    height = bottom - top + 2 * MARGIN + HEADING_HEIGHT
+    x, y = left - MARGIN, top - MARGIN - HEADING_HEIGHT
+    return page((x, y, width, height), heading, _body(drawn), _FONT_SIZE)
 
 
 def _heading(diagram: Diagram) -> str:
@@ -195,14 +178,10 @@ def _text(corner: Point, text: str, color: str) -> str:
     """A text of some lines."""
     x, y = corner
     spans = "".join(
-        f'<tspan x="{x}" y="{y + _FONT_SIZE + LINE_HEIGHT * number}">{_safe(line) or " "}</tspan>'
+        f'<tspan x="{x}" y="{y + _FONT_SIZE + LINE_HEIGHT * number}">{safe(line) or " "}</tspan>'
         for number, line in enumerate(text.split("\n"))
     )
     return f'<text fill="{color}" xml:space="preserve">{spans}</text>'
-
-
-def _safe(text: str) -> str:
-    return escape(_NOT_XML.sub("\ufffd", text))
 
 
 def _bounds(diagram: Diagram) -> tuple[float, float, float, float]:

@@ -1,0 +1,85 @@
+"""A picture as a value: an SVG document that notebooks show and that can be saved."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from xml.sax.saxutils import escape
+
+from ntagen.files import write_files
+
+_NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""Characters that an XML document must not contain."""
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Svg:
+    """A picture; a notebook shows it.
+
+    Attributes:
+        text: The SVG document.
+    """
+
+    text: str
+
+    def __repr__(self) -> str:
+        return f"<Svg of {len(self.text)} characters>"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_svg_(self) -> str:
+        return self.text
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the document to a file, whole or not at all.
+
+        Raises:
+            InputError: The file cannot be written.
+        """
+        write_files({Path(path): self.text})
+
+
+def page(
+    box: tuple[float, float, float, float], heading: str, parts: Iterable[str], font_size: int
+) -> str:
+    """An SVG document: a white page with a heading at its upper left, and what is drawn on it.
+
+    Args:
+        box: Left, top, width and height of the page.
+        heading: The heading, which is also the title of the document.
+        parts: The elements, in the order of drawing.
+        font_size: The size of texts that do not say theirs.
+    """
+    x, y, width, height = box
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="{x:.0f} {y:.0f} {width:.0f} {height:.0f}" '
+        f'font-family="Helvetica, Arial, sans-serif" font-size="{font_size}">',
+        f"<title>{safe(heading)}</title>",
+        f'<rect x="{x:.0f}" y="{y:.0f}" width="{width:.0f}" height="{height:.0f}" fill="#ffffff"/>',
+        f'<text x="{x + MARGIN:.0f}" y="{y + MARGIN + 6:.0f}" font-weight="bold" font-size="14" '
+        f'fill="#202020">{safe(heading)}</text>',
+        *parts,
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+MARGIN: Final = 16
+HEADING_HEIGHT: Final = 26
+"""The room above the drawing that the heading takes."""
+
+
+def safe(text: str) -> str:
+    """A text as it stands in an XML document."""
+    return escape(_NOT_XML.sub("\ufffd", text))
+
+
+def shortened(text: str, most: int) -> str:
+    """A text of at most `most` characters."""
+    return text if len(text) <= most else text[: max(1, most - 1)] + "…"
