@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
     from ntagen.experiment.scripting import campaign
     from ntagen.loading import load, load_strategy
+    from ntagen.plot.face import view
     from ntagen.traces.face import match
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "load",
     "load_strategy",
     "match",
+    "view",
 ]
 
 _HOMES = {
@@ -49,6 +51,7 @@ _HOMES = {
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",
     "match": "ntagen.traces.face",
+    "view": "ntagen.plot.face",
 }
 """The modules of the public names. A name is imported on first use: the command line imports this
 package for every command, and `ntagen --help` must not wait for the engine."""

@@ -74,7 +74,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
-    "plot": BASE | {"files", "needle", "plan", "drive", "traces"},
+    "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"},
     "experiment": BASE | {"files", "grbl", "needle", "nsl", "plan", "drive", "lab", "version"},
     "cli": BASE
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
@@ -132,7 +132,7 @@ ONLY_IN: dict[str, set[str]] = {
     "asyncio": {"drive"},
     "threading": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
     | {"plugins", "testing"},
-    "time": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink", "testing"},
+    "time": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink", "plot", "testing"},
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

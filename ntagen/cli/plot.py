@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
     from ntagen.plot.picture import Picture
     from ntagen.scene import Scene
 
-_BUDGET_S: Final = 3.0
-"""The time to look for plans, if there are too many to list all."""
-
 _MCAP_MAGIC: Final = b"\x89MCAP"
 
 
@@ -36,7 +32,7 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
 @click.option(
     "-o",
     "--output",
-    metavar="FILE.png|pdf|svg",
+    metavar="FILE.png|pdf|svg|html",
     type=click.Path(path_type=Path),
     help="The picture to write.  [default: the source's name with .png, in the current folder]",
 )
@@ -90,6 +86,9 @@ def command(
     against it are drawn instead, the expected one thick. For a run, the picture also shows the true
     path, the measurements and what the driver learned.
 
+    A file that ends in .html is a page for a browser: you turn the scene with the mouse, switch
+    regions and paths on and off, and step through the time of a run. It needs no network.
+
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
     of a query, in a file that ends in .svg.
 
@@ -97,11 +96,12 @@ def command(
     Examples:
       ntagen plot examples/paper.nsl -o scene.pdf --plans 10
       ntagen plot run.mcap
+      ntagen plot run.mcap -o run.html
       ntagen plot model.xml --query "E<> Gate.Open" -o trace.svg
       ntagen plot model.xml --query "E<> Gate.Open" --as sequence -o trace.svg
     """  # noqa: D301  click wants the control character
     from ntagen.plan.rank import parse_ranking
-    from ntagen.plot.save import format_of, save
+    from ntagen.plot.save import PICTURES, format_of, write_picture
 
     if kind is not None or source.suffix.lower() in MODELS:
         _without_scene()
@@ -120,17 +120,14 @@ def command(
     elif shown == 0:
         say_idle({"ranking": "--rank", "tree_path": "--strategy"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
-    format_of(path)
+    format_of(path, PICTURES)
     require_apart({"-o": path}, {"source": source})
     picture = (
         _of_run(source, shown)
         if _is_log(source)
         else _of_scene(source, shown, criteria, include, tree_path)
     )
-    # Importing Matplotlib takes half a second: it waits until everything else is right.
-    from ntagen.plot.picture import draw
-
-    save(draw(picture), path)
+    write_picture(picture, path)
     echo(f"wrote {path}")
 
 
@@ -168,8 +165,7 @@ def _of_scene(
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
     from ntagen.nsl import load_task
-    from ntagen.plan.anytime import synthesis_within
-    from ntagen.plan.best_plan import MOST_WHEN_NARROW, BestPlanSynthesiser, sequences
+    from ntagen.plot.face import picture_with_plans
     from ntagen.plot.run import picture_of_plans
 
     task = load_task(source, include=include)
@@ -186,16 +182,7 @@ def _of_scene(
     elif (found := _of_strategy(task.scene, configuration, tree_path)) is not None:
         say_idle({"ranking": "--rank"}, "here: a strategy against the tissue is drawn, not plans")
         return found
-    if task.scene.breath is not None:
-        # Waits make too many plans for a list. The best one is asked for, as in drives.
-        return picture_of_plans(task.scene, BestPlanSynthesiser(engine)(task.scene), shown)
-    if sequences(task.scene) <= MOST_WHEN_NARROW:
-        # All plans are listed, since some are to be shown beside the best one.
-        return picture_of_plans(task.scene, engine(task.scene), shown)
-    synthesis = synthesis_within(
-        task.scene, engine, clock=time.monotonic, count=shown, budget_s=_BUDGET_S
-    )
-    return picture_of_plans(task.scene, synthesis, shown)
+    return picture_with_plans(task.scene, engine, shown)
 
 
 def _of_strategy(

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
@@ -24,21 +24,41 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _AXES: Final = "xyz"
-_COLOURS: Final = {
+COLOURS: Final = {
     "target": "#2a9d4a",
     "critical": "#c8283c",
     "detection": "#e8890c",
     "unexplored": "#5b6472",
     "safe": "#3fa7a0",
 }
-_OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
+OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
 """The kinds that are drawn as outlines, and their dashes."""
 _LEGEND_COLUMNS: Final = 6
 _MANY_CURVES: Final = 400
 _SHADOW_POINTS: Final = 160
 _TITLE_WIDTH: Final = 120
 
+GAP_MM: Final = 1.0
+"""Tip positions farther apart than this are on different lines: the tip was pulled back."""
+
 Curve = Sequence[Vector]
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A moment of a run.
+
+    Attributes:
+        time_s: The time on the clock of the run.
+        true_mm: Where the tip truly is (simulation only).
+        measured_mm: Where it was measured.
+        said: What happened, in words.
+    """
+
+    time_s: float
+    true_mm: Vector | None = None
+    measured_mm: Vector | None = None
+    said: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +77,8 @@ class Picture:
         other_label: What the other paths are.
         title: The line above the picture.
         caption: The lines below the picture.
+        moments: The moments of a run, in order; pages and animations go through them.
+        appears_s: When a region was learned, by its name.
     """
 
     scene: Scene
@@ -70,6 +92,8 @@ class Picture:
     other_label: str = "other plans"
     title: str = ""
     caption: str = ""
+    moments: Sequence[Moment] = ()
+    appears_s: Mapping[str, float] = field(default_factory=dict)
 
 
 def draw(picture: Picture) -> Figure:
@@ -78,8 +102,8 @@ def draw(picture: Picture) -> Figure:
 
     figure = Figure(figsize=(11.0, 6.4), dpi=150, layout="constrained")
     grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.3))
-    depth = _depth_axis(picture.scene)
-    bounds = _bounds(picture)
+    depth = depth_axis(picture.scene)
+    bounds = bounds_mm(picture)
     across = [axis for axis in range(3) if axis != depth]
     flat = [
         _draw_projection(figure.add_subplot(grid[0, i]), picture, (axis, depth), bounds)
@@ -106,12 +130,12 @@ def _heading(picture: Picture) -> str:
     return "\n".join(part for line in lines for part in textwrap.wrap(line, _TITLE_WIDTH))
 
 
-def _depth_axis(scene: Scene) -> int:
+def depth_axis(scene: Scene) -> int:
     """The coordinate axis along which insertion makes most progress."""
     return max(range(3), key=lambda i: abs(scene.axis[i]))
 
 
-def _bounds(picture: Picture) -> list[tuple[float, float]]:
+def bounds_mm(picture: Picture) -> list[tuple[float, float]]:
     """The range of each coordinate that contains everything, with a little space."""
     room_mm = 2.0
     curves = [picture.best, *picture.others, *picture.true_path]
@@ -127,7 +151,7 @@ def _bounds(picture: Picture) -> list[tuple[float, float]]:
             low = min(low, least) if math.isfinite(least) else low
             high = max(high, most) if math.isfinite(most) else high
         bounds.append((low - room_mm, high + room_mm))
-    across = [i for i in range(3) if i != _depth_axis(picture.scene)]
+    across = [i for i in range(3) if i != depth_axis(picture.scene)]
     # Both projections have the same width, so that they fit side by side on one scale.
     half = max(bounds[i][1] - bounds[i][0] for i in across) / 2.0
     for i in across:
@@ -186,7 +210,7 @@ def _ghosts(region: Region) -> list[Region]:
 
 def _ghost_style(region: Region) -> dict[str, Any]:
     """A thin outline without a face."""
-    colour = (*_rgb(_COLOURS[region.kind]), 0.6)
+    colour = (*_rgb(COLOURS[region.kind]), 0.6)
     label = f"{region.kind}, end of its way"
     return {
         **{"edgecolor": colour, "facecolor": "none", "linewidth": 0.7},
@@ -259,11 +283,11 @@ def _back_to_front(regions: Sequence[Region]) -> list[Region]:
 
 def _face(region: Region, picture: Picture) -> dict[str, Any]:
     """The style of a region's disc."""
-    colour = _COLOURS[region.kind]
+    colour = COLOURS[region.kind]
     label: str = region.kind
     style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.2, "zorder": 2}
-    if region.kind in _OUTLINES:
-        style |= {"facecolor": "none", "linestyle": _OUTLINES[region.kind], "zorder": 3}
+    if region.kind in OUTLINES:
+        style |= {"facecolor": "none", "linestyle": OUTLINES[region.kind], "zorder": 3}
     else:
         style |= {"facecolor": (*_rgb(colour), 0.22)}
     if region.kind == "unexplored":
@@ -352,8 +376,8 @@ def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: A
         points, triangles = skin(region.shape)
         if len(triangles):
             mesh = [points[:, i] for i in order]
-            face = _COLOURS[region.kind]
-            alpha = 0.08 if region.kind in _OUTLINES else 0.25
+            face = COLOURS[region.kind]
+            alpha = 0.08 if region.kind in OUTLINES else 0.25
             axes.plot_trisurf(
                 *mesh[:2], mesh[2], triangles=triangles, color=face, alpha=alpha, linewidth=0
             )
@@ -361,8 +385,8 @@ def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: A
     grid = directions()
     points = outline_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
     surface = [points[..., i] for i in order]
-    colour = _COLOURS[region.kind]
-    if region.kind in _OUTLINES:
+    colour = COLOURS[region.kind]
+    if region.kind in OUTLINES:
         axes.plot_wireframe(*surface, color=colour, linewidth=0.35, alpha=0.45, linestyle="--")
     else:
         axes.plot_surface(*surface, color=colour, alpha=0.22, linewidth=0, shade=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 from ntagen.drive.reading import RunLog
@@ -12,12 +13,13 @@ from ntagen.drive.records import (
     Ended,
     Followed,
     Guaranteed,
+    Learned,
     Measured,
     Record,
     Synthesised,
     Truth,
 )
-from ntagen.drive.story import guaranteed
+from ntagen.drive.story import guaranteed, tell
 from ntagen.errors import InputError
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
@@ -25,14 +27,12 @@ from ntagen.plan.branches import path_of
 from ntagen.plan.document import plan_from_json
 from ntagen.plan.synthesise import Synthesis
 from ntagen.plan.wording import clearance_of, counted, ranked_by
-from ntagen.plot.picture import Curve, Picture
+from ntagen.plot.picture import GAP_MM, Curve, Moment, Picture
 from ntagen.plot.strategy import FOLLOWED_LABEL, OTHER_LABEL, branches_of, curve_of
 from ntagen.scene import Needle, Scene, Vector
 
 _SPACING_MM: Final = 0.5
 _LONGEST: Final = 200
-_GAP_MM: Final = 1.0
-"""Tip positions farther apart than this are on different curves: the tip was pulled back."""
 
 
 def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> Picture:
@@ -87,7 +87,32 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
         unknown=frozenset(names - {region.name for region in told.regions}),
         title=f"{actual.name}, a run with seed {log.metadata.get('seed', '?')}",
         caption=_outcome(ends[-1], log.records) if ends else "the log is torn",
+        moments=moments_of(log.records),
+        appears_s=_learned_at(log.records),
     )
+
+
+def moments_of(records: Sequence[Record]) -> list[Moment]:
+    """The moments of a run: one for each time at which something was measured or is told."""
+    at: dict[float, Moment] = {}
+    for record in records:
+        moment = at.get(record.time_s, Moment(record.time_s))
+        if isinstance(record, Truth):
+            moment = replace(moment, true_mm=record.position_mm)
+        elif isinstance(record, Measured):
+            moment = replace(moment, measured_mm=record.position_mm)
+        elif (text := tell(record)) is not None:
+            moment = replace(moment, said=(*moment.said, text))
+        else:
+            continue
+        at[record.time_s] = moment
+    return [at[time_s] for time_s in sorted(at)]
+
+
+def _learned_at(records: Sequence[Record]) -> dict[str, float]:
+    """When each region was learned first."""
+    learned = [record for record in records if isinstance(record, Learned)]
+    return {record.name: record.time_s for record in reversed(learned)}
 
 
 def curve(plan: Plan, needle: Needle) -> Curve:
@@ -149,7 +174,7 @@ def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
 def _split(points: list[Vector]) -> list[Curve]:
     curves: list[list[Vector]] = []
     for point in points:
-        if curves and math.dist(curves[-1][-1], point) <= _GAP_MM:
+        if curves and math.dist(curves[-1][-1], point) <= GAP_MM:
             curves[-1].append(point)
         else:
             curves.append([point])

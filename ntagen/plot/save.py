@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,21 +13,42 @@ from ntagen.files import write_files
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS: Final = ("png", "pdf", "svg")
+    from ntagen.plot.picture import Picture
+
+FIGURES: Final = ("png", "pdf", "svg")
+PICTURES: Final = (*FIGURES, "html")
+"""Scenes and runs can also be pages."""
 
 
-def format_of(path: Path) -> str:
-    """The format of a file's ending.
+def write_picture(picture: Picture, path: Path) -> None:
+    """Draws a picture into a file: a page to turn and step through, or a figure.
+
+    Raises:
+        InputError: The file cannot be written, or its ending is unknown.
+    """
+    # Matplotlib takes half a second to load, and a page does not need it.
+    if format_of(path, PICTURES) == "html":
+        from ntagen.plot.viewer import page_of
+
+        page_of(picture).save(path)
+        return
+    from ntagen.plot.picture import draw
+
+    save(draw(picture), path)
+
+
+def format_of(path: Path, known: Sequence[str] = FIGURES) -> str:
+    """The format of a file's ending, which is one of those `known`.
 
     Raises:
         InputError: The ending is not that of a supported format.
     """
     ending = path.suffix.lower().removeprefix(".")
-    if ending not in FORMATS:
-        known = ", ".join(f".{name}" for name in FORMATS)
+    if ending not in known:
+        endings = ", ".join(f".{name}" for name in known)
         raise InputError(
             f"cannot draw {path}: unknown kind of picture\n"
-            f"hint: choose a file name with one of these endings: {known}"
+            f"hint: choose a file name with one of these endings: {endings}"
         )
     return ending
 
