@@ -2,8 +2,7 @@
 
 Each projection shows the direction of insertion, from top to bottom, and one of the two other axes.
 All lengths are in mm, and all axes have the same scale. A path that crosses a region in one
-projection may pass in front of it: the certificate has the true distances, and the caption repeats
-its numbers.
+projection may pass in front of it: a note above the projection then has the true distance.
 
 Nothing about needles is computed here: the curves are given as points.
 """
@@ -17,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
+from ntagen.plot.seeming import Seeming, note_of, seeming
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import UPRIGHT, Field, Sphere, directions, outline_mm, skin
 
@@ -178,10 +178,12 @@ def _draw_projection(
     bounds: list[tuple[float, float]],
 ) -> Any:  # noqa: ANN401
     across, depth = shown
+    seen: list[Seeming | None] = []
     for region in _back_to_front(picture.scene.regions):
         for ghost in _ghosts(region):
             axes.add_patch(_outline(ghost, shown, _ghost_style(region)))
-        axes.add_patch(_outline(region, shown, _face(region, picture)))
+        outline = axes.add_patch(_outline(region, shown, _face(region, picture)))
+        seen.append(seeming(picture.best, region, outline, shown))
     for style, curves in _curves(picture):
         for curve in _few(curves):
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
@@ -197,6 +199,8 @@ def _draw_projection(
     axes.set_ylabel(f"{_AXES[depth]} [mm]")
     axes.grid(True, color="#e6e8ec", linewidth=0.6)
     axes.set_axisbelow(True)
+    note = note_of([one for one in seen if one is not None], picture.best_label)
+    axes.set_title(note, fontsize=7.5, color="#404040")
     return axes
 
 
