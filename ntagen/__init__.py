@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, RejectedError
     from ntagen.checker.strategy import Strategy
+    from ntagen.drive.reading import read_log
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
     from ntagen.experiment.scripting import campaign
     from ntagen.loading import load, load_strategy
@@ -35,6 +36,7 @@ __all__ = [
     "load",
     "load_strategy",
     "match",
+    "read_log",
     "view",
 ]
 
@@ -51,6 +53,7 @@ _HOMES = {
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",
     "match": "ntagen.traces.face",
+    "read_log": "ntagen.drive.reading",
     "view": "ntagen.plot.face",
 }
 """The modules of the public names. A name is imported on first use: the command line imports this

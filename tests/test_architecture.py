@@ -35,6 +35,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "nsl": BASE | {"cache", "files", "imaging"},
     "render": BASE | {"files"},
     "files": {"errors"},
+    "frames": {"errors"},
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
@@ -66,7 +67,18 @@ MAY_IMPORT: dict[str, set[str]] = {
     "grbl": {"errors", "hardware", "units"},
     "extensions": {"errors"},
     "drive": BASE
-    | {"extensions", "files", "imaging", "needle", "nsl", "plan", "render", "checker", "grbl"}
+    | {
+        "extensions",
+        "files",
+        "frames",
+        "imaging",
+        "needle",
+        "nsl",
+        "plan",
+        "render",
+        "checker",
+        "grbl",
+    }
     | {"version"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"extensions", "files", "needle", "drive", "openigtlink"},
@@ -75,7 +87,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"},
-    "experiment": BASE | {"files", "grbl", "needle", "nsl", "plan", "drive", "lab", "version"},
+    "experiment": BASE
+    | {"files", "frames", "grbl", "needle", "nsl", "plan", "drive", "lab", "version"},
     "cli": BASE
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}

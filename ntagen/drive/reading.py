@@ -13,7 +13,7 @@ import io
 import json
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any, Final, cast
 
@@ -34,6 +34,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.trees import COURSE, course_from_log
 from ntagen.errors import InputError
 from ntagen.files import open_file
+from ntagen.frames import frame_of
 from ntagen.scene import Scene
 
 MAX_LOG_BYTES: Final = 512 * 2**20
@@ -122,6 +123,25 @@ class RunLog:
         """
         return self._scene(f"rebuild-{number:04d}/scene.json")
 
+    def rows(self) -> list[dict[str, Any]]:
+        """The records as flat rows, in order: ``record`` is the kind, and the rest its fields.
+
+        The parts of a vector are fields of their own, such as ``position_x_mm``. What was not
+        measured is left out.
+        """
+        return [
+            {"record": type(record).__name__.lower(), **_flat(asdict(record))}
+            for record in self.records
+        ]
+
+    def to_frame(self) -> Any:  # noqa: ANN401  it depends on what is installed
+        """The `rows` as a frame of pandas, or of polars if there is no pandas.
+
+        Raises:
+            InputError: Neither is installed.
+        """
+        return frame_of(self.rows(), "`rows` has the records")
+
     def _scene(self, name: str) -> Scene:
         if name not in self.attachments:
             raise InputError("the log has no scene\nhint: it was cut off before the run began")
@@ -129,12 +149,29 @@ class RunLog:
         return scene_from_json(self.attachments[name], known)
 
 
-def read_log(path: Path) -> RunLog:
+def _flat(fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a record with each part of a vector apart."""
+    found: dict[str, Any] = {}
+    for name, value in fields.items():
+        if not isinstance(value, tuple):
+            found[name] = value
+        elif name == "way":
+            found[name] = " ".join(f"{one:g}" for one in value)
+        else:
+            base = name.removesuffix("_mm")
+            unit = name[len(base) :]
+            # The heading and the bevel of a tracker that measures positions only are empty.
+            found |= {f"{base}_{axis}{unit}": one for axis, one in zip("xyz", value, strict=False)}
+    return found
+
+
+def read_log(path: str | Path) -> RunLog:
     """Reads the readable part of a log.
 
     Raises:
         InputError: The file cannot be read, is not MCAP, or is not the log of a run.
     """
+    path = Path(path)
     try:
         file = open_file(path, MAX_LOG_BYTES)
     except OSError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from ntagen.experiment.report import report_of
 from ntagen.experiment.table import FORMAT_VERSION
 from ntagen.experiment.writing import csv_of, flat, latex_of, markdown_of
 from ntagen.files import MODEL_BYTES, read_file, write_files
+from ntagen.frames import frame_of
 from ntagen.nsl import load
 from ntagen.scene import Scene
 
@@ -52,7 +53,7 @@ class Campaign:
             InputError: Neither is installed.
         """
         rows = [flat(row) for row in self.table]
-        return _frame(rows)
+        return frame_of(rows, "`table` has the rows")
 
     def _repr_html_(self) -> str:
         from ntagen.experiment.report import table_of
@@ -95,19 +96,3 @@ def read_table(folder: Path) -> Campaign:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} is no table of an experiment: {error}") from error
     return Campaign(document, folder, {})
-
-
-def _frame(rows: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
-    import importlib
-
-    for name in ("pandas", "polars"):
-        try:
-            library = importlib.import_module(name)
-        except ImportError:
-            continue
-        columns = list(dict.fromkeys(key for row in rows for key in row))
-        return library.DataFrame({key: [row.get(key) for row in rows] for key in columns})
-    raise InputError(
-        "a frame needs pandas or polars, and neither is installed\n"
-        "hint: pip install polars; `table` has the rows without them"
-    )

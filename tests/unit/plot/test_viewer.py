@@ -7,6 +7,8 @@ import math
 import re
 import shutil
 import subprocess
+import sys
+import types
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from ntagen.drive.reading import RunLog, read_log
 from ntagen.drive.records import Learned, Truth
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
+from ntagen.errors import InputError
 from ntagen.plot.picture import Picture
 from ntagen.plot.run import moments_of, picture_of_plans, picture_of_run
 from ntagen.plot.viewer import data_of, page_of
@@ -128,3 +131,29 @@ def test_the_script_of_the_page_is_javascript(tmp_path: Path) -> None:
     script.write_text(text.rpartition("<script>")[2].partition("</script>")[0], "utf-8")
     done = subprocess.run(["node", "--check", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_run_is_rows_with_each_part_of_a_vector_apart(run: RunLog) -> None:
+    rows = run.rows()
+    assert [row["time_s"] for row in rows] == [record.time_s for record in run.records]
+    truth = next(record for record in run.records if isinstance(record, Truth))
+    row = next(row for row in rows if row["record"] == "truth")
+    assert row == {
+        **{"record": "truth", "time_s": truth.time_s, "clearance_mm": truth.clearance_mm},
+        **{f"position_{axis}_mm": truth.position_mm[i] for i, axis in enumerate("xyz")},
+    }
+    assert all(isinstance(one, int | float | str | bool) for row in rows for one in row.values())
+
+
+def test_a_run_is_a_frame_if_there_is_a_library(
+    monkeypatch: pytest.MonkeyPatch, run: RunLog
+) -> None:
+    library = types.ModuleType("pandas")
+    library.DataFrame = dict  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "pandas", library)
+    frame = run.to_frame()
+    assert {len(column) for column in frame.values()} == {len(run.records)}
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    monkeypatch.setitem(sys.modules, "polars", None)
+    with pytest.raises(InputError, match=r"pip install polars; `rows` has the records"):
+        run.to_frame()
