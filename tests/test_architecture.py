@@ -62,6 +62,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.options", "checker.query_form", "checker.states"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
+    "verifyta": {"errors", "files", "checker"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},
@@ -93,6 +94,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture"}
+    | {"verifyta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 
+Matrix = list[list[tuple[int, bool] | None]]
+"""A zone as a closed difference bound matrix; `SymbolicState.dbm` says what an entry is."""
+
 Extreme = int | Literal["inf"] | None
 """A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
 
@@ -236,6 +239,10 @@ class Answer:
     def trace_json(self) -> str | None:
         """The same as JSON text."""
         return self._raw.trace_json()
+
+    def trace_zones(self) -> list[list[Matrix]]:
+        """Of each trace in `trace_json`, the zones of its symbolic states."""
+        return self._raw.trace_zones()
 
     def certificate_text(self) -> str | None:
         """The certificate as the text of a file; ``None`` if none was asked for or found."""

@@ -79,6 +79,14 @@ class Model:
         """The description of the model as one JSON object, as ``ntagen info --json`` prints it."""
         return self._raw.facts_json()
 
+    def network_json(self) -> str:
+        """The processes, clocks and variables by number as one JSON object.
+
+        Locations and edges have the numbers of traces and strategies; ``network_json.rs`` of the
+        engine describes the object.
+        """
+        return self._raw.network_json()
+
     @property
     def facts(self) -> Facts:
         """The description of the model as one value."""

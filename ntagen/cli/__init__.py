@@ -28,7 +28,7 @@ from ntagen.cli.signals import TERMINATED, Terminated, termination
 from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError, NtagenError
 
-__all__ = ["main"]
+__all__ = ["main", "verifyta"]
 
 COMMANDS: Final = {
     "compile": "Turn an environment into a UPPAAL model and its queries.",
@@ -46,6 +46,7 @@ COMMANDS: Final = {
     "device": "Try a device before it drives a needle.",
     "match": "Find the actions that explain measured traces of the tip.",
     "replay": "Repeat the decisions of a logged run and compare them.",
+    "verifyta": "Stand in for UPPAAL's verifyta: its options, output and files.",
     "fmt": "Format environment files.",
 }
 """The commands in the order of the help, each with its line there."""
@@ -138,6 +139,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except BaseException as error:  # also KeyboardInterrupt and panics of the engine
             code = _report(error)
     return TERMINATED if signalled.came and code == INTERRUPTED else code
+
+
+def verifyta() -> int:
+    """The program ``verifyta-ntagen``: ``ntagen verifyta`` by a name without a blank.
+
+    Returns:
+        The exit code.
+    """
+    return main(["verifyta", *sys.argv[1:]])
 
 
 def _run(arguments: list[str]) -> int:

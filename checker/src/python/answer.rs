@@ -6,7 +6,7 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 
 use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
-use super::model::Model;
+use super::model::{BoundRow, Model, bound_rows};
 use super::options;
 use super::plans::Plans;
 use crate::engine::evidence::strategy_check;
@@ -185,6 +185,16 @@ impl Answer {
     /// The traces as JSON; `None` without a trace.
     fn trace_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
         until_signal(py, || self.trace_json_or_none())
+    }
+
+    /// Of each trace, the zones of its states as matrices.
+    fn trace_zones(&self) -> Vec<Vec<Vec<BoundRow>>> {
+        let witnesses = self.inner.evidence.witnesses.iter();
+        let zones = witnesses.map(|one| {
+            let states = one.trace.states.iter();
+            states.map(|(_, zone)| bound_rows(zone)).collect()
+        });
+        zones.collect()
     }
 
     /// The certificate as a file; `None` without one.

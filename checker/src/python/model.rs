@@ -10,12 +10,13 @@ use super::convert::{
     FailedError, StepEntry, code_engine, observer, overflow_rule, rejected, rules, step_entry,
     stop_name, time_limit, until_signal,
 };
-use crate::engine::format::{json, model_json, text};
+use crate::engine::format::{json, model_json, network_json, text};
 use crate::engine::{Limits, LoadedModel};
 use crate::ir::{Network, Overflow};
 use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::optimum::best_first::Met;
+use crate::zones::Zone;
 
 /// A loaded model.
 #[pyclass(frozen, module = "ntagen._checker")]
@@ -35,7 +36,7 @@ type EdgeEntry = (String, String, Vec<String>, Vec<String>, String, bool);
 
 /// A row of a matrix of bounds: of each the value and whether it is strict, `None` for one that is
 /// infinite.
-type BoundRow = Vec<Option<(i32, bool)>>;
+pub(super) type BoundRow = Vec<Option<(i32, bool)>>;
 
 /// A reached state: locations and variables as JSON, the constraints, the matrix, and the state and
 /// move that led to it.
@@ -46,17 +47,22 @@ type ReachedEntry = (
     Option<(usize, StepEntry)>,
 );
 
-fn reached_entry(network: &Network, met: Met) -> ReachedEntry {
-    let clocks = 0..met.zone.dimension();
+/// The matrix of a zone.
+pub(super) fn bound_rows(zone: &Zone) -> Vec<BoundRow> {
+    let clocks = 0..zone.dimension();
     let bound = |left: usize, right: usize| {
-        let bound = met.zone.bound(left, right);
+        let bound = zone.bound(left, right);
         (!bound.is_infinite()).then(|| (bound.value(), bound.is_strict()))
     };
     let row = |left: usize| clocks.clone().map(|right| bound(left, right)).collect();
+    clocks.clone().map(row).collect()
+}
+
+fn reached_entry(network: &Network, met: Met) -> ReachedEntry {
     (
         json::discrete(network, &met.words).to_string(),
         text::minimal_constraints(network, &met.zone),
-        clocks.clone().map(row).collect(),
+        bound_rows(&met.zone),
         met.from
             .map(|(source, parts)| (source, step_entry(network, &parts))),
     )
@@ -103,6 +109,11 @@ impl Model {
     /// What is in the model, as JSON; see `engine::facts`.
     fn facts_json(&self) -> String {
         self.with(|model| model_json::facts(model).to_string())
+    }
+
+    /// The network, as JSON; see `engine::format::network_json`.
+    fn network_json(&self) -> String {
+        self.with(|model| network_json::network(model).to_string())
     }
 
     /// The queries of the file, as JSON.

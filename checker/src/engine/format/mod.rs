@@ -8,6 +8,7 @@ pub mod json_reader;
 pub mod machine_c;
 pub mod machine_json;
 pub mod model_json;
+pub mod network_json;
 pub mod strategy_c;
 pub mod strategy_json;
 pub mod strategy_text;

@@ -58,7 +58,8 @@ pub enum Value {
     Double(f64),
 }
 
-fn visit_shape<'n>(
+/// Calls `visit` with the name and the place of every scalar part of a variable.
+pub(super) fn visit_shape<'n>(
     shape: &'n Shape,
     name: &str,
     offset: usize,

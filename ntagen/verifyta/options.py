@@ -1,0 +1,256 @@
+"""The command line of verifyta: ``[OPTION]... MODEL [QUERIES]``.
+
+Options stand before, between or after the files. ``-t0``, ``-t 0``, ``--diagnostic 0`` and
+``--diagnostic=0`` are the same; options of one letter without a value may be bundled (``-squ``); a
+long name may be shortened as long as it is clear.
+
+Each option of `OPTIONS` is honoured, has no effect because it cannot change a verdict, or is
+refused. There is no fourth kind: an unknown option is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from ntagen.errors import InputError
+from ntagen.values import dataclass
+
+Effect = Literal["honoured", "idle", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """An option of verifyta.
+
+    Attributes:
+        letter: Its short name, or empty.
+        long: Its long name, or empty.
+        value: What its value is called; empty if it has none.
+        effect: Whether ntagen honours it.
+        help: What it does; for an option that is refused, why.
+        choices: The values that it may have; empty for any.
+    """
+
+    letter: str
+    long: str
+    value: str
+    effect: Effect
+    help: str
+    choices: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its long name, or else its short one."""
+        return self.long or self.letter
+
+
+_STATISTICAL: Final = "it is for statistical queries, which ntagen does not answer"
+_LEARNING: Final = "it is for learning, which ntagen does not do"
+
+
+def _refused(names: Sequence[str], why: str) -> list[Option]:
+    return [Option("", f"--{name}", "N", "refused", why) for name in names]
+
+
+OPTIONS: Final = (
+    Option("-h", "--help", "", "honoured", "Show this help."),
+    Option("-v", "--version", "", "honoured", "Show the version."),
+    Option(
+        "-t",
+        "--diagnostic",
+        "0|1|2",
+        "honoured",
+        "Make a trace: 0 some, 1 shortest, 2 fastest. Without -f and -X it is written to standard "
+        "error; strategies of control queries are written to standard output.",
+        ("0", "1", "2"),
+    ),
+    Option("-f", "", "PREFIX", "honoured", "Write the trace of query n to PREFIX-n (.xtr)."),
+    Option("-X", "", "PREFIX", "honoured", "Write the trace of query n to PREFIXn.xml."),
+    Option("-y", "", "", "honoured", "Show symbolic traces."),
+    Option("-Y", "", "", "honoured", "The same."),
+    Option(
+        "-o",
+        "--search-order",
+        "0|1|2",
+        "honoured",
+        "Search breadth first (0), depth first (1) or in random depth-first order (2). 3 and 4 are "
+        "taken as 0.",
+        ("0", "1", "2", "3", "4"),
+    ),
+    Option("-r", "--seed", "N", "honoured", "The seed of the random order."),
+    Option("-s", "--silence-progress", "", "honoured", "Do not mark lines as progress."),
+    Option("-q", "", "", "honoured", "Do not show the options."),
+    Option("-u", "--summary", "", "honoured", "Show counts, time and memory of each query."),
+    Option("", "--nosummary", "", "honoured", "Do not."),
+    Option(
+        "",
+        "--print-strategies",
+        "DIR",
+        "honoured",
+        "Write the strategy of each `strategy NAME = control: …` to DIR/NAME.",
+    ),
+    Option(
+        "", "--generate-strategy", "0|1|2", "idle", "Strategies are always made.", ("0", "1", "2")
+    ),
+    Option("-n", "--extrapolation", "0..4", "idle", "Answers are exact.", tuple("01234")),
+    Option("-S", "", "0|1|2", "idle", "How many states are stored.", ("0", "1", "2")),
+    Option("-C", "", "", "idle", "Zones as matrices."),
+    Option("-b", "", "", "idle", "The search is breadth first."),
+    Option("-H", "--hashtable-size", "N", "idle", "The size of a table."),
+    Option("-T", "", "", "idle", "Use states again for the next query."),
+    Option("-O", "", "std", "idle", "The kind of output.", ("std",)),
+    Option("", "--key", "KEY", "idle", "ntagen needs no licence."),
+    Option("", "--lease", "HOURS", "idle", "The same."),
+    Option("", "--lease-request", "", "idle", "The same."),
+    Option("", "--lease-install", "", "idle", "The same."),
+    Option(
+        "",
+        "--state-representation",
+        "0|1",
+        "idle",
+        "Zones as matrices or by their fewest constraints.",
+        ("0", "1"),
+    ),
+    Option(
+        "-A",
+        "",
+        "",
+        "refused",
+        "ntagen does not over-approximate; without the option answers are exact",
+    ),
+    Option(
+        "-Z",
+        "",
+        "",
+        "refused",
+        "ntagen does not under-approximate; without the option answers are exact",
+    ),
+    Option("-E", "--epsilon", "N", "refused", _STATISTICAL),
+    Option("-a", "--alpha", "N", "refused", _STATISTICAL),
+    Option("-B", "--beta", "N", "refused", _STATISTICAL),
+    Option("-D", "--discretization", "N", "refused", _STATISTICAL),
+    *_refused(
+        (
+            "learning-method",
+            "good-runs",
+            "total-runs",
+            "runs-pr-state",
+            "eval-runs",
+            "max-iterations",
+            "reset-no-better",
+            "max-reset-learning",
+            "qlearning-alpha",
+            "split-filter-rate",
+            "indifference-smoothing",
+            "max-imitation",
+            "filter",
+        ),
+        _LEARNING,
+    ),
+)
+"""The options that are known, in the order of the help."""
+
+_BY_LETTER: Final = {option.letter: option for option in OPTIONS if option.letter}
+_BY_LONG: Final = {option.long: option for option in OPTIONS if option.long}
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLine:
+    """What a command line asks for.
+
+    Attributes:
+        given: By name of the option: its value, empty for one without a value.
+        files: The other words.
+    """
+
+    given: dict[str, str]
+    files: tuple[str, ...]
+
+    def has(self, name: str) -> bool:
+        """Whether an option is given, by its long name or, without one, its letter."""
+        return name in self.given
+
+    def value(self, name: str, default: str = "") -> str:
+        """The value of an option."""
+        return self.given.get(name, default)
+
+
+def parse(words: Sequence[str]) -> CommandLine:
+    """Reads a command line.
+
+    Raises:
+        InputError: An option is unknown or not supported, or its value is missing or wrong.
+    """
+    given: dict[str, str] = {}
+    files: list[str] = []
+    rest = list(words)
+    while rest:
+        word = rest.pop(0)
+        if word == "--":
+            files += rest
+            break
+        if word.startswith("--"):
+            name, equals, value = word.partition("=")
+            option = _long(name)
+            if equals and not option.value:
+                raise InputError(f"{option.name} has no value, but {value!r} is given")
+            _take(option, value if equals else None, rest, given)
+        elif word.startswith("-") and word != "-":
+            _letters(word, rest, given)
+        else:
+            files.append(word)
+    return CommandLine(given, tuple(files))
+
+
+def _letters(word: str, rest: list[str], given: dict[str, str]) -> None:
+    """Takes the options of a word such as ``-squ`` or ``-t0``."""
+    for index in range(1, len(word)):
+        option = _BY_LETTER.get(f"-{word[index]}")
+        if option is None:
+            where = f" in {word}" if len(word) > 2 else ""
+            raise _unknown(f"-{word[index]}{where}")
+        if option.value:
+            _take(option, word[index + 1 :] or None, rest, given)
+            return
+        _take(option, None, rest, given)
+
+
+def _long(name: str) -> Option:
+    """The option with this name, or the only one that begins with it."""
+    if name in _BY_LONG:
+        return _BY_LONG[name]
+    found = [option for long, option in _BY_LONG.items() if long.startswith(name)]
+    if len(found) > 1:
+        names = ", ".join(option.long for option in found)
+        raise InputError(f"the option {name} is ambiguous: {names}")
+    if not found:
+        raise _unknown(name)
+    return found[0]
+
+
+def _unknown(name: str) -> InputError:
+    return InputError(f"unknown option {name}; -h lists the options")
+
+
+def _take(option: Option, value: str | None, rest: list[str], given: dict[str, str]) -> None:
+    """Notes an option and its value, which may be the next word."""
+    if option.effect == "refused":
+        names = "/".join(name for name in (option.letter, option.long) if name)
+        raise InputError(f"{names} is not supported: {option.help}")
+    if option.value and value is None:
+        if not rest:
+            raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
+        value = rest.pop(0)
+    value = value or ""
+    if option.choices and value not in option.choices:
+        raise InputError(f"{option.name} is {value!r}, but must be {_choices(option)}")
+    if option.value == "N" and not value.lstrip("-").isdigit():
+        raise InputError(f"{option.name} is {value!r}, but must be an integer")
+    if option.value and not value:
+        raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
+    given[option.name] = value
+
+
+def _choices(option: Option) -> str:
+    return f"{', '.join(option.choices[:-1])} or {option.choices[-1]}".removeprefix(" or ")

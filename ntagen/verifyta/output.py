@@ -1,0 +1,147 @@
+"""The lines that verifyta prints, and that scripts search for.
+
+The verdict stands on the line right after "Verifying formula", and nothing else says whether a
+formula is satisfied: scripts rely on both.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+from ntagen.errors import LimitError
+from ntagen.verifyta.options import OPTIONS, CommandLine, Option
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer
+
+COMPATIBLE_VERSION: Final = "5.0.0"
+"""The version of UPPAAL whose output this is; scripts choose names of files by it."""
+
+ERASE_LINE: Final = "\x1b[2K"
+"""Stands before a verdict if progress is shown."""
+
+_TRACES: Final = {"": "no", "0": "some", "1": "shortest", "2": "fastest"}
+_ORDERS: Final = {"1": "depth first", "2": "random depth first"}
+_SPACE: Final = {"0": "no", "2": "aggressive"}
+_NAMES_WIDTH: Final = 34
+
+
+def version_text(version: str) -> str:
+    """What ``-v`` says: that this is ntagen, and for which version of UPPAAL it stands in."""
+    return f"ntagen {version} in place of UPPAAL {COMPATIBLE_VERSION} (this is not UPPAAL)"
+
+
+def help_text() -> str:
+    """What ``-h`` says."""
+    lines = [
+        "Usage: verifyta [OPTION]... MODEL QUERY",
+        "",
+        "ntagen in place of UPPAAL's verifyta. MODEL is .xml, .xta or .ta; QUERY is a file of",
+        "queries, without which those in MODEL are answered. UPPAAL_COMPILE_ONLY=1 in the",
+        "environment prints the compiled form of MODEL (.if) instead. Exit codes: 0 whatever the",
+        "verdicts are, 1 after an error.",
+        "",
+        "Examples:",
+        "  ntagen verifyta model.xml",
+        "  ntagen verifyta -t1 -f trace -s model.xml queries.q",
+        "  UPPAAL_COMPILE_ONLY=1 ntagen verifyta model.xml > model.if",
+        "",
+        "Options:",
+    ]
+    lines += [_help_line(option) for option in OPTIONS if option.effect == "honoured"]
+    lines += ["", "Without effect on the answers:"]
+    lines += [_help_line(option) for option in OPTIONS if option.effect == "idle"]
+    lines += ["", "Not supported (an error):"]
+    lines += [_help_line(option) for option in OPTIONS if option.effect == "refused"]
+    return "\n".join(lines)
+
+
+def _help_line(option: Option) -> str:
+    names = f"{option.letter} [ {option.long} ]" if option.letter else option.long
+    names = names.removesuffix(" [  ]")
+    shown = f"  {names} {option.value}".rstrip()
+    return f"{shown:<{_NAMES_WIDTH}} {option.help}"
+
+
+def header(line: CommandLine) -> str:
+    """The options of a run."""
+    trace = _TRACES[line.value("--diagnostic")]
+    order = _ORDERS.get(line.value("--search-order"), "breadth first")
+    space = _SPACE.get(line.value("-S"), "conservative")
+    zones = "minimal constraint systems with future testing"
+    zones = "difference bound matrices" if line.has("-C") else zones
+    return "\n".join(
+        [
+            "Options for the verification:",
+            f"  Generating {trace} trace",
+            f"  Search order is {order}",
+            f"  Using {space} space optimisation",
+            f"  Seed is {line.value('--seed', '0')}",
+            f"  State space representation uses {zones}",
+            "  Using HashMap + Compress integers for discrete state storage",
+        ]
+    )
+
+
+def verdict(answer: Answer) -> str:
+    """The verdict of an answer that has one.
+
+    Raises:
+        LimitError: A limit came before an answer.
+    """
+    match answer.verdict:
+        case "satisfied":
+            return " -- Formula is satisfied."
+        case "not satisfied":
+            return " -- Formula is NOT satisfied."
+        case "maybe":
+            # The zones are too large where clocks stand: what they reach may be out of reach.
+            is_universal = re.match(r"\s*A(\[\]|<>)|.*-->", answer.query, re.DOTALL)
+            return f" -- Formula MAY {'NOT ' if is_universal else ''}be satisfied."
+        case _:
+            raise LimitError(f"stopped by the {answer.limit_text}")
+
+
+def values(answer: Answer) -> list[str]:
+    """The values of ``sup``, ``inf`` and ``bounds``, a line for each expression."""
+    found = re.match(r"\s*(sup|inf|bounds)\b[^:]*?(?:\{.*\})?\s*:(.*)", answer.query, re.DOTALL)
+    if found is None or answer.value is None:
+        return []
+    items = _items(found[2])
+    values = answer.value if len(items) > 1 and isinstance(answer.value, list) else [answer.value]
+    return [
+        f" -- {found[1]}: {item} = {_value(value)}"
+        for item, value in zip(items, values, strict=True)
+    ]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(_value(one) for one in value)}]"
+    return "none" if value is None else str(value)
+
+
+def _items(text: str) -> list[str]:
+    """The expressions of a list; commas within brackets do not separate them."""
+    items, depth = [""], 0
+    for sign in text:
+        depth += (sign in "([{") - (sign in ")]}")
+        if sign == "," and depth == 0:
+            items.append("")
+        else:
+            items[-1] += sign
+    return [" ".join(item.split()) for item in items]
+
+
+def summary(answer: Answer, cpu_ms: int, memory_kib: tuple[int, int] | None) -> list[str]:
+    """What ``-u`` shows: counts, the user time in ms, virtual and resident memory in KiB."""
+    lines = [
+        f" -- States stored : {answer.stored} states",
+        f" -- States explored : {answer.explored} states",
+        f" -- CPU user time used : {cpu_ms} ms",
+    ]
+    if memory_kib is not None:
+        lines.append(f" -- Virtual memory used : {memory_kib[0]} KiB")
+        lines.append(f" -- Resident memory used : {memory_kib[1]} KiB")
+    return lines

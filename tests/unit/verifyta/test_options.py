@@ -1,0 +1,80 @@
+"""The command line of verifyta: forms of options, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from ntagen.errors import InputError
+from ntagen.verifyta.options import OPTIONS, parse
+from ntagen.verifyta.output import help_text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["-t0", "-s", "-u", "m.xml", "q.q"],
+        ["m.xml", "q.q", "-t", "0", "-us"],
+        ["m.xml", "--diagnostic", "0", "q.q", "-sut0"],
+        ["--diagnostic=0", "m.xml", "--silence-progress", "--summary", "--", "q.q"],
+        ["--diag", "0", "--silence", "m.xml", "q.q", "--summ"],
+    ],
+)
+def test_all_forms_of_options_mean_the_same(words: list[str]) -> None:
+    line = parse(words)
+    assert line.files == ("m.xml", "q.q")
+    assert line.given == {"--diagnostic": "0", "--silence-progress": "", "--summary": ""}
+
+
+def test_words_that_clients_pass_are_accepted() -> None:
+    line = parse(
+        ["-s", "-u", "--generate-strategy", "2", "--print-strategies", "out", "m.xml", "q.q"]
+    )
+    assert line.value("--print-strategies") == "out"
+    for words in (
+        "-S1 -b -u m.xml",
+        "-t0 -T m.xml",
+        "m.xml -f x_xtr -t 1 -o 0",
+        "-C -H 27 -n4 -squ",
+    ):
+        parse(words.split())
+    assert parse(["-r", "7", "m.xml"]).value("--seed") == "7"
+    assert parse(["m.xml", "-"]).files == ("m.xml", "-")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--nonsense"], "unknown option --nonsense; -h lists the options"),
+        (["-sxu"], "unknown option -x in -sxu; -h lists the options"),
+        (["-J"], "unknown option -J; -h lists the options"),
+        (["m.xml", "-t"], "--diagnostic needs a value: --diagnostic 0|1|2"),
+        (["-t7", "m.xml"], "--diagnostic is '7', but must be 0, 1 or 2"),
+        (["-O", "json"], "-O is 'json', but must be std"),
+        (["--seed", "soon"], "--seed is 'soon', but must be an integer"),
+        (["--summary=2"], "--summary has no value, but '2' is given"),
+        (["--di", "0"], "the option --di is ambiguous: --diagnostic, --discretization"),
+        (["-f", ""], "-f needs a value: -f PREFIX"),
+    ],
+)
+def test_a_wrong_option_is_named(words: list[str], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(words)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["-E", "0.1"], ["--alpha=0.05"], ["-D0.1"], ["--good-runs", "50"], ["-A"], ["-Z"], ["-sZ"]],
+)
+def test_what_would_change_a_verdict_is_not_supported(words: list[str]) -> None:
+    with pytest.raises(InputError, match="is not supported: "):
+        parse([*words, "m.xml"])
+
+
+def test_the_help_lists_every_option_and_has_the_lines_that_clients_look_for() -> None:
+    text = help_text()
+    for option in OPTIONS:
+        assert f"  {option.letter or option.long} " in text
+        assert option.long in text
+    assert "Usage: verifyta [OPTION]... MODEL QUERY" in text
+    assert "-h [ --help ]" in text
