@@ -201,6 +201,7 @@ def command(
     A trace is a run with exact times, which an independent replay has checked. Each step says when
     it is, its edges, and only what it changes. A file that ends in .json has all states, and the
     symbolic ones too.
+    FILE.xtr and FILE.xml are traces as UPPAAL writes them.
 
     \b
     The value of sup and inf is a number, or "inf" if the clock has no limit. The value of bounds is
@@ -274,7 +275,7 @@ def command(
             return INTERNAL_ERROR
         show_warnings(answer.warnings)
         covered = answer.verification if verify else ()
-        notes = [*covered, *write_evidence(answer, query, outputs, loaded.task)]
+        notes = [*covered, *write_evidence(answer, query, outputs, loaded)]
         list_stop = outputs.stops.get(query.text)
         if found is not None:
             answer = answer_of(found)

@@ -23,7 +23,8 @@ from ntagen.files import write_files
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer
+    from ntagen.checker import Answer, Model
+    from ntagen.loading import Loaded
     from ntagen.nsl import Task
 
 BEST_SHOWN: Final = 3
@@ -62,12 +63,13 @@ class Outputs:
         }
 
 
-def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | None) -> list[str]:
+def write_evidence(answer: Answer, query: Asked, outputs: Outputs, loaded: Loaded) -> list[str]:
     """Writes what was asked for; returns a line for the user about each output."""
+    task = loaded.task
     notes: list[str] = []
     if outputs.trace and (trace := answer.trace_json()) is not None:
         outputs.written.add("--trace")
-        notes += _write_trace(answer, query, outputs.trace, trace)
+        notes += _write_trace(answer, query, outputs.trace, trace, loaded.model)
     certificate = answer.certificate_text() if outputs.certificate else None
     if outputs.certificate and certificate is not None:
         write_files({outputs.certificate: certificate})
@@ -88,19 +90,30 @@ def write_evidence(answer: Answer, query: Asked, outputs: Outputs, task: Task | 
     return notes
 
 
-def _write_trace(answer: Answer, query: Asked, target: str, as_json: str) -> list[str]:
+def _write_trace(
+    answer: Answer, query: Asked, target: str, as_json: str, model: Model
+) -> list[str]:
     if target == "-":
         echo(f"{query.text} is {answer.verdict}:")
         for line in answer.trace_lines():
             echo(line)
         return []
     path = Path(target)
-    if path.suffix == ".json":
-        text = as_json
-    else:
-        text = "\n".join([f"{query.text} is {answer.verdict}", "", *answer.trace_lines()])
-    write_files({path: f"{text}\n"})
+    write_files({path: _trace_file(answer, query, path.suffix, as_json, model)})
     return [f"trace written to {path}"]
+
+
+def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: Model) -> str:
+    """The trace in the form that the end of the file's name asks for."""
+    from ntagen.verifyta.trace_xml import trace_xml_text
+    from ntagen.verifyta.xtr import xtr_text
+
+    if suffix == ".json":
+        return f"{as_json}\n"
+    if suffix in (".xtr", ".xml"):
+        return (xtr_text if suffix == ".xtr" else trace_xml_text)(model, answer) or ""
+    text = "\n".join([f"{query.text} is {answer.verdict}", "", *answer.trace_lines()])
+    return f"{text}\n"
 
 
 def _strategy_text(answer: Answer, query: Asked, target: str) -> str | None:

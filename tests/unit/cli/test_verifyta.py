@@ -263,3 +263,10 @@ def test_licences_are_not_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verifyta", "--lease-request"]) == 0
     assert capsys.readouterr().out == "ntagen needs no licence\n"
     assert main(["verifyta", "--key", "K", "--lease", "1", "gate.xta", "gate.q"]) == 0
+
+
+def test_check_writes_the_same_traces(gate: Path) -> None:
+    assert main(["verifyta", "-t0", "-f", "v", "-X", "v", "gate.xta", "gate.q"]) == 0
+    for name, same in (("c.xtr", "v-1"), ("c.xml", "v1.xml")):
+        assert main(["check", "gate.xta", "--query", "E<> P.Open", "--trace", name]) == 0
+        assert (gate / name).read_bytes() == (gate / same).read_bytes()
