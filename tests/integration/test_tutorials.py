@@ -1,4 +1,4 @@
-"""What the tutorials tell readers to type works, and gives what they say."""
+"""What the README and the tutorials tell readers to type works, and gives what they say."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from tests.tutorials import ROOT, agrees, follow, steps_of
 
-TUTORIALS = sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md"))
+TUTORIALS = [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md"))]
 
 
 @pytest.mark.slow
