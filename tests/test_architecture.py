@@ -40,6 +40,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
     "checker.charts": {"errors", "checker.picture"},
+    "checker.winning": {"errors", "checker.picture"},
     "checker.queries": set(),
     "checker.expectation": {"checker.queries"},
     "checker.facts": {"checker.picture", "checker.queries"},
@@ -48,7 +49,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.machine": {"errors"},
     "checker.story": {"checker.runs"},
     "checker.play": {"errors", "checker.runs", "_checker"},
-    "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"},
+    "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
+    | {"checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
     | {"checker.story", "checker.strategy", "_checker"},
     "checker.options": {"checker.queries", "checker.strategy"},

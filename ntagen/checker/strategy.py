@@ -15,13 +15,16 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from ntagen import _checker
 from ntagen.checker.play import Play, played
 from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.files import write_files
+
+if TYPE_CHECKING:
+    from ntagen.checker.picture.page import Svg
 
 __all__ = ["Advice", "Decision", "Discrete", "Strategy", "StrategyState", "Verification"]
 
@@ -169,6 +172,7 @@ class Strategy:
         processes, clocks = raw.names()
         self._processes = frozenset(processes)
         self._clocks = frozenset(clocks)
+        self._clock_order = tuple(clocks)
         self.forced: ForcedRule = forced
         self.priorities: PriorityRule = priorities
         self.query = raw.query
@@ -278,6 +282,44 @@ class Strategy:
         if raw["over"]:
             return (Advice("done"),)
         return tuple(_advice(decision, raw["waiting"]) for decision in raw["now"])
+
+    def zones(
+        self,
+        state: StateLike | Discrete | None = None,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+    ) -> Svg:
+        """What it does in a state as a picture: the zones of two clocks, coloured by decisions.
+
+        A clock that is not drawn has its value of the state; if the state is one without clock
+        values, or names with values among which it is not, the picture shows what is done for some
+        value of it.
+
+        Args:
+            state: The state; by default the locations and variables of the initial one.
+            x: The clock to the right; by default the first one on which decisions depend.
+            y: The clock upwards; by default the second one. A model with one clock needs none.
+
+        Raises:
+            UndecidedError: The strategy does not have this state.
+            InputError: The model does not have this state or clock, or has no clocks.
+        """
+        # Imported here: few commands draw, and the XML libraries take time to load.
+        from ntagen.checker.winning import zones_chart
+
+        if state is None:
+            first = self.play().state
+            state = {"locations": first.locations, "variables": first.variables}
+        given = self._given(state)
+        return zones_chart(
+            _state(json.loads(self._at(given))),
+            self._clock_order,
+            (x, y),
+            {name: Fraction(*value) for name, value in given["clocks"].items()},
+            owner=self.owner,
+            is_permissive=self.is_permissive,
+        )
 
     def json(self) -> str:
         """The strategy as JSON text, as ``ntagen check --strategy FILE`` writes it."""

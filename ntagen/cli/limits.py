@@ -15,8 +15,15 @@ def _whole(_ctx: click.Context, _param: click.Parameter, value: float | None) ->
     return None if value is None else int(value)
 
 
-def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
-    """The options by their fields of `ntagen.checker.Options`; `about` makes their help."""
+def limits(
+    about: Callable[[str], str] = lambda text: text, default: str = "no limit"
+) -> dict[str, Decorator]:
+    """The options by their fields of `ntagen.checker.Options`.
+
+    Args:
+        about: Makes the help of an option from what it does.
+        default: What holds without the option.
+    """
     return {
         "states": click.option(
             "--states",
@@ -24,7 +31,7 @@ def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
             type=COUNT,
             help=about(
                 "Stop a search after this many stored states, for example 10k or 2M.  "
-                "[default: no limit]"
+                f"[default: {default}]"
             ),
         ),
         "memory_bytes": click.option(
@@ -34,7 +41,8 @@ def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
             type=SIZE,
             callback=_whole,
             help=about(
-                "Stop a search that takes this much memory, for example 4GiB.  [default: no limit]"
+                "Stop a search that takes this much memory, for example 4GiB.  "
+                f"[default: {default}]"
             ),
         ),
         "timeout_s": click.option(
@@ -44,13 +52,13 @@ def _limits(about: Callable[[str], str]) -> dict[str, Decorator]:
             type=TIME,
             help=about(
                 "Stop a search after this time, for example 60s or 2min; a number without a unit "
-                "is in seconds.  [default: no limit]"
+                f"is in seconds.  [default: {default}]"
             ),
         ),
     }
 
 
-LIMITS: Final = _limits(lambda text: text)
+LIMITS: Final = limits()
 """The options ``--states``, ``--memory`` and ``--timeout``."""
 
 
@@ -58,7 +66,7 @@ def limit_options(of: str) -> Decorator:
     """The same options where they limit one of several things; `of` says which one."""
 
     def decorate(command: Callable[..., int | None]) -> Callable[..., int | None]:
-        options = _limits(lambda text: f"For {of}: {text[0].lower()}{text[1:]}")
+        options = limits(lambda text: f"For {of}: {text[0].lower()}{text[1:]}")
         for option in reversed(options.values()):
             command = option(command)
         return command

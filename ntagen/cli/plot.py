@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.limits import limits
 from ntagen.cli.models import include_option, rank_option
-from ntagen.cli.plot_models import KINDS, MODELS, plot_model
+from ntagen.cli.plot_models import KINDS, MODELS, Wish, plot_model
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from ntagen.scene import Scene
 
 _MCAP_MAGIC: Final = b"\x89MCAP"
+_LIMITS: Final = limits(default="none for a model; of an environment, what drive { … } says")
+_LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
 
 
 @click.command(
@@ -67,6 +70,21 @@ _MCAP_MAGIC: Final = b"\x89MCAP"
     metavar="TEXT|NAME",
     help="Of a model: the query whose trace is drawn.  [default: the model's only query]",
 )
+@click.option(
+    "--at",
+    metavar="STATE",
+    help="With --as zones: the state, as locations and values where they differ from the initial "
+    "state, for example 'Train(1).Cross n=1'. A clock with a value (x=3/2) is fixed; one without "
+    "may have any.",
+)
+@click.option(
+    "--clocks",
+    metavar="X,Y",
+    help="With --as zones: the clocks of the two axes.  [default: the first on which decisions "
+    "depend]",
+)
+@_LIMITS["timeout_s"]
+@_LIMITS["memory_bytes"]
 @include_option()
 def command(
     source: Path,
@@ -76,6 +94,10 @@ def command(
     ranking: str | None,
     kind: str | None,
     asked: str | None,
+    at: str | None,
+    clocks: str | None,
+    timeout_s: float | None,
+    memory_bytes: int | None,
     include: tuple[Path, ...],
 ) -> None:
     """Draw a scene with its plans, a run from its log, or what a query of a model finds.
@@ -90,7 +112,8 @@ def command(
     regions and paths on and off, and step through the time of a run. It needs no network.
 
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
-    of a query, in a file that ends in .svg.
+    of a query, or what the strategy of a game does over two clocks (--as zones), in a file that
+    ends in .svg.
 
     \b
     Examples:
@@ -99,6 +122,7 @@ def command(
       ntagen plot run.mcap -o run.html
       ntagen plot model.xml --query "E<> Gate.Open" -o trace.svg
       ntagen plot model.xml --query "E<> Gate.Open" --as sequence -o trace.svg
+      ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
     """  # noqa: D301  click wants the control character
     from ntagen.plan.rank import parse_ranking
     from ntagen.plot.save import PICTURES, format_of, write_picture
@@ -107,25 +131,29 @@ def command(
         _without_scene()
         path = Path(f"{source.stem}.svg") if output is None else output
         require_apart({"-o": path}, {"source": source})
-        plot_model(source, path, kind or "gantt", asked, include)
+        wish = Wish(kind or "gantt", asked, at, clocks, timeout_s, memory_bytes)
+        plot_model(source, path, wish, include)
         echo(f"wrote {path}")
         return
-    if asked is not None:
-        say_idle({"asked": "--query"}, "without --as: the scene is drawn, not its model")
+    say_idle(
+        {"asked": "--query", "at": "--at", "clocks": "--clocks"},
+        "without --as: the scene is drawn, not its model",
+    )
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
+        say_idle(_LIMITED, "here: nothing is searched for in the log of a run")
         say_idle({"tree_path": "--strategy"}, "here: the log of a run contains its strategy")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
-        say_idle({"ranking": "--rank", "tree_path": "--strategy"}, "with --plans 0")
+        say_idle({"ranking": "--rank", "tree_path": "--strategy"} | _LIMITED, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path, PICTURES)
     require_apart({"-o": path}, {"source": source})
     picture = (
         _of_run(source, shown)
         if _is_log(source)
-        else _of_scene(source, shown, criteria, include, tree_path)
+        else _of_scene(source, shown, criteria, include, tree_path, (timeout_s, memory_bytes))
     )
     write_picture(picture, path)
     echo(f"wrote {path}")
@@ -161,6 +189,7 @@ def _of_scene(
     ranking: tuple[str, ...],
     include: tuple[Path, ...],
     tree_path: Path | None,
+    limits: tuple[float | None, int | None],
 ) -> Picture:
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
@@ -172,7 +201,14 @@ def _of_scene(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     configuration = configure(task.given, task.scene)
+    timeout_s, memory_bytes = limits
     settings = configuration.settings
+    settings = replace(
+        settings,
+        engine_time_s=timeout_s or settings.engine_time_s,
+        engine_memory_bytes=memory_bytes or settings.engine_memory_bytes,
+    )
+    configuration = replace(configuration, settings=settings)
     engine = engine_for(settings)
     engine = replace(engine, ranking=ranking or settings.ranking)
     if shown == 0:

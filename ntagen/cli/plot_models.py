@@ -1,20 +1,24 @@
-"""The pictures of `ntagen plot` that show models: traces of queries."""
+"""The pictures of `ntagen plot` that show models: traces of queries, and zones of strategies."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.asked import Asked, queries_of
+from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError, LimitError, ModelError
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
     from ntagen.checker.picture.page import Svg
     from ntagen.checker.runs import Run
+    from ntagen.checker.strategy import Strategy
 
 MODELS: Final = (".xml", ".xta", ".ta")
 """The endings of UPPAAL models."""
@@ -22,38 +26,71 @@ MODELS: Final = (".xml", ".xta", ".ta")
 KINDS: Final = {
     "gantt": "the trace of a query as a chart, where each process is when",
     "sequence": "the trace, and what passes between the processes",
+    "zones": "what the strategy of a game does over two clocks, in one state",
 }
 """The pictures of a model, each with what it shows."""
 
 
-def plot_model(
-    source: Path, path: Path, kind: str, asked: str | None, include: Sequence[Path]
-) -> None:
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is to be drawn of a model."""
+
+    kind: str
+    """One of `KINDS`."""
+
+    asked: str | None
+    """The text or name of a query."""
+
+    at: str | None
+    """The state of zones, where it differs from the initial one."""
+
+    clocks: str | None
+    """The clocks of zones, with a comma between them."""
+
+    timeout_s: float | None
+    memory_bytes: int | None
+
+
+def plot_model(source: Path, path: Path, wish: Wish, include: Sequence[Path]) -> None:
     """Writes a picture of a model.
 
     Raises:
         InputError: The model, the query or the name of the picture is wrong, or there is nothing
             to draw.
+        LimitError: The search reached a limit.
     """
     if path.suffix.lower() != ".svg":
         raise InputError(
             f"cannot draw {path}: the pictures of a model are SVG\n"
             "hint: choose a file name that ends in .svg"
         )
+    if wish.kind != "zones":
+        say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
     with pointing_to_explanations(True):
         model = load_model(source, include).model
-        query = _query(model, asked)
-        run = _trace(model, query)
-    _drawn(run, kind).save(path)
+        _drawn(model, wish).save(path)
 
 
-def _drawn(run: Run, kind: str) -> Svg:
-    return run.gantt() if kind == "gantt" else run.sequence()
+def _drawn(model: Model, wish: Wish) -> Svg:
+    query = _query(model, wish)
+    if wish.kind == "zones":
+        return _zones(model, query, wish)
+    run = _trace(model, query, wish)
+    return run.gantt() if wish.kind == "gantt" else run.sequence()
 
 
-def _query(model: Model, asked: str | None) -> Asked:
-    """The query that was asked for, or the only one of the model."""
-    queries = queries_of(model, () if asked is None else (asked,), None)
+def _query(model: Model, wish: Wish) -> Asked:
+    """The query that was asked for, or the only one of the model that can be drawn."""
+    if wish.asked is None and not model.queries:
+        raise InputError("the model has no queries\nhint: give one with --query")
+    queries = queries_of(model, () if wish.asked is None else (wish.asked,), None)
+    if wish.kind == "zones" and wish.asked is None:
+        queries = [query for query in queries if query.form and query.form.is_game]
+        if not queries:
+            raise InputError(
+                "no query of the model is a game, so there is no strategy to draw\n"
+                "hint: give one with --query: control: A<> p, control: A[] p, …"
+            )
     if len(queries) > 1:
         names = "\n".join(f"  {query.name or query.text}" for query in queries[:10])
         raise InputError(
@@ -62,10 +99,71 @@ def _query(model: Model, asked: str | None) -> Asked:
     return queries[0]
 
 
-def _trace(model: Model, query: Asked) -> Run:
+def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
+    """The zones of the strategy of a game."""
+    with shown_progress(query.text, quiet=False) as report:
+        strategy = model.synthesize(
+            query.text,
+            timeout_s=wish.timeout_s,
+            memory_bytes=wish.memory_bytes,
+            progress=report,
+        )
+    axes = _axes(wish.clocks)
+    return strategy.zones(_state(strategy, wish.at), x=axes[0], y=axes[1])
+
+
+def _axes(clocks: str | None) -> tuple[str | None, str | None]:
+    """The clocks of both axes, as far as they are given."""
+    # A name may have commas of its own, in the brackets of its process: Train(1,2).x.
+    names = [] if clocks is None else re.split(r",(?![^(\[]*[)\]])", clocks)
+    names = [name.strip() for name in names]
+    if len(names) > 2 or not all(names):
+        raise InputError(
+            f"--clocks {clocks!r} is not one clock or two\nhint: write for example x,y"
+        )
+    return names[0] if names else None, names[1] if len(names) > 1 else None
+
+
+def _state(strategy: Strategy, given: str | None) -> dict[str, dict[str, Any]]:
+    """The state of `--at`: the initial one, but for what is given."""
+    first = strategy.play().state
+    places, variables = dict(first.locations), dict(first.variables)
+    clocks: dict[str, str] = {}
+    for word in (given or "").split():
+        name, equals, value = word.partition("=")
+        process, dot, location = word.rpartition(".")
+        if equals and name in first.clocks:
+            clocks[name] = value
+        elif equals and name in variables:
+            variables[name] = _number(word, value)
+        elif not equals and dot and process in places:
+            places[process] = location
+        else:
+            known = ", ".join([*places, *variables, *first.clocks])
+            raise InputError(
+                f"--at: {word!r} is neither a location nor a value\n"
+                f"hint: write Process.Location or name=value; the names are {known}"
+            )
+    return {"locations": places, "variables": variables, "clocks": clocks}
+
+
+def _number(word: str, value: str) -> int | float:
+    try:
+        return float(value) if "." in value else int(value)
+    except ValueError:
+        raise InputError(f"--at: {word!r} gives no number\nhint: write for example n=1") from None
+
+
+def _trace(model: Model, query: Asked, wish: Wish) -> Run:
     """The trace of a query, with exact times."""
     with shown_progress(query.text, quiet=False) as report:
-        answer = model.check(query.text, trace=True, progress=report)
+        answer = model.check(
+            query.text,
+            trace=True,
+            timeout_s=wish.timeout_s,
+            memory_bytes=wish.memory_bytes,
+            progress=report,
+        )
     if answer.verdict == "error":
         raise ModelError(answer.message or "the model has a run-time error")
     if answer.verdict == "unknown":

@@ -8,7 +8,11 @@ import pytest
 
 from tests.tutorials import ROOT, agrees, follow, steps_of
 
-TUTORIALS = [ROOT / "README.md", *sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md"))]
+TUTORIALS = [
+    ROOT / "README.md",
+    ROOT / "docs" / "pictures.md",
+    *sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md")),
+]
 
 
 @pytest.mark.slow

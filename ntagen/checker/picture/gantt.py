@@ -14,7 +14,15 @@ from fractions import Fraction
 from typing import Final
 
 from ntagen.checker.picture.layout import text_width
-from ntagen.checker.picture.page import HEADING_HEIGHT, MARGIN, Svg, page, safe, shortened
+from ntagen.checker.picture.page import (
+    HEADING_HEIGHT,
+    LIGHT,
+    MARGIN,
+    Svg,
+    page,
+    safe,
+    shortened,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,19 +49,6 @@ _MARK_WIDTH: Final = 2.0
 _TICKS: Final = 10
 _NAME_CHARACTERS: Final = 28
 _FONT_SIZE: Final = 12
-_COLORS: Final = (
-    "#cfe0f5",
-    "#f7d9b8",
-    "#cfe8cf",
-    "#f3c9cb",
-    "#ddd0ec",
-    "#e3d5cb",
-    "#f6d6e8",
-    "#d5d8dd",
-    "#e9e9b5",
-    "#bfe5ea",
-)
-"""By the order in which the locations of a process are first visited; light, for dark texts."""
 
 
 def gantt(
@@ -131,6 +126,7 @@ def _rows(
             f'<text x="{left - 8:.1f}" y="{y:.1f}" text-anchor="end" fill="#202020">'
             f"{safe(shortened(name, _NAME_CHARACTERS))}</text>"
         )
+    # By the order in which the locations of a process are first visited.
     colors: dict[tuple[str, str], str] = {}
     seen: dict[str, int] = {}
     # Thin marks are drawn last: the bar that follows would hide a part of them.
@@ -138,7 +134,7 @@ def _rows(
         key = (stay.process, stay.location)
         if key not in colors:
             seen[stay.process] = seen.get(stay.process, -1) + 1
-            colors[key] = _COLORS[seen[stay.process] % len(_COLORS)]
+            colors[key] = LIGHT[seen[stay.process] % len(LIGHT)]
         y = top + _ROW_HEIGHT * row_of[stay.process] + (_ROW_HEIGHT - _BAR_HEIGHT) / 2
         yield _bar(stay, colors[key], left + float(stay.start) * scale, y, scale)
 

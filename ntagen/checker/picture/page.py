@@ -12,6 +12,20 @@ from xml.sax.saxutils import escape
 
 from ntagen.files import write_files
 
+LIGHT: Final = (
+    "#cfe0f5",
+    "#f7d9b8",
+    "#cfe8cf",
+    "#f3c9cb",
+    "#ddd0ec",
+    "#e3d5cb",
+    "#f6d6e8",
+    "#d5d8dd",
+    "#e9e9b5",
+    "#bfe5ea",
+)
+"""Colours for things of one kind; light, for dark texts."""
+
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """Characters that an XML document must not contain."""
 
