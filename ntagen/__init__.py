@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
     from ntagen.experiment.scripting import campaign
     from ntagen.loading import load, load_strategy
-    from ntagen.plot.face import view
+    from ntagen.plot.face import animate, view
     from ntagen.traces.face import match
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "RejectedError",
     "Strategy",
     "UndecidedError",
+    "animate",
     "campaign",
     "load",
     "load_strategy",
@@ -49,6 +50,7 @@ _HOMES = {
     "RejectedError": "ntagen.checker",
     "Strategy": "ntagen.checker.strategy",
     "UndecidedError": "ntagen.errors",
+    "animate": "ntagen.plot.face",
     "campaign": "ntagen.experiment.scripting",
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",

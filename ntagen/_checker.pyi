@@ -49,6 +49,7 @@ class Model:
         states: int | None,
         memory_bytes: int | None,
         timeout_s: float | None,
+        links: bool,
     ) -> tuple[
         list[
             tuple[
@@ -58,6 +59,7 @@ class Model:
                 tuple[int, list[tuple[int, int, int, list[int]]]] | None,
             ]
         ],
+        list[tuple[int, list[tuple[int, int, int, list[int]]], int]],
         Literal["states", "memory", "time"] | None,
     ]: ...
     def read_queries_json(self, path: str, data: bytes) -> str: ...

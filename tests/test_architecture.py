@@ -45,6 +45,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.expectation": {"checker.queries"},
     "checker.facts": {"checker.picture", "checker.queries"},
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
+    "checker.state_space": {"errors", "files", "checker.edges", "checker.picture"}
+    | {"checker.states"},
     "checker.runs": {"checker.charts", "checker.picture"},
     "checker.machine": {"errors"},
     "checker.story": {"checker.runs"},
@@ -58,7 +60,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
     | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
-    | {"checker.strategy"},
+    | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
     | {"checker.expectation"}
     | {"checker.options", "checker.query_form", "checker.states"},

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         Variable,
     )
     from ntagen.checker.runs import Choose, Run
+    from ntagen.checker.state_space import StateSpace
     from ntagen.checker.states import Simulation, SymbolicState
     from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
@@ -379,8 +380,8 @@ class Model:
         if any(one is not None and one < 0 for one in (limit, timeout_s, memory_bytes)):
             raise ValueError("a limit cannot be negative")
         with failing():
-            found, stop = self._raw.states(
-                engine, states=limit, memory_bytes=memory_bytes, timeout_s=timeout_s
+            found, _, stop = self._raw.states(
+                engine, states=limit, memory_bytes=memory_bytes, timeout_s=timeout_s, links=False
             )
         if stop in ("memory", "time"):
             raise LimitError(
@@ -388,6 +389,48 @@ class Model:
                 "raise that limit, or ask for fewer states with `limit`"
             )
         return symbolic_states(found, self._edge_table())
+
+    def state_space(
+        self,
+        limit: int = 10_000,
+        *,
+        timeout_s: float | None = None,
+        memory_bytes: int | None = None,
+        engine: CodeEngine = "jit",
+    ) -> StateSpace:
+        """The reachable symbolic states with all moves between them, to be drawn or looked at.
+
+        The states are those of `states`. A notebook shows the graph if it is small.
+
+        Args:
+            limit: At most this many states.
+            timeout_s: The search gives up after this time, in seconds.
+            memory_bytes: The search gives up when its states take this many bytes.
+            engine: What runs the code of the model; states do not depend on it.
+
+        Raises:
+            ValueError: A limit is negative.
+            LimitError: There are more states, or time or memory ran out.
+            ModelError: The model fails in a state.
+            KeyboardInterrupt: The user interrupted.
+        """
+        from ntagen.checker.state_space import state_space
+        from ntagen.checker.states import symbolic_states
+
+        if any(one is not None and one < 0 for one in (limit, timeout_s, memory_bytes)):
+            raise ValueError("a limit cannot be negative")
+        with failing():
+            found, links, stop = self._raw.states(
+                engine, states=limit, memory_bytes=memory_bytes, timeout_s=timeout_s, links=True
+            )
+        if stop == "states":
+            raise LimitError(
+                f"the model has more than {limit} symbolic states\n"
+                "hint: make constants of the model smaller, or raise the limit"
+            )
+        if stop is not None:
+            raise LimitError(f"the search was stopped by the {stop} limit\nhint: raise it")
+        return state_space(symbolic_states(found, self._edge_table()), links, self._raw.edges())
 
     def walk(self, engine: CodeEngine = "jit") -> Simulation:
         """Starts a symbolic walk through the model from its initial state.

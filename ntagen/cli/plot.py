@@ -35,7 +35,7 @@ _LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
 @click.option(
     "-o",
     "--output",
-    metavar="FILE.png|pdf|svg|html",
+    metavar="FILE.png|pdf|svg|html|gif|dot",
     type=click.Path(path_type=Path),
     help="The picture to write.  [default: the source's name with .png, in the current folder]",
 )
@@ -112,17 +112,19 @@ def command(
     regions and paths on and off, and step through the time of a run. It needs no network.
 
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
-    of a query, or what the strategy of a game does over two clocks (--as zones), in a file that
-    ends in .svg.
+    of a query, what the strategy of a game does over two clocks (--as zones), or the states of a
+    small model (--as states), in a file that ends in .svg.
 
     \b
     Examples:
       ntagen plot examples/paper.nsl -o scene.pdf --plans 10
       ntagen plot run.mcap
       ntagen plot run.mcap -o run.html
+      ntagen plot run.mcap -o run.gif
       ntagen plot model.xml --query "E<> Gate.Open" -o trace.svg
       ntagen plot model.xml --query "E<> Gate.Open" --as sequence -o trace.svg
       ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
+      ntagen plot model.xml --as states -o states.svg
     """  # noqa: D301  click wants the control character
     from ntagen.plan.rank import parse_ranking
     from ntagen.plot.save import PICTURES, format_of, write_picture

@@ -1,4 +1,4 @@
-"""The pictures of `ntagen plot` that show models: traces of queries, and zones of strategies."""
+"""The pictures of `ntagen plot` that show models: traces, zones of strategies, state spaces."""
 
 from __future__ import annotations
 
@@ -27,8 +27,13 @@ KINDS: Final = {
     "gantt": "the trace of a query as a chart, where each process is when",
     "sequence": "the trace, and what passes between the processes",
     "zones": "what the strategy of a game does over two clocks, in one state",
+    "states": "the state space of a small model as a graph (.svg or .dot)",
+    "discrete": "the same without clocks",
 }
 """The pictures of a model, each with what it shows."""
+
+GRAPHS: Final = ("states", "discrete")
+"""Those that need no query."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +64,23 @@ def plot_model(source: Path, path: Path, wish: Wish, include: Sequence[Path]) ->
             to draw.
         LimitError: The search reached a limit.
     """
-    if path.suffix.lower() != ".svg":
+    is_graph = wish.kind in GRAPHS
+    endings = (".svg", ".dot") if is_graph else (".svg",)
+    if path.suffix.lower() not in endings:
+        kinds = "this graph is SVG or DOT" if is_graph else "the pictures of a model are SVG"
         raise InputError(
-            f"cannot draw {path}: the pictures of a model are SVG\n"
-            "hint: choose a file name that ends in .svg"
+            f"cannot draw {path}: {kinds}\n"
+            f"hint: choose a file name that ends in {' or '.join(endings)}"
         )
     if wish.kind != "zones":
         say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
     with pointing_to_explanations(True):
         model = load_model(source, include).model
+        if is_graph:
+            say_idle({"asked": "--query"}, f"with --as {wish.kind}: all states are drawn")
+            space = model.state_space(timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes)
+            space.save(path, clocks=wish.kind == "states")
+            return
         _drawn(model, wish).save(path)
 
 

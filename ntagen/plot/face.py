@@ -1,4 +1,4 @@
-"""`ntagen.view`: a task or a run as a page in one call, for scripts and notebooks."""
+"""`ntagen.view` and `ntagen.animate`: a task or a run in one call, for scripts and notebooks."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Final
 from ntagen.drive.engine import engine_for
 from ntagen.drive.reading import read_log
 from ntagen.plan.synthesise import EngineSynthesiser
+from ntagen.plot.animation import Animation, animation_of
 from ntagen.plot.picture import Picture
 from ntagen.plot.run import picture_of_plans, picture_of_run
 from ntagen.plot.viewer import Page, page_of
@@ -32,17 +33,36 @@ def view(source: str | Path, *, plans: int = 20) -> Page:
         InputError: The file is wrong.
         LimitError: The engine reached a limit.
     """
-    path = Path(source)
+    return page_of(_picture(Path(source), plans))
+
+
+def animate(source: str | Path, *, plans: int = 20) -> Animation:
+    """A run over time, or one breath of a task whose regions move, as a GIF.
+
+    A notebook shows it; `Animation.save` writes it.
+
+    Args:
+        source: As for `view`.
+        plans: As for `view`.
+
+    Raises:
+        InputError: The file is wrong, or nothing moves.
+        LimitError: The engine reached a limit.
+    """
+    return animation_of(_picture(Path(source), plans))
+
+
+def _picture(path: Path, plans: int) -> Picture:
     if path.suffix == ".mcap":
-        return page_of(picture_of_run(read_log(path), plans))
+        return picture_of_run(read_log(path), plans)
     from ntagen.drive.configure import configure
     from ntagen.nsl import load_task
 
     task = load_task(path)
     if plans == 0:
-        return page_of(picture_of_plans(task.scene, None, 0))
+        return picture_of_plans(task.scene, None, 0)
     settings = configure(task.given, task.scene).settings
-    return page_of(picture_with_plans(task.scene, engine_for(settings), plans))
+    return picture_with_plans(task.scene, engine_for(settings), plans)
 
 
 def picture_with_plans(scene: Scene, engine: EngineSynthesiser, shown: int) -> Picture:

@@ -79,6 +79,8 @@ class Picture:
         caption: The lines below the picture.
         moments: The moments of a run, in order; pages and animations go through them.
         appears_s: When a region was learned, by its name.
+        clock_s: The time on the clock of the breath at the time 0 of the run; where plans begin
+            without a run.
     """
 
     scene: Scene
@@ -94,6 +96,7 @@ class Picture:
     caption: str = ""
     moments: Sequence[Moment] = ()
     appears_s: Mapping[str, float] = field(default_factory=dict)
+    clock_s: float = 0.0
 
 
 def draw(picture: Picture) -> Figure:
@@ -106,25 +109,31 @@ def draw(picture: Picture) -> Figure:
     bounds = bounds_mm(picture)
     across = [axis for axis in range(3) if axis != depth]
     flat = [
-        _draw_projection(figure.add_subplot(grid[0, i]), picture, (axis, depth), bounds)
+        draw_projection(figure.add_subplot(grid[0, i]), picture, (axis, depth), bounds)
         for i, axis in enumerate(across)
     ]
     _draw_space(figure.add_subplot(grid[0, 2], projection="3d"), picture, depth, bounds)
     handles, labels = flat[0].get_legend_handles_labels()
     unique = dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(),
-        unique.keys(),
-        loc="outside lower center",
-        ncols=min(len(unique), _LEGEND_COLUMNS),
-        frameon=False,
-        fontsize=9,
-    )
-    figure.suptitle(_heading(picture), fontsize=11, wrap=True)
+    add_legend(figure, unique)
+    figure.suptitle(heading_of(picture), fontsize=11, wrap=True)
     return figure
 
 
-def _heading(picture: Picture) -> str:
+def add_legend(figure: Figure, entries: Mapping[str, Any], columns: int = _LEGEND_COLUMNS) -> None:
+    """Adds the legend below the views: what stands for each text."""
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="outside lower center",
+        ncols=min(len(entries), columns),
+        frameon=False,
+        fontsize=9,
+    )
+
+
+def heading_of(picture: Picture) -> str:
+    """The title and the caption, in lines."""
     title = picture.title or picture.scene.name
     lines = [title, *picture.caption.splitlines()]
     return "\n".join(part for line in lines for part in textwrap.wrap(line, _TITLE_WIDTH))
@@ -171,18 +180,28 @@ def _seen_bounds(region: Region) -> tuple[Vector, Vector]:
     return region.shape.bounds_mm()
 
 
-def _draw_projection(
+def draw_projection(
     axes: Any,  # noqa: ANN401  matplotlib's own stubs leave axes open
     picture: Picture,
     shown: tuple[int, int],
     bounds: list[tuple[float, float]],
+    regions: Sequence[Region] | None = None,
 ) -> Any:  # noqa: ANN401
+    """Draws what is seen along the axis that is not among those `shown`.
+
+    Args:
+        axes: Where it is drawn.
+        picture: What is drawn.
+        shown: The axes of space across and down the page.
+        bounds: The range of each axis of space.
+        regions: These regions only; by default all.
+    """
     across, depth = shown
     seen: list[Seeming | None] = []
-    for region in _back_to_front(picture.scene.regions):
+    for region in _back_to_front(picture.scene.regions if regions is None else regions):
         for ghost in _ghosts(region):
-            axes.add_patch(_outline(ghost, shown, _ghost_style(region)))
-        outline = axes.add_patch(_outline(region, shown, _face(region, picture)))
+            axes.add_patch(outline_of(ghost, shown, _ghost_style(region)))
+        outline = axes.add_patch(outline_of(region, shown, face_of(region, picture)))
         seen.append(seeming(picture.best, region, outline, shown))
     for style, curves in _curves(picture):
         for curve in _few(curves):
@@ -222,7 +241,7 @@ def _ghost_style(region: Region) -> dict[str, Any]:
     }
 
 
-def _outline(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
+def outline_of(region: Region, shown: tuple[int, int], style: dict[str, Any]) -> Any:  # noqa: ANN401
     """What a region looks like along an axis: a circle, or the hull of points of its surface."""
     import numpy as np
     from matplotlib.patches import Circle, Polygon
@@ -285,7 +304,7 @@ def _back_to_front(regions: Sequence[Region]) -> list[Region]:
     return sorted(regions, key=lambda r: (r.kind != "target", -r.shape.reach_mm()))
 
 
-def _face(region: Region, picture: Picture) -> dict[str, Any]:
+def face_of(region: Region, picture: Picture) -> dict[str, Any]:
     """The style of a region's disc."""
     colour = COLOURS[region.kind]
     label: str = region.kind

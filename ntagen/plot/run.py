@@ -10,6 +10,7 @@ from typing import Final
 
 from ntagen.drive.reading import RunLog
 from ntagen.drive.records import (
+    Breathed,
     Ended,
     Followed,
     Guaranteed,
@@ -56,6 +57,7 @@ def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> P
         best=curve(plans[0], scene.needle) if plans else (),
         others=[curve(plan, scene.needle) for plan in plans[1:]],
         caption=caption,
+        clock_s=0.0 if scene.breath is None else scene.breath.clock_s,
     )
 
 
@@ -89,6 +91,7 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
         caption=_outcome(ends[-1], log.records) if ends else "the log is torn",
         moments=moments_of(log.records),
         appears_s=_learned_at(log.records),
+        clock_s=_clock_s(log),
     )
 
 
@@ -113,6 +116,15 @@ def _learned_at(records: Sequence[Record]) -> dict[str, float]:
     """When each region was learned first."""
     learned = [record for record in records if isinstance(record, Learned)]
     return {record.name: record.time_s for record in reversed(learned)}
+
+
+def _clock_s(log: RunLog) -> float:
+    """The time on the clock of the breath at the time 0 of the run."""
+    if log.actual.breath is None:
+        return 0.0
+    heard = (one for one in log.records if isinstance(one, Breathed))
+    first = next(heard, Breathed(0.0, log.actual.breath.clock_s))
+    return first.clock_s - first.time_s
 
 
 def curve(plan: Plan, needle: Needle) -> Curve:

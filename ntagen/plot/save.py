@@ -16,18 +16,25 @@ if TYPE_CHECKING:
     from ntagen.plot.picture import Picture
 
 FIGURES: Final = ("png", "pdf", "svg")
-PICTURES: Final = (*FIGURES, "html")
-"""Scenes and runs can also be pages."""
+PICTURES: Final = (*FIGURES, "html", "gif")
+"""Scenes and runs can also be pages, and animations."""
 
 
 def write_picture(picture: Picture, path: Path) -> None:
-    """Draws a picture into a file: a page to turn and step through, or a figure.
+    """Draws a picture into a file: a page to turn and step through, an animation, or a figure.
 
     Raises:
-        InputError: The file cannot be written, or its ending is unknown.
+        InputError: The file cannot be written, or its ending is unknown, or an animation is asked
+            for and nothing moves.
     """
     # Matplotlib takes half a second to load, and a page does not need it.
-    if format_of(path, PICTURES) == "html":
+    kind = format_of(path, PICTURES)
+    if kind == "gif":
+        from ntagen.plot.animation import animation_of
+
+        animation_of(picture).save(path)
+        return
+    if kind == "html":
         from ntagen.plot.viewer import page_of
 
         page_of(picture).save(path)

@@ -23,6 +23,8 @@ from ntagen.shapes import triangles
 
 _DATA: Final = "/*DATA*/"
 _HEIGHT_PX: Final = 620
+_STEPS: Final = 64
+"""A period of the breath is shown in so many steps; between them, regions go straight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ def data_of(picture: Picture) -> dict[str, Any]:
         | ({"true": _point(one.true_mm)} if one.true_mm else {})
         | ({"measured": _point(one.measured_mm)} if one.measured_mm else {})
         for one in picture.moments
-    ]
+    ] or _breath(picture)
     return {
         "title": picture.title or picture.scene.name,
         "caption": picture.caption,
@@ -81,6 +83,7 @@ def data_of(picture: Picture) -> dict[str, Any]:
         "right": right,
         "away": away,
         "gap": GAP_MM,
+        "clock": round(picture.clock_s, 3),
         "regions": [_region(region, picture) for region in picture.scene.regions],
         "paths": list(_paths(picture)),
         "tracks": _tracks(picture),
@@ -117,7 +120,7 @@ def _region(region: Region, picture: Picture) -> dict[str, Any]:
     elif region.name in picture.unknown:
         note += ", not known"
     if region.motion is not None:
-        note += ", moves; shown at rest"
+        note += ", moves with the breath"
     return {
         "name": region.name,
         "note": note,
@@ -126,7 +129,31 @@ def _region(region: Region, picture: Picture) -> dict[str, Any]:
         "from": picture.appears_s.get(region.name),
         "points": [_point((float(x), float(y), float(z))) for x, y, z in points],
         "faces": faces,
+        "motion": _motion(region),
     }
+
+
+def _motion(region: Region) -> dict[str, Any] | None:
+    """Where a region is during a period: times and displacements, with straight lines between."""
+    motion = region.motion
+    if motion is None:
+        return None
+    sampled = tuple((time_s, motion.at_mm(time_s)) for time_s in _steps(motion.period_s))
+    rows = motion.rows if motion.table else sampled
+    return {
+        "period": motion.period_s,
+        "places": [[round(time_s, 4), *_point(place)] for time_s, place in rows],
+    }
+
+
+def _steps(period_s: float) -> list[float]:
+    return [period_s * index / _STEPS for index in range(_STEPS + 1)]
+
+
+def _breath(picture: Picture) -> list[dict[str, Any]]:
+    """The moments of one breath, for a scene with moving regions; else none."""
+    periods = [one.motion.period_s for one in picture.scene.regions if one.motion is not None]
+    return [{"t": round(time_s, 3)} for time_s in _steps(periods[0])] if periods else []
 
 
 def _paths(picture: Picture) -> Iterable[dict[str, Any]]:

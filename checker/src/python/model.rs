@@ -47,6 +47,14 @@ type ReachedEntry = (
     Option<(usize, StepEntry)>,
 );
 
+/// Reached states, the moves between them (index, move, index), and the limit that stopped the
+/// search.
+type SpaceEntry = (
+    Vec<ReachedEntry>,
+    Vec<(usize, StepEntry, usize)>,
+    Option<&'static str>,
+);
+
 /// The matrix of a zone.
 pub(super) fn bound_rows(zone: &Zone) -> Vec<BoundRow> {
     let clocks = 0..zone.dimension();
@@ -153,16 +161,17 @@ impl Model {
         })
     }
 
-    /// The reachable symbolic states, and "states", "memory" or "time" if a limit stopped the
-    /// search.
-    #[pyo3(signature = (engine, *, states, memory_bytes, timeout_s))]
+    /// The reachable symbolic states, with `links` the moves between them, and "states", "memory"
+    /// or "time" if a limit stopped the search.
+    #[pyo3(signature = (engine, *, states, memory_bytes, timeout_s, links))]
     fn states(
         slf: &Bound<'_, Self>,
         engine: &str,
         states: Option<u64>,
         memory_bytes: Option<u64>,
         timeout_s: Option<f64>,
-    ) -> PyResult<(Vec<ReachedEntry>, Option<&'static str>)> {
+        links: bool,
+    ) -> PyResult<SpaceEntry> {
         let code = code_engine(engine)?;
         let limits = Limits {
             states,
@@ -174,18 +183,23 @@ impl Model {
         let found = slf.py().detach(|| {
             model.with(|model| {
                 model.prepare_simulation(code).map_err(rejected)?;
-                let (met, stop) = model
-                    .reached(limits)
+                let space = model
+                    .reached(limits, links)
                     .map_err(|failure| failed(model, failure))?;
                 let network = model.network();
-                let states = met.into_iter().map(|one| reached_entry(network, one));
-                Ok::<_, PyErr>((states.collect(), stop))
+                let met = space.states.into_iter();
+                let states = met.map(|one| reached_entry(network, one)).collect();
+                let links = space.links.iter().map(|link| {
+                    let step = step_entry(network, &link.parts);
+                    (link.source, step, link.target)
+                });
+                Ok::<_, PyErr>((states, links.collect(), space.stop))
             })
         });
-        let (states, stop): (Vec<ReachedEntry>, _) = found?;
+        let (states, links, stop): (_, _, Option<StopReason>) = found?;
         match stop {
             Some(StopReason::Interrupted) => Err(PyKeyboardInterrupt::new_err(())),
-            stop => Ok((states, stop.and_then(stop_name))),
+            stop => Ok((states, links, stop.and_then(stop_name))),
         }
     }
 

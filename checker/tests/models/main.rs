@@ -21,6 +21,7 @@ mod replay;
 #[path = "../common/searches.rs"]
 mod searches;
 mod shown;
+mod state_space;
 mod stopwatches;
 mod stored;
 mod subsumption;

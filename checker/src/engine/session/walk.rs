@@ -11,7 +11,7 @@ use crate::network::{Failure, MoveRef, Moves, Part, Stepper, Symbolic};
 use crate::search::Outcome;
 use crate::search::StopReason;
 use crate::search::limits::Counters;
-use crate::search::optimum::best_first::{BestFirst, Measure, Met};
+use crate::search::optimum::best_first::{BestFirst, Link, Measure, Met};
 use crate::tuning::Tuning;
 use crate::verify;
 use crate::verify::choices::Choices;
@@ -36,6 +36,17 @@ pub struct Point {
     pub words: Vec<i32>,
     /// The clock values that are possible.
     pub zone: Zone,
+}
+
+/// The states that a model can reach.
+#[derive(Clone, Debug)]
+pub struct Space {
+    /// The states, those with the fewest moves first.
+    pub states: Vec<Met>,
+    /// The moves between them, if they were asked for.
+    pub links: Vec<Link>,
+    /// What stopped the search, if they are not all.
+    pub stop: Option<StopReason>,
 }
 
 /// Moves, and where each leads.
@@ -82,8 +93,9 @@ impl LoadedModel {
 
     /// The reachable states, breadth first, the fewest moves first, at most `limits.states` of
     /// them; and what stopped the search, if they are not all. A state that an earlier one contains
-    /// is left out. Zones are extrapolated by the constants of the model.
-    pub fn reached(&self, limits: Limits) -> Result<(Vec<Met>, Option<StopReason>), Failure> {
+    /// is left out. Zones are extrapolated by the constants of the model. With `has_links`, also all
+    /// moves between these states.
+    pub fn reached(&self, limits: Limits, has_links: bool) -> Result<Space, Failure> {
         let network = self.network();
         let abstraction = if has_differences(network, &[]) {
             Abstraction::Differences
@@ -97,6 +109,9 @@ impl LoadedModel {
         let mut watch = LimitWatch::new(limits);
         let mut search =
             BestFirst::new(&mut symbolic, &nothing, Measure::Moves, Counters::default());
+        if has_links {
+            search = search.with_links();
+        }
         let stop = match watch.bound(|watch| search.run(watch)) {
             Ok(Ok(Outcome::Stopped(reason))) | Err((reason, _)) => Some(reason),
             Ok(Ok(Outcome::Found(_) | Outcome::Exhausted)) => None,
@@ -105,8 +120,12 @@ impl LoadedModel {
         };
         // The search checks its limits only from time to time, so it may have found more.
         let is_cut = search.counters().stored > most as u64;
-        let states = search.into_met(most)?;
-        Ok((states, stop.or(is_cut.then_some(StopReason::States))))
+        let (states, links) = search.into_graph(most)?;
+        Ok(Space {
+            states,
+            links,
+            stop: stop.or(is_cut.then_some(StopReason::States)),
+        })
     }
 
     /// Zones as they are, without abstraction.

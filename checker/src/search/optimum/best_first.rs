@@ -80,6 +80,17 @@ pub struct Met {
     pub from: Option<(usize, Vec<Part>)>,
 }
 
+/// A move from one state of a list to another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// The index of the state from which it leads.
+    pub source: usize,
+    /// The edges that are taken together.
+    pub parts: Vec<Part>,
+    /// The index of the state that contains where it leads.
+    pub target: usize,
+}
+
 struct Node {
     discrete: DiscreteId,
     zone: Zone,
@@ -101,6 +112,8 @@ pub struct BestFirst<'s, 'a> {
     /// For each discrete state: its nodes.
     lists: Vec<Vec<u32>>,
     waiting: BinaryHeap<Waiting>,
+    /// All moves: from which node, which move, and to which node; `None` if nobody asks for them.
+    links: Option<Vec<(u32, Step, u32)>>,
     explored: u64,
     before: Counters,
 }
@@ -121,9 +134,17 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             nodes: Vec::new(),
             lists: Vec::new(),
             waiting: BinaryHeap::new(),
+            links: None,
             explored: 0,
             before,
         }
+    }
+
+    /// Remembers all moves, for [`BestFirst::into_graph`].
+    #[must_use]
+    pub fn with_links(mut self) -> Self {
+        self.links = Some(Vec::new());
+        self
     }
 
     /// What was done, with what was done before.
@@ -131,11 +152,12 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         let dimension = self.symbolic.dimension();
         let zone = dimension * dimension * size_of::<Bound>();
         let node = size_of::<Node>() + zone + 2 * size_of::<Waiting>();
+        let links = self.links.as_ref().map_or(0, |links| size_of_val(&**links));
         let own = Counters {
             explored: self.explored,
             stored: self.nodes.len() as u64,
             waiting: self.waiting.len() as u64,
-            bytes: (self.store.bytes() + self.nodes.len() * node) as u64,
+            bytes: (self.store.bytes() + self.nodes.len() * node + links) as u64,
         };
         own + self.before
     }
@@ -234,10 +256,13 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             }
             let (nodes, list) = (&self.nodes, &mut self.lists[discrete.0 as usize]);
             let bounds_of = |node: u32| nodes[node as usize].zone.bounds();
-            if list
-                .iter()
-                .any(|&one| dbm::is_subset(zone.bounds(), bounds_of(one)))
-            {
+            let mut known = list.iter().copied();
+            let container = known.find(|&one| dbm::is_subset(zone.bounds(), bounds_of(one)));
+            if let Some(links) = self.links.as_mut().filter(|_| parent != NONE) {
+                let target = container.unwrap_or(self.nodes.len() as u32);
+                links.push((parent, step, target));
+            }
+            if container.is_some() {
                 continue;
             }
             // What the new zone contains was reached before, at no greater cost. It stays for the
@@ -316,6 +341,33 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             reached.push((words, zones.collect()));
         }
         reached
+    }
+
+    /// Like [`BestFirst::into_met`], with the moves between these states in the order in which they
+    /// were taken. A move stands in it once for each zone that it leads to.
+    pub fn into_graph(mut self, most: usize) -> Result<(Vec<Met>, Vec<Link>), Failure> {
+        let initial = self.symbolic.stepper.network().initial.clone();
+        let mut moves = Moves::default();
+        let mut moves_of = NONE;
+        let mut links = Vec::new();
+        for (source, step, target) in self.links.take().unwrap_or_default() {
+            if source.max(target) as usize >= most {
+                continue;
+            }
+            if moves_of != source {
+                let mut words = initial.clone();
+                let discrete = self.nodes[source as usize].discrete;
+                self.store.load(discrete, &mut words);
+                self.symbolic.moves(&mut words, &mut moves)?;
+                moves_of = source;
+            }
+            links.extend(moves.with_rank(step).map(|one| Link {
+                source: source as usize,
+                parts: one.parts.to_vec(),
+                target: target as usize,
+            }));
+        }
+        Ok((self.into_met(most)?, links))
     }
 
     /// The first `most` states in the order in which they were reached, including those that a
