@@ -67,6 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "verifyta": {"errors", "files", "checker"},
+    "serve": {"errors"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},
@@ -98,7 +99,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture"}
-    | {"verifyta"}
+    | {"serve", "verifyta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},
@@ -150,8 +151,18 @@ ONLY_IN: dict[str, set[str]] = {
     "select": {"drive", "grbl"},
     "asyncio": {"drive"},
     "threading": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
-    | {"plugins", "testing"},
-    "time": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink", "plot", "testing"},
+    | {"plugins", "serve", "testing"},
+    "time": {
+        "drive",
+        "grbl",
+        "cli",
+        "experiment",
+        "lab",
+        "openigtlink",
+        "plot",
+        "serve",
+        "testing",
+    },
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
     "random": {"needle", "drive", "checker.runs", "checker.play"},

@@ -1,0 +1,97 @@
+"""`ntagen serve`: models, environments and runs in the browser, on this computer only."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import click
+
+from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.terminal import echo
+from ntagen.files import read_file
+
+
+@click.command("serve", epilog="Exit codes: 2 the port or a file is wrong, 130 ended by Ctrl-C.")
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "--port",
+    metavar="PORT",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="The port to listen on.  [default: any that is free]",
+)
+@click.option(
+    "--open",
+    "opens",
+    is_flag=True,
+    help="Open the page in the browser.",
+)
+@click.option(
+    "--timeout",
+    "timeout_s",
+    metavar="TIME",
+    type=TIME,
+    default="60s",
+    show_default=True,
+    help="Stop a search after this time.",
+)
+@click.option(
+    "--memory",
+    "memory_bytes",
+    metavar="SIZE",
+    type=SIZE,
+    default="1GiB",
+    show_default=True,
+    help="Stop a search that takes this much memory.",
+)
+@click.option(
+    "--upload",
+    "upload_bytes",
+    metavar="SIZE",
+    type=SIZE,
+    default="32MiB",
+    show_default=True,
+    help="Refuse files that are larger.",
+)
+def command(
+    file: Path | None,
+    port: int,
+    opens: bool,
+    timeout_s: float,
+    memory_bytes: float,
+    upload_bytes: float,
+) -> None:
+    """Show models, environments and runs in the browser: verdicts, traces and pictures.
+
+    It prints an address. Open it, and drop a model (.xml, .xta), an environment (.nsl) or the log
+    of a run (.mcap) on the page. FILE is shown at once. Only this computer gets there, and only
+    with the token in the address. Each check is a process of its own, which you can cancel.
+
+    \b
+    Examples:
+      ntagen serve
+      ntagen serve model.xml --open
+      ntagen serve --port 8080 --timeout 10min --memory 4GiB
+    """  # noqa: D301  click wants the control character
+    from ntagen.serve.limits import Limits
+    from ntagen.serve.server import Server
+
+    limits = Limits(
+        timeout_s=timeout_s,
+        memory_bytes=int(memory_bytes),
+        upload_bytes=int(upload_bytes),
+        jobs=max(2, os.cpu_count() or 1),
+    )
+    data = None if file is None else read_file(file, limits.upload_bytes)
+    server = Server(limits, port)
+    try:
+        if file is not None and data is not None:
+            server.open(file.name, data)
+        echo(f"open {server.address}")
+        echo("Ctrl-C ends the server", err=True)
+        if opens:
+            click.launch(server.address)
+        server.serve()
+    finally:
+        server.end()
