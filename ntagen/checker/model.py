@@ -426,7 +426,8 @@ class Model:
         if stop == "states":
             raise LimitError(
                 f"the model has more than {limit} symbolic states\n"
-                "hint: make constants of the model smaller, or raise the limit"
+                "hint: make constants of the model smaller; in Python, state_space(limit=…) allows "
+                "more"
             )
         if stop is not None:
             raise LimitError(f"the search was stopped by the {stop} limit\nhint: raise it")

@@ -39,7 +39,7 @@ COMMANDS: Final = {
     "info": "Show what is in a model or an environment.",
     "explain": "Explain a diagnostic: what it means and how to fix it.",
     "plot": "Draw a scene, its plans or a run.",
-    "serve": "Show models, tasks and runs in the browser, on this computer only.",
+    "serve": "Show models, tasks and runs on a page in the browser.",
     "drive": "Steer a needle to the target and log the run.",
     "experiment": "Drive many simulated runs, and make a table of them.",
     "sweep": "Show how much of an error a task stands.",
