@@ -12,7 +12,7 @@ from pygments.token import Comment, Keyword, Name, Number, Punctuation, String, 
 
 from ntagen.cli import _ntagen
 from ntagen.nsl.tokens import RESERVED
-from ntagen.version import installed_version
+from ntagen.version import VERSION
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 project = "ntagen"
 author = "the ntagen contributors"
 copyright = author
-release = installed_version()
+release = VERSION
 
 extensions = [
     "myst_parser",

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import io
 import os
 import re
@@ -27,6 +26,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, BinaryIO, Final, Literal
 
+from ntagen import system
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 
@@ -38,6 +38,7 @@ EVIDENCE_BYTES: Final = 2 * 2**30
 
 _LINKS_FOLLOWED: Final = 40
 _PIECE_BYTES: Final = 2**20
+_READING: Final = os.O_RDONLY | system.AT_ONCE | system.OWN_TERMINAL | system.BINARY
 _OWN_DESCRIPTORS: Final = re.compile(r"/dev/fd|/proc/(\d+)(/task/\d+)?/fd")
 
 
@@ -133,7 +134,7 @@ class GrowingFile:
             self._is_plain = target.part is not None
             if self._is_plain:
                 _make_folders(target.final.parent, [])
-                flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
+                flags = os.O_RDWR | os.O_CREAT | system.BINARY
                 self._descriptor = os.open(target.final, flags, 0o666)
             else:
                 self._descriptor = _descriptor(target)
@@ -223,7 +224,13 @@ def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
         OSError: It is something else, cannot be read, or is too large (`errno.EFBIG`).
     """
     # Opening a pipe in the usual way waits for a writer, perhaps for ever.
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
+    try:
+        descriptor = os.open(path, _READING)
+    except PermissionError:
+        # Windows opens no folders.
+        if Path(path).is_dir():
+            raise _is_folder(path) from None
+        raise
     try:
         kind = _readable_kind(descriptor, path, limit_bytes)
         file = os.fdopen(descriptor, "rb", buffering=0)
@@ -236,7 +243,7 @@ def open_file(path: str | Path, limit_bytes: int) -> BinaryIO:
         first = file.read(_PIECE_BYTES)
         if first == b"" and kind == "pipe":
             raise OSError(errno.ENXIO, "it is a pipe, and nobody writes to it", str(path))
-        os.set_blocking(descriptor, True)
+        system.wait_for_data(descriptor)
         rest = _pieces(file, path, limit_bytes, first or b"")
         return io.BytesIO(b"".join(rest))
 
@@ -255,7 +262,7 @@ def _readable_kind(
             raise _too_large(path, limit_bytes)
         return "file"
     if stat.S_ISDIR(found.st_mode):
-        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
+        raise _is_folder(path)
     if stat.S_ISFIFO(found.st_mode):
         return "pipe"
     if os.isatty(descriptor):
@@ -274,6 +281,10 @@ def _pieces(
         yield piece
     if length > limit_bytes:
         raise _too_large(path, limit_bytes)
+
+
+def _is_folder(path: str | Path) -> OSError:
+    return IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
 
 
 def _too_large(path: str | Path, limit_bytes: int) -> OSError:
@@ -343,14 +354,11 @@ def _followed(path: Path) -> tuple[Path, int | None]:
 def _write_part(target: _Target, part: Path, content: Content) -> None:
     """Writes the temporary file, with the mode that the file has or gets."""
     found = target.found
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | system.BINARY
     descriptor = os.open(part, flags, 0o666 if found is None else 0o600)
     with os.fdopen(descriptor, "wb") as file:
         if found is not None:
-            if (found.st_uid, found.st_gid) != (os.geteuid(), os.getegid()):
-                with contextlib.suppress(OSError):
-                    os.fchown(descriptor, found.st_uid, found.st_gid)
-            os.fchmod(descriptor, stat.S_IMODE(found.st_mode))
+            system.keep_access(descriptor, found)
         _write(file, content)
         file.flush()
         os.fsync(descriptor)
@@ -366,7 +374,8 @@ def _descriptor(target: _Target) -> int:
     """A new descriptor for a pipe or device."""
     if target.descriptor is not None:
         return os.dup(target.descriptor)
-    return os.open(target.final, os.O_WRONLY | os.O_CLOEXEC | os.O_NOCTTY)
+    # Opening for writing does wait: for the reader of a pipe.
+    return os.open(target.final, os.O_WRONLY | system.OWN_TERMINAL | system.BINARY)
 
 
 def _write(file: BinaryIO, content: Content) -> None:
@@ -403,7 +412,7 @@ def lock(descriptor: int, refusal: str) -> None:
         InputError: Another process has locked it.
     """
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        system.take_lock(descriptor)
     except BlockingIOError:
         raise InputError(refusal) from None
     except OSError:

@@ -23,6 +23,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "values": set(),
     "version": set(),
+    "system": set(),
     "errors": set(),
     "units": set(),
     "rules": {"units"},
@@ -34,7 +35,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "imaging": {"cache", "errors", "files", "shapes"},
     "nsl": BASE | {"cache", "files", "imaging"},
     "render": BASE | {"files"},
-    "files": {"errors"},
+    "files": {"errors", "system"},
     "frames": {"errors"},
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
@@ -94,11 +95,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"},
     "experiment": BASE
-    | {"files", "frames", "grbl", "needle", "nsl", "plan", "drive", "lab", "version"},
+    | {"files", "frames", "grbl", "needle", "nsl", "plan", "drive", "lab", "system", "version"},
     "cli": BASE
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
-    | {"checker.picture"}
+    | {"checker.picture", "system"}
     | {"serve", "verifyta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
@@ -150,6 +151,12 @@ ONLY_IN: dict[str, set[str]] = {
     "selectors": {"openigtlink"},
     "select": {"drive", "grbl"},
     "asyncio": {"drive"},
+    # Windows has none of these.
+    "fcntl": {"system"},
+    "pty": {"grbl"},
+    "tty": {"grbl"},
+    "termios": set(),
+    "resource": {"serve"},
     "threading": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
     | {"plugins", "serve", "testing"},
     "time": {

@@ -19,6 +19,8 @@ from pathlib import Path, PurePosixPath
 import pytest
 from packaging.requirements import Requirement
 
+from ntagen.version import VERSION
+
 ROOT = Path(__file__).parents[1]
 TEMPLATES = ROOT / "templates"
 
@@ -52,6 +54,15 @@ def test_the_lock_file_pins_all_that_is_asked_for() -> None:
     others = [line for line in lock.splitlines() if not re.match(r"[\w.-]+==\S+( ; .*)? \\$", line)]
     assert all(re.match(r"#|    --hash=sha256:[0-9a-f]{64}( \\)?$", line) for line in others)
     assert len(pins) == len(re.findall(r"^[\w.-]+==", lock, re.MULTILINE))
+
+
+def test_the_version_is_that_of_the_wheel() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["dynamic"] == ["version"]  # so that it is the engine's
+    assert (
+        tomllib.loads((ROOT / "checker" / "Cargo.toml").read_text())["package"]["version"]
+        == VERSION
+    )
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ import contextlib
 import gc
 import importlib
 import importlib.util
+import io
 import os
 import re
 import sys
@@ -27,6 +28,7 @@ import click
 from ntagen.cli.signals import TERMINATED, Terminated, termination
 from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError, NtagenError
+from ntagen.version import VERSION
 
 __all__ = ["main", "verifyta"]
 
@@ -89,9 +91,7 @@ def _module(command: str) -> str:
 
 def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:
     if wanted and not ctx.resilient_parsing:
-        from ntagen.version import installed_version
-
-        echo(f"ntagen {installed_version()}")
+        echo(f"ntagen {VERSION}")
         ctx.exit()
 
 
@@ -131,6 +131,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
+    for stream in (sys.stdout, sys.stderr):
+        # A pipe on Windows has few characters; the others are shown by their numbers.
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")
     with termination() as signalled:
         try:
             code = _run(list(sys.argv[1:] if arguments is None else arguments))
@@ -195,7 +199,10 @@ def _report(error: BaseException) -> int:
             _say(_with_severity(_describe(error)))
             return InputError.exit_code
         case ImportError():
-            _say(f"error: ntagen is not installed completely: {error}\nhint: run `make setup`")
+            _say(
+                f"error: ntagen is not installed completely: {error}\n"
+                "hint: install it again; in a copy of its sources, run `make setup`"
+            )
             return INTERNAL_ERROR
         case _:
             _say(_internal(error))

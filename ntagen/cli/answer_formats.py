@@ -16,6 +16,7 @@ from xml.sax.saxutils import escape, quoteattr
 
 from ntagen.cli.outcomes import Mistake, Outcome, fault_of, mistakes_in, summary
 from ntagen.cli.terminal import echo, safe
+from ntagen.version import VERSION
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
@@ -197,11 +198,9 @@ class Sarif:
         self._print([_result(_fault(one, self._path), _explained(one)) for one in faults])
 
     def _print(self, results: list[dict[str, Any]]) -> None:
-        from ntagen.version import installed_version
-
         tool = {
             "name": "ntagen",
-            "version": installed_version(),
+            "version": VERSION,
             "rules": [{"id": rule} for rule in sorted({one["ruleId"] for one in results})],
         }
         document = {

@@ -11,6 +11,7 @@ import click
 
 from ntagen.cli.signals import Handler, handled
 from ntagen.drive.operator import Operator
+from ntagen.system import HANG_UPS
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -35,10 +36,10 @@ class SignalledOperator(Operator):
         self.was_terminated = True
         self.end("ended by the system (SIGTERM)")
 
-    def hang_up(self, _number: int, _frame: FrameType | None) -> None:
-        """SIGHUP: the terminal is gone, so nobody could end the run any more."""
+    def hang_up(self, number: int, _frame: FrameType | None) -> None:
+        """The terminal is gone, so nobody could end the run any more."""
         self.was_terminated = True
-        self.end("the terminal was closed (SIGHUP)")
+        self.end(f"the terminal was closed ({signal.Signals(number).name})")
 
     def agree(self, text: str) -> None:
         """Asks whether the driver may do this.
@@ -64,7 +65,7 @@ def signalled_operator() -> Iterator[SignalledOperator]:
     handlers: dict[signal.Signals, Handler] = {
         signal.SIGINT: operator.interrupt,
         signal.SIGTERM: operator.terminate,
-        signal.SIGHUP: operator.hang_up,
+        **dict.fromkeys(HANG_UPS, operator.hang_up),
     }
     with handled(handlers):
         yield operator

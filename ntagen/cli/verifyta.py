@@ -12,6 +12,7 @@ import click
 from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart, write_files
+from ntagen.version import VERSION
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -43,7 +44,6 @@ def command(words: tuple[str, ...]) -> int:
     """Stand in for UPPAAL's verifyta; -h lists the options."""
     from ntagen.verifyta.options import parse
     from ntagen.verifyta.output import help_text, version_text
-    from ntagen.version import installed_version
 
     try:
         line = parse(words)
@@ -51,7 +51,7 @@ def command(words: tuple[str, ...]) -> int:
             echo(help_text())
             return 0
         if line.has("--version"):
-            echo(version_text(installed_version()))
+            echo(version_text(VERSION))
             return 0
         if any(line.has(name) for name in _LICENCES) and not line.files:
             echo("ntagen needs no licence")

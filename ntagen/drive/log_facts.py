@@ -13,7 +13,7 @@ from ntagen.drive.scene_json import scene_to_json
 from ntagen.files import read_file
 from ntagen.nsl.source import MAX_SOURCE_BYTES
 from ntagen.scene import Scene
-from ntagen.version import installed_version
+from ntagen.version import VERSION
 
 
 def facts_of(
@@ -30,7 +30,7 @@ def facts_of(
     """
     errors, needle = configuration.errors, configuration.needle
     metadata: dict[str, Any] = {
-        "program": f"ntagen {installed_version()}",
+        "program": f"ntagen {VERSION}",
         "started_at": datetime.now(tz=UTC).isoformat(timespec="milliseconds"),
         "environment": environment.name.encode(errors="replace").decode(),
         "known": known,

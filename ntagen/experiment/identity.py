@@ -6,7 +6,7 @@ import functools
 import hashlib
 from pathlib import Path
 
-from ntagen.version import installed_version
+from ntagen.version import VERSION
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -18,4 +18,4 @@ def identity() -> str:
     for path in sorted([*_PACKAGE.rglob("*.py"), *_PACKAGE.glob("_checker*.so")]):
         digest.update(path.relative_to(_PACKAGE).as_posix().encode())
         digest.update(path.read_bytes())
-    return f"{installed_version()} {digest.hexdigest()[:12]}"
+    return f"{VERSION} {digest.hexdigest()[:12]}"

@@ -16,6 +16,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from typing import Final
 
+from ntagen import system
 from ntagen.errors import InputError
 from ntagen.experiment.crew import Done
 from ntagen.experiment.making import Block, make_block
@@ -137,7 +138,7 @@ class _Worker:
         pid = self.pid
         if pid is not None:
             with contextlib.suppress(OSError):
-                os.kill(pid, signal.SIGKILL)
+                os.kill(pid, system.KILL)
         self._pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -166,4 +167,4 @@ def _end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
-        os.kill(os.getpid(), signal.SIGKILL)
+        os.kill(os.getpid(), system.KILL)

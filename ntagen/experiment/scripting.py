@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
+from ntagen import system
 from ntagen.errors import InputError
 from ntagen.experiment.campaign import Progress, carry_out
 from ntagen.experiment.crew import Crew, Here
@@ -84,4 +84,4 @@ def crew_of(workers: int | None, dask: str | None = None) -> Callable[[], Crew]:
     from ntagen.experiment import local
 
     local.require_main_process()
-    return lambda: local.LocalCrew(workers or len(os.sched_getaffinity(0)))
+    return lambda: local.LocalCrew(workers or system.core_count())

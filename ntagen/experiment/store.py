@@ -24,6 +24,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
+from ntagen import system
 from ntagen.errors import InputError
 from ntagen.experiment.description import Experiment
 from ntagen.experiment.identity import identity
@@ -54,7 +55,7 @@ def taken(folder: Path, experiment: Experiment, *, resume: bool) -> Iterator[Non
     with naming(folder):
         for part in (RESULTS, LOGS):
             Path(folder, part).mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | system.BINARY, 0o666)
     try:
         # Where there are no locks, two experiments still write other files.
         lock(
@@ -115,7 +116,7 @@ class Results:
         """
         with naming(self._path):
             if self._descriptor is None:
-                flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | os.O_CLOEXEC
+                flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | system.BINARY
                 self._descriptor = os.open(self._path, flags, 0o666)
             rest = memoryview(line_of(run))
             while rest:

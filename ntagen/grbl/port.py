@@ -20,6 +20,9 @@ from ntagen.grbl.protocol import BAUD_RATE
 _WRITE_TIMEOUT_S: Final = 0.5
 """A line has at most 80 bytes: so much is always sent in this time, or the wire is blocked."""
 
+_LOOK_S: Final = 0.001
+"""How long to sleep before looking again at a port that cannot be waited for."""
+
 
 class Port(Protocol):
     """Bytes to and from a controller, and the clock on which its motions take time."""
@@ -87,11 +90,24 @@ class SerialPort:
     def read(self, timeout_s: float) -> bytes:
         """See `Port.read`."""
         try:
-            ready, _, _ = select.select([self._serial.fileno()], [], [], max(0.0, timeout_s))
-            return bytes(self._serial.read(max(1, self._serial.in_waiting))) if ready else b""
+            is_ready = self._wait(max(0.0, timeout_s))
+            return bytes(self._serial.read(max(1, self._serial.in_waiting))) if is_ready else b""
         # A port that is closed or pulled out gives any of these.
         except (serial.SerialException, OSError, TypeError, ValueError) as error:
             raise self._gone(error) from None
+
+    def _wait(self, timeout_s: float) -> bool:
+        """Waits until something has come; returns whether it has."""
+        try:
+            number = self._serial.fileno()
+        except io.UnsupportedOperation:
+            # A serial port of Windows is no file, so it is looked at again and again.
+            end_s = time.monotonic() + timeout_s
+            while not self._serial.in_waiting and time.monotonic() < end_s:
+                time.sleep(_LOOK_S)
+            return bool(self._serial.in_waiting)
+        ready, _, _ = select.select([number], [], [], timeout_s)
+        return bool(ready)
 
     def write(self, data: bytes) -> None:
         """See `Port.write`."""

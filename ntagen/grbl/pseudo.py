@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import os
-import pty
 import select
 import threading
 import time
-import tty
 from types import TracebackType
 from typing import Final, Self
 
+from ntagen.errors import DeviceError
 from ntagen.grbl.emulator import Emulator
 
 _LONGEST_WAIT_S: Final = 0.01
@@ -26,6 +25,9 @@ class PseudoTerminal:
     Args:
         emulator: The controller; it should be switched on. Other threads use it under `lock` only.
         speed: How many seconds pass on its clock in one second.
+
+    Raises:
+        DeviceError: This system has no pseudo-terminals.
     """
 
     def __init__(self, emulator: Emulator, speed: float = 1.0) -> None:
@@ -33,8 +35,7 @@ class PseudoTerminal:
         self._emulator = emulator
         self._speed = speed
         self._began_s, self._offset_s = time.monotonic(), emulator.now_s
-        self._controller, self._client = pty.openpty()
-        tty.setraw(self._client)
+        self._controller, self._client = _opened()
         os.set_blocking(self._controller, False)
         self.name = os.ttyname(self._client)
         self._wake_read, self._wake_write = os.pipe()
@@ -96,3 +97,22 @@ class PseudoTerminal:
             # Nobody reads: a real controller's answers are lost then, too.
             with contextlib.suppress(BlockingIOError):
                 os.write(self._controller, answer)
+
+
+def _opened() -> tuple[int, int]:
+    """Both ends of a new pseudo-terminal that passes on all bytes: the controller's and the other.
+
+    Raises:
+        DeviceError: This system has no pseudo-terminals.
+    """
+    try:
+        import pty
+        import tty
+    except ImportError:
+        raise DeviceError(
+            "this system has no pseudo-terminals, on which other programs could reach the emulated "
+            "controller\nhint: use Linux, macOS or WSL; `ntagen drive --needle grbl+sim` works here"
+        ) from None
+    controller, client = pty.openpty()
+    tty.setraw(client)
+    return controller, client
