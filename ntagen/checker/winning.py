@@ -115,7 +115,7 @@ def zones_chart(
         _axes(areas, x, y),
         f"What the {owner} does in ( {places} ){variables}",
         _notes(areas, fixed, free, is_permissive=is_permissive),
-        hatched=is_permissive or bool(free),
+        striped=is_permissive or bool(free),
     )
 
 
@@ -133,7 +133,7 @@ def _notes(
         some = "some value" if len(free) == 1 else "some values"
         notes.append(f"for {some} of {', '.join(free)}; give values to see a plane")
     if is_permissive:
-        notes.append("the strategy allows all that is hatched")
+        notes.append("where areas overlap, the strategy allows all of them")
     if not any(area.zones for area in areas):
         notes.append("there is no decision here" if fixed else "there is no decision in this state")
     notes.append("blank: no decision; play under the strategy does not get there")

@@ -100,10 +100,11 @@ _LEGEND_CHARACTERS: Final = 90
 _ROW: Final = 20
 _FONT_SIZE: Final = 12
 _DASHES: Final = "5 4"
+_STRIPE: Final = 6
 
 
 def zones_picture(
-    areas: Sequence[Area], axes: Axes, heading: str, notes: Sequence[str], *, hatched: bool
+    areas: Sequence[Area], axes: Axes, heading: str, notes: Sequence[str], *, striped: bool
 ) -> Svg:
     """Draws areas.
 
@@ -112,13 +113,14 @@ def zones_picture(
         axes: The clocks.
         heading: The heading.
         notes: Lines below the legend.
-        hatched: Whether all areas count where they overlap: they are hatched, so that all are seen.
+        striped: Whether all areas count where they overlap: they have stripes, so that all are
+            seen.
     """
     colors = _colors(areas)
-    hatched = hatched and len(colors) > 1
+    striped = striped and len(colors) > 1
     paints = {
-        kind: _Paint(f"url(#{_hatch(number, colors)})", _darker(color))
-        if hatched
+        kind: _Paint(f"url(#{_stripe_id(number, colors)})", _darker(color))
+        if striped
         else _Paint(color, color)
         for number, (kind, color) in enumerate(colors.items())
     }
@@ -129,8 +131,8 @@ def zones_picture(
         height=height,
         axes=axes,
     )
-    parts = [*(_hatches(colors) if hatched else ()), *_paper(frame)]
-    for area, zone in reversed(list(_seen(areas, hatched=hatched))):
+    parts = [*(_stripes(colors) if striped else ()), *_paper(frame)]
+    for area, zone in reversed(list(_seen(areas, striped=striped))):
         parts += _zone(zone, area, paints[area.kind], frame)
     parts += _scales(frame)
     under = frame.top + height + 54
@@ -159,7 +161,7 @@ def _colors(areas: Sequence[Area]) -> dict[str, str]:
     return colors | ({WAIT: _GREY} if any(area.kind == WAIT for area in areas) else {})
 
 
-def _seen(areas: Sequence[Area], *, hatched: bool) -> Iterator[tuple[Area, Sequence[Half]]]:
+def _seen(areas: Sequence[Area], *, striped: bool) -> Iterator[tuple[Area, Sequence[Half]]]:
     """The zones of areas without those that others hide: their outlines would only confuse.
 
     Where the first area counts, an earlier zone hides those within it. Where all count, only one
@@ -171,10 +173,10 @@ def _seen(areas: Sequence[Area], *, hatched: bool) -> Iterator[tuple[Area, Seque
             if any(
                 _is_within(zone, other)
                 for one, other in kept
-                if not hatched or one.kind == area.kind
+                if not striped or one.kind == area.kind
             ):
                 continue
-            if hatched:
+            if striped:
                 kept = [
                     (one, other)
                     for one, other in kept
@@ -302,20 +304,20 @@ def _bound(start: tuple[float, float], end: tuple[float, float], *, strict: bool
     )
 
 
-def _hatch(number: int, all_kinds: Collection[str]) -> str:
+def _stripe_id(number: int, all_kinds: Collection[str]) -> str:
     """The id of a pattern; in a notebook, several pictures stand on one page."""
-    return f"hatch-{number}-of-{len(all_kinds)}"
+    return f"stripes-{number}-of-{len(all_kinds)}"
 
 
-def _hatches(colors: dict[str, str]) -> Iterator[str]:
-    """A pattern for each colour, each with an angle of its own."""
+def _stripes(colors: dict[str, str]) -> Iterator[str]:
+    """Stripes for each colour, each in a place of its own: where areas overlap, all are seen."""
     yield "<defs>"
+    period = _STRIPE * len(colors)
     for number, color in enumerate(colors.values()):
-        angle = (45 + 180 * number / max(len(colors), 1)) % 180
         yield (
-            f'<pattern id="{_hatch(number, colors)}" width="9" height="9" '
-            'patternUnits="userSpaceOnUse" '
-            f'patternTransform="rotate({angle:.0f})"><rect width="9" height="4.5" '
+            f'<pattern id="{_stripe_id(number, colors)}" width="{period}" height="{period}" '
+            'patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
+            f'<rect y="{_STRIPE * number}" width="{period}" height="{_STRIPE}" '
             f'fill="{_darker(color)}"/></pattern>'
         )
     yield "</defs>"

@@ -139,11 +139,11 @@ def test_an_earlier_zone_hides_a_later_one_within_it() -> None:
     small = (Half(1, 0, number(2)), Half(0, 1, number(2)))
     axes = Axes("x", "y", number(5), number(5))
     areas = [Area("go", (wide,), "first"), Area(WAIT, (small,), "second")]
-    assert zones_picture(areas, axes, "h", (), hatched=False).text.count("<polygon") == 1
-    assert zones_picture(areas[::-1], axes, "h", (), hatched=False).text.count("<polygon") == 2
-    both = zones_picture(areas, axes, "h", (), hatched=True).text
+    assert zones_picture(areas, axes, "h", (), striped=False).text.count("<polygon") == 1
+    assert zones_picture(areas[::-1], axes, "h", (), striped=False).text.count("<polygon") == 2
+    both = zones_picture(areas, axes, "h", (), striped=True).text
     assert both.count("<polygon") == 2
-    assert len(set(re.findall(r'id="(hatch[^"]*)"', both))) == 2
+    assert len(set(re.findall(r'id="(stripes[^"]*)"', both))) == 2
 
 
 def test_what_the_picture_leaves_open_is_said() -> None:
@@ -154,7 +154,7 @@ def test_what_the_picture_leaves_open_is_said() -> None:
     at = {"z": number("3/2")}
     fixed = zones_chart(state, names, drawn, at, owner="controller", is_permissive=True).text
     assert "where z = 3/2" in texts(fixed)
-    assert "the strategy allows all that is hatched" in texts(fixed)
+    assert "where areas overlap, the strategy allows all of them" in texts(fixed)
     nothing = {"z": number(4)}
     empty = zones_chart(state, names, drawn, nothing, owner="environment", is_permissive=False)
     assert "there is no decision here" in texts(empty.text)
