@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ntagen import build as build
     from ntagen.checker import Answer, Model, RejectedError
     from ntagen.checker.strategy import Strategy
     from ntagen.drive.reading import read_log
@@ -51,6 +52,7 @@ _HOMES = {
     "Strategy": "ntagen.checker.strategy",
     "UndecidedError": "ntagen.errors",
     "animate": "ntagen.plot.face",
+    "build": "ntagen.build",
     "campaign": "ntagen.experiment.scripting",
     "load": "ntagen.loading",
     "load_strategy": "ntagen.loading",
@@ -68,7 +70,8 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     import importlib
 
-    return getattr(importlib.import_module(home), name)
+    module = importlib.import_module(home)
+    return module if home == f"{__name__}.{name}" else getattr(module, name)
 
 
 def __dir__() -> list[str]:

@@ -67,6 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.options", "checker.query_form", "checker.states"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
+    "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
     "serve": {"errors"},
     "needle": BASE,

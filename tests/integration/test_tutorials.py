@@ -10,6 +10,7 @@ from tests.tutorials import ROOT, agrees, follow, steps_of
 
 TUTORIALS = [
     ROOT / "README.md",
+    ROOT / "docs" / "building.md",
     ROOT / "docs" / "pictures.md",
     *sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md")),
 ]

@@ -1,0 +1,113 @@
+"""Places for what has none, by the layout of `ntagen.checker.picture`.
+
+A template without any place is laid out as a whole. If only some parts have none, these are laid
+out by themselves, below the others; what has a place keeps it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from ntagen.build.parts import Edge, Location, Point
+from ntagen.build.template import Template
+from ntagen.checker.picture import diagram
+from ntagen.checker.picture.layout import EDGE_LABELS, LOCATION_LABELS, placed
+
+_BELOW: Final = 102
+"""The distance of new parts from the lowest one that has a place."""
+
+
+def arranged(template: Template) -> diagram.Diagram:
+    """The template as a picture with a place for each part; its parts have the order of the lists.
+
+    The structure must be right: see `ntagen.build.structure`.
+    """
+    ids = {id(node): str(number) for number, node in enumerate(template.nodes)}
+    nodes = template.nodes
+    fixed = [node.position for node in nodes if node.position is not None]
+    drawn = diagram.Diagram(
+        template.name,
+        (template.parameters,) if template.parameters.strip() else (),
+        tuple(_location(one, ids, initial=one is template.initial) for one in template.locations),
+        tuple(
+            diagram.BranchPoint(ids[id(one)], _rounded(one.position))
+            for one in template.branch_points
+        ),
+        tuple(_edge(edge, ids) for edge in template.edges),
+    )
+    if fixed and len(fixed) < len(nodes):
+        drawn = _with_new_ones_below(drawn)
+    return placed(drawn)
+
+
+def _with_new_ones_below(drawn: diagram.Diagram) -> diagram.Diagram:
+    """The picture with places for the locations and branch points that have none."""
+    old = [node.position for node in drawn.nodes if node.position is not None]
+    new = {node.id for node in drawn.nodes if node.position is None}
+    part = placed(
+        replace(
+            drawn,
+            locations=tuple(one for one in drawn.locations if one.id in new),
+            branch_points=tuple(one for one in drawn.branch_points if one.id in new),
+            edges=tuple(one for one in drawn.edges if {one.source, one.target} <= new),
+        )
+    )
+    spots = {node.id: node.position for node in part.nodes if node.position is not None}
+    right = min(x for x, _ in old) - min(x for x, _ in spots.values())
+    down = max(y for _, y in old) + _BELOW - min(y for _, y in spots.values())
+    spots = {name: (x + right, y + down) for name, (x, y) in spots.items()}
+    return replace(
+        drawn,
+        locations=tuple(
+            replace(one, position=spots.get(one.id, one.position)) for one in drawn.locations
+        ),
+        branch_points=tuple(
+            replace(one, position=spots.get(one.id, one.position)) for one in drawn.branch_points
+        ),
+    )
+
+
+def _location(location: Location, ids: dict[int, str], *, initial: bool) -> diagram.Location:
+    return diagram.Location(
+        ids[id(location)],
+        location.name,
+        "committed" if location.committed else "urgent" if location.urgent else "normal",
+        initial,
+        location.invariant.strip(),
+        location.rate.strip(),
+        _rounded(location.position),
+        _labels(location),
+        location.color,
+    )
+
+
+def _edge(edge: Edge, ids: dict[int, str]) -> diagram.Edge:
+    return diagram.Edge(
+        ids[id(edge.source)],
+        ids[id(edge.target)],
+        edge.controllable,
+        edge.select.strip(),
+        edge.guard.strip(),
+        edge.sync.strip(),
+        edge.update.strip(),
+        edge.weight.strip(),
+        tuple((round(x), round(y)) for x, y in edge.nails),
+        _labels(edge),
+        edge.color,
+    )
+
+
+def _labels(part: Location | Edge) -> dict[diagram.LabelKind, diagram.Point]:
+    """Where the labels are drawn that pictures show."""
+    kinds = LOCATION_LABELS if isinstance(part, Location) else EDGE_LABELS
+    return {
+        kind: (round(x), round(y))
+        for kind in kinds
+        if kind in part.labels
+        for x, y in [part.labels[kind]]
+    }
+
+
+def _rounded(position: Point | None) -> diagram.Point | None:
+    return None if position is None else (round(position[0]), round(position[1]))
