@@ -12,7 +12,7 @@ import click
 from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limits
 from ntagen.cli.models import include_option, rank_option
-from ntagen.cli.plot_models import KINDS, MODELS, Wish, plot_model
+from ntagen.cli.plot_models import KINDS, LIMITED, MODELS, Wish, plot_model
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 _MCAP_MAGIC: Final = b"\x89MCAP"
 _LIMITS: Final = limits(default="none for a model; of an environment, what drive { … } says")
-_LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
 
 
 @click.command(
@@ -112,8 +111,8 @@ def command(
     regions and paths on and off, and step through the time of a run. It needs no network.
 
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
-    of a query, what the strategy of a game does over two clocks (--as zones), or the states of a
-    small model (--as states), in a file that ends in .svg.
+    of a query, what the strategy of a game does over two clocks (--as zones), the templates
+    (--as templates), or the states of a small model (--as states), in a file that ends in .svg.
 
     \b
     Examples:
@@ -144,11 +143,11 @@ def command(
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
-        say_idle(_LIMITED, "here: nothing is searched for in the log of a run")
+        say_idle(LIMITED, "here: nothing is searched for in the log of a run")
         say_idle({"tree_path": "--strategy"}, "here: the log of a run contains its strategy")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
-        say_idle({"ranking": "--rank", "tree_path": "--strategy"} | _LIMITED, "with --plans 0")
+        say_idle({"ranking": "--rank", "tree_path": "--strategy"} | LIMITED, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     format_of(path, PICTURES)
     require_apart({"-o": path}, {"source": source})

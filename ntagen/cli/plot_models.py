@@ -27,13 +27,17 @@ KINDS: Final = {
     "gantt": "the trace of a query as a chart, where each process is when",
     "sequence": "the trace, and what passes between the processes",
     "zones": "what the strategy of a game does over two clocks, in one state",
+    "templates": "the templates, as UPPAAL's editor shows them",
     "states": "the state space of a small model as a graph (.svg or .dot)",
     "discrete": "the same without clocks",
 }
 """The pictures of a model, each with what it shows."""
 
+LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
+"""The options that limit a search."""
+
 GRAPHS: Final = ("states", "discrete")
-"""Those that need no query."""
+"""Those that may be written for Graphviz, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +80,24 @@ def plot_model(source: Path, path: Path, wish: Wish, include: Sequence[Path]) ->
         say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
     with pointing_to_explanations(True):
         model = load_model(source, include).model
+        if is_graph or wish.kind == "templates":
+            drawn = "templates" if wish.kind == "templates" else "states"
+            say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
         if is_graph:
-            say_idle({"asked": "--query"}, f"with --as {wish.kind}: all states are drawn")
             space = model.state_space(timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes)
             space.save(path, clocks=wish.kind == "states")
             return
+        if wish.kind == "templates":
+            say_idle(LIMITED, "with --as templates: nothing is searched for")
+            _templates(model).save(path)
+            return
         _drawn(model, wish).save(path)
+
+
+def _templates(model: Model) -> Svg:
+    from ntagen.checker.picture.svg import draw_all
+
+    return draw_all(model.templates)
 
 
 def _drawn(model: Model, wish: Wish) -> Svg:

@@ -32,6 +32,7 @@ PICTURES: Final = {
     "gantt": "svg",
     "sequence": "svg",
     "zones": "svg",
+    "templates": "svg",
     "states": "svg",
     "discrete": "svg",
     "scene": "html",
@@ -283,7 +284,8 @@ def arguments_for(file: File, wish: dict[str, Any], limits: Limits) -> list[str]
                 return ["plot", path, *output, *(limited if file.kind != "run" else ())]
             at = wish.get("at")
             place = [f"--at={at}"] if picture == "zones" and isinstance(at, str) and at else []
-            asked = [] if picture in ("states", "discrete") else asked
+            asked = [] if picture in ("templates", "states", "discrete") else asked
+            limited = [] if picture == "templates" else limited
             return ["plot", path, "--as", picture, *asked, *place, *limited, *output]
     raise Refusal(400, f"{file.name} has no such answer or picture")
 

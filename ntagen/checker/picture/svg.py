@@ -7,6 +7,7 @@ environment and legs of branch points are dashed. Each kind of label has its own
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Final
@@ -22,7 +23,7 @@ from ntagen.checker.picture.layout import (
     text_height,
     text_width,
 )
-from ntagen.checker.picture.page import HEADING_HEIGHT, MARGIN, page, safe
+from ntagen.checker.picture.page import HEADING_HEIGHT, MARGIN, Svg, page, safe
 
 _COLORS: Final[dict[LabelKind, str]] = {
     "name": "#8b1a1a",
@@ -40,6 +41,7 @@ _FONT_SIZE: Final = 12
 _ARROW_LENGTH: Final = 9.0
 _ARROW_HALF_WIDTH: Final = 3.6
 _BEND_RADIUS: Final = 9.0
+_SIZE: Final = re.compile(r'<svg [^>]*?width="(\d+)" height="(\d+)"')
 _INITIAL_GAP: Final = 3.5
 """The distance between the two circles of the initial location."""
 
@@ -57,6 +59,22 @@ def draw(diagram: Diagram) -> str:
     height = bottom - top + 2 * MARGIN + HEADING_HEIGHT
     x, y = left - MARGIN, top - MARGIN - HEADING_HEIGHT
     return page((x, y, width, height), heading, _body(drawn), _FONT_SIZE)
+
+
+def draw_all(diagrams: Sequence[Diagram]) -> Svg:
+    """Draws templates below each other; lengths are as in `draw`."""
+    parts, width, bottom = [], 0.0, 0.0
+    for diagram in diagrams:
+        text = draw(diagram)
+        found = _SIZE.match(text)
+        if found is None:
+            raise ValueError("a picture begins with its size")
+        parts.append(text.replace("<svg ", f'<svg y="{bottom:.0f}" ', 1))
+        width, bottom = max(width, float(found[1])), bottom + float(found[2])
+    return Svg(
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{bottom:.0f}" '
+        f'viewBox="0 0 {width:.0f} {bottom:.0f}">\n{"".join(parts)}</svg>\n'
+    )
 
 
 def _heading(diagram: Diagram) -> str:

@@ -178,6 +178,7 @@ def test_pictures_are_drawn(server: Server) -> None:
         ({"picture": "gantt", "query": "E<> Main.Won"}, b"Main.Middle from"),
         ({"picture": "zones", "query": "control: A<> Main.Won", "at": "Main.Middle"}, b"x >= 1"),
         ({"picture": "states"}, b"4 symbolic states"),
+        ({"picture": "templates"}, b"<title>Main</title>"),
     ):
         job = started(server, number, action="plot", **wish)
         assert ended(server, job)["picture"], wish

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from itertools import combinations, pairwise
+from pathlib import Path
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,7 +21,9 @@ from ntagen.checker.picture.layout import (
     text_height,
     text_width,
 )
+from ntagen.cli import main
 
+ROOT = Path(__file__).parents[4]
 SVG = "{http://www.w3.org/2000/svg}"
 
 XTA = """
@@ -155,3 +159,20 @@ def test_automatic_places_keep_locations_and_labels_apart(template: Template) ->
 @given(templates())
 def test_pictures_do_not_change_from_time_to_time(template: Template) -> None:
     assert template.svg() == template.svg()
+
+
+def test_templates_stand_below_each_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, path = ROOT / "examples" / "models" / "train_gate.xta", tmp_path / "templates.svg"
+    assert main(["plot", str(model), "--as", "templates", "-o", str(path), "--timeout", "3"]) == 0
+    assert "--timeout has no effect" in capsys.readouterr().err
+    whole = ET.fromstring(path.read_text("utf-8"))
+    inner = whole.findall(f"{SVG}svg")
+    titles = [one.findtext(f"{SVG}title") for one in inner]
+    assert titles == ["Train(const train id)", "Gate"]
+    first, second = inner
+    assert float(second.attrib["y"]) == float(first.attrib["height"])
+    total = sum(float(one.attrib["height"]) for one in inner)
+    assert float(whole.attrib["height"]) == total
+    assert float(whole.attrib["width"]) == max(float(one.attrib["width"]) for one in inner)
