@@ -40,7 +40,7 @@ COMMANDS: Final = {
     "play": "Play a timed game against a strategy.",
     "info": "Show what is in a model or an environment.",
     "explain": "Explain a diagnostic: what it means and how to fix it.",
-    "plot": "Draw a scene, its plans or a run.",
+    "plot": "Draw a scene, its plans, a run or a model.",
     "serve": "Show models, tasks and runs on a page in the browser.",
     "drive": "Steer a needle to the target and log the run.",
     "experiment": "Drive many simulated runs, and make a table of them.",

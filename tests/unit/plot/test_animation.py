@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import io
+import json
+import re
+import shutil
+import subprocess
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -19,7 +23,7 @@ from ntagen.nsl import load
 from ntagen.plot.animation import animation_of
 from ntagen.plot.picture import Moment, Picture
 from ntagen.plot.run import picture_of_plans
-from ntagen.plot.viewer import data_of
+from ntagen.plot.viewer import data_of, page_of
 from tests.steering import PAPER
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
@@ -120,6 +124,27 @@ def test_moving_regions_are_on_the_page_where_they_are() -> None:
             ]
             assert drawn == pytest.approx(motion.at_mm(float(time_s)), abs=0.05)
     assert [data["moments"][0]["t"], data["moments"][-1]["t"]] == [0.0, motion_of(scene).period_s]
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_page_moves_regions_as_the_breath_does() -> None:
+    scene = load(RIBS)
+    page = page_of(replace(picture_of_plans(scene, None, 0), clock_s=0.7)).text
+    function = re.search(r"^function displacement.*?^}", page, re.DOTALL | re.MULTILINE)
+    data = re.search(r'type="application/json">(.*?)</script>', page, re.DOTALL)
+    assert function is not None
+    assert data is not None
+    times_s = [-1.0, 0.0, 0.3, 1.9, 3.3, 4.0, 17.5]
+    script = (
+        f"const data = {data[1]};\n{function[0]}\nconsole.log(JSON.stringify(data.regions.map("
+        f"(region) => {times_s}.map((time) => displacement(region, time)))));"
+    )
+    done = subprocess.run(["node", "-"], input=script, capture_output=True, text=True, check=True)
+    for region, places in zip(scene.regions, json.loads(done.stdout), strict=True):
+        for time_s, place in zip(times_s, places, strict=True):
+            still = (0.0, 0.0, 0.0)
+            expected = still if region.motion is None else region.motion.at_mm(0.7 + time_s)
+            assert place == pytest.approx(expected, abs=0.05)
 
 
 def motion_of(scene: object) -> Motion:
