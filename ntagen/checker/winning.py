@@ -136,7 +136,9 @@ def _notes(
         notes.append("where areas overlap, the strategy allows all of them")
     if not any(area.zones for area in areas):
         notes.append("there is no decision here" if fixed else "there is no decision in this state")
-    notes.append("blank: no decision; play under the strategy does not get there")
+    notes.append(
+        "blank: no decision; play does not get there, or its owner does not win from there"
+    )
     return notes
 
 
