@@ -270,14 +270,16 @@ impl Lexer<'_> {
 
     fn symbol(&mut self) -> bool {
         let start = self.position;
-        if let Some(kind) = symbol_alone(self.text.as_bytes()[start]) {
+        let first = self.text.as_bytes()[start];
+        if let Some(kind) = symbol_alone(first) {
             self.position += 1;
             self.push(kind, start);
             return true;
         }
+        // Most symbols begin with another byte, which is sooner seen than that the rest differs.
         let found = SYMBOLS
             .iter()
-            .find(|(symbol, _)| self.follows(symbol))
+            .find(|(symbol, _)| symbol.as_bytes()[0] == first && self.follows(symbol))
             .copied();
         if let Some((symbol, kind)) = found {
             self.position += symbol.len();
