@@ -13,6 +13,7 @@ rotation about the heading, and a change of curvature adds that of the end of it
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,6 +24,7 @@ from ntagen.needle.vectors import add, combine, cross, rotate, scale, subtract
 from ntagen.scene import Pose, Vector
 
 _Array = NDArray[np.float64]
+_Indices = NDArray[np.intp]
 
 ENTRY = -1
 """The index of the entry in the tree of channels."""
@@ -120,24 +122,8 @@ class Placed:
         return 1.0 / self.curvature_per_mm
 
     def positions(self, along_mm: _Array) -> tuple[_Array, _Array]:
-        """Positions at these lengths from the beginning, and their derivatives.
-
-        Returns:
-            One row a place; one 3-row matrix a place, with one column for each unknown.
-        """
-        turned = self.curvature_per_mm * along_mm
-        half = 0.5 * turned
-        chord = along_mm * np.sinc(half / math.pi)
-        heading, bevel = np.array(self.start.heading), np.array(self.start.bevel)
-        ahead, aside = chord * np.cos(half), chord * np.sin(half)
-        places = np.array(self.start.position_mm) + ahead[:, None] * heading
-        places -= aside[:, None] * bevel
-        # Derivatives of both parts by the curvature's logarithm.
-        ahead_growth = along_mm * np.cos(turned) - ahead
-        aside_growth = along_mm * np.sin(turned) - aside
-        own = ahead_growth[:, None] * heading - aside_growth[:, None] * bevel
-        slopes = _moved(places, self.rotation, self.shift) + own[:, :, None] * self.growth
-        return places, slopes
+        """Positions at these lengths from the beginning, and their derivatives: see `positions`."""
+        return positions([self], np.zeros(len(along_mm), dtype=np.intp), along_mm)
 
     def directions(self, along_mm: float) -> tuple[Pose, _Array]:
         """The pose at a length from the beginning, and the derivative of its rotation vector."""
@@ -259,19 +245,46 @@ def place(
     return start, placed
 
 
+def positions(parts: Sequence[Placed], part_of: _Indices, along_mm: _Array) -> tuple[_Array, _Array]:
+    """Positions on stretches, and their derivatives; all at once, since each call of NumPy counts.
+
+    Args:
+        parts: The stretches.
+        part_of: By place: the index of its stretch.
+        along_mm: By place: its length from the beginning of the stretch.
+
+    Returns:
+        One row a place; one 3-row matrix a place, with one column for each unknown.
+    """
+    starts = [part.start for part in parts]
+    begins = np.array([start.position_mm for start in starts])[part_of]
+    headings = np.array([start.heading for start in starts])[part_of]
+    bevels = np.array([start.bevel for start in starts])[part_of]
+    turned = np.array([part.curvature_per_mm for part in parts])[part_of] * along_mm
+    half = 0.5 * turned
+    chord = along_mm * np.sinc(half / math.pi)
+    ahead, aside = chord * np.cos(half), chord * np.sin(half)
+    places = begins + ahead[:, None] * headings
+    places -= aside[:, None] * bevels
+    # Derivatives of both parts by the curvature's logarithm.
+    ahead_growth = along_mm * np.cos(turned) - ahead
+    aside_growth = along_mm * np.sin(turned) - aside
+    own = ahead_growth[:, None] * headings - aside_growth[:, None] * bevels
+    slopes = np.stack([part.shift for part in parts])[part_of]
+    growth = np.stack([part.growth for part in parts])[part_of]
+    rotation = np.stack([part.rotation for part in parts], axis=1)[:, part_of]
+    slopes += own[:, :, None] * growth[:, None, :]
+    # A place moves by ``w x place + v`` with each unknown.
+    x, y, z = places[:, 0, None], places[:, 1, None], places[:, 2, None]
+    slopes[:, 0] += rotation[1] * z - rotation[2] * y
+    slopes[:, 1] += rotation[2] * x - rotation[0] * z
+    slopes[:, 2] += rotation[0] * y - rotation[1] * x
+    return places, slopes
+
+
 def _turn_about(
     rotation: _Array, shift: _Array, unknown: int, axis: Vector, point_mm: Vector
 ) -> None:
     """Adds a rotation about an axis through a point to the derivatives by an unknown."""
     rotation[:, unknown] += axis
     shift[:, unknown] -= cross(axis, point_mm)
-
-
-def _moved(places: _Array, rotation: _Array, shift: _Array) -> _Array:
-    """How each place moves with each unknown: ``w x place + v``."""
-    x, y, z = places[:, 0, None], places[:, 1, None], places[:, 2, None]
-    moved = np.empty((len(places), 3, rotation.shape[1]))
-    moved[:, 0] = rotation[1] * z - rotation[2] * y
-    moved[:, 1] = rotation[2] * x - rotation[0] * z
-    moved[:, 2] = rotation[0] * y - rotation[1] * x
-    return np.asarray(moved + shift)

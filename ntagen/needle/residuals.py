@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, Channel, Placed, place
+from ntagen.needle.channels import ENTRY, Channel, Placed, place, positions
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.priors import Priors
 from ntagen.scene import Pose
@@ -47,7 +47,6 @@ class Problem:
         self._channels = channels
         self._priors = priors
         self._stds = stds
-        self._groups: list[tuple[int, int, _Array, _Array, _Array]] = []
         self._directed: list[tuple[int, int, float, Measurement]] = []
         places: dict[tuple[int, int], list[tuple[float, float, Measurement]]] = {}
         noises_mm = _noises_mm(readings, priors)
@@ -61,11 +60,16 @@ class Problem:
             places.setdefault(key, []).append((along_mm, noise_mm, reading.measurement))
             if reading.measurement.heading is not None:
                 self._directed.append((reading.channel, number, along_mm, reading.measurement))
-        for (channel_index, number), group in sorted(places.items(), key=lambda item: item[0]):
-            along, noise = (np.array([row[column] for row in group]) for column in (0, 1))
-            positions = np.array([measurement.position_mm for _, _, measurement in group])
-            self._groups.append((channel_index, number, along, positions, noise))
-        self._position_count = 3 * len(readings)
+        # Rows are in the order of the stretches.
+        ordered = sorted(places.items(), key=lambda item: item[0])
+        self._parts = [part for part, _ in ordered]
+        self._part_of = np.repeat(
+            np.arange(len(ordered), dtype=np.intp), [len(group) for _, group in ordered]
+        )
+        rows = [row for _, group in ordered for row in group]
+        self._along_mm = np.array([along_mm for along_mm, _, _ in rows])
+        self._noise_mm = np.array([noise_mm for _, noise_mm, _ in rows])
+        self._measured = np.array([measurement.position_mm for _, _, measurement in rows])
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
         """Residuals and derivatives."""
@@ -74,11 +78,12 @@ class Problem:
 
     def rms_mm(self, residuals: _Array) -> float:
         """Root mean square of the distances between measured and predicted positions."""
-        if not self._position_count:
+        count = 3 * len(self._noise_mm)
+        if not count:
             return 0.0
-        noise_mm = np.concatenate([np.repeat(group[-1], 3) for group in self._groups])
-        squares = float(np.sum((noise_mm * residuals[: self._position_count]) ** 2))
-        return math.sqrt(3.0 * squares / self._position_count)
+        noise_mm = np.repeat(self._noise_mm, 3)
+        squares = float(np.sum((noise_mm * residuals[:count]) ** 2))
+        return math.sqrt(3.0 * squares / count)
 
     def _evaluated(
         self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
@@ -87,10 +92,12 @@ class Problem:
             return begin if channel == ENTRY else placed[channel][number]
 
         residuals, slopes = [], []
-        for channel, number, along_mm, measured, noise_mm in self._groups:
-            expected, moved = part(channel, number).positions(along_mm)
-            residuals.append(((measured - expected) / noise_mm[:, None]).ravel())
-            slopes.append((moved / -noise_mm[:, None, None]).reshape(-1, len(unknowns)))
+        if self._parts:
+            parts = [part(*one) for one in self._parts]
+            expected, moved = positions(parts, self._part_of, self._along_mm)
+            residuals.append(((self._measured - expected) / self._noise_mm[:, None]).ravel())
+            moved /= -self._noise_mm[:, None, None]
+            slopes.append(moved.reshape(-1, len(unknowns)))
         for channel, number, along, measurement in self._directed:
             pose, rotation = part(channel, number).directions(along)
             seen_and_expected = (

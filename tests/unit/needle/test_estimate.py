@@ -143,13 +143,13 @@ def test_points_alone_give_the_pose_of_a_long_arc() -> None:
 
 def test_without_drift_the_curvature_is_one_for_all() -> None:
     # Numbers of the estimator with one curvature and numeric derivatives, before it had stretches,
-    # when it searched with tolerances of 1e-15.
+    # when it searched with tolerances of 1e-15. Today's stops within 0.001 standard deviations.
     errors = Errors(noise_mm=0.1, roll_rad=math.radians(1.0))
     estimate, _ = driven(PULLED, errors, seed=3)
-    assert estimate.tip.position_mm == pytest.approx(GOLDEN[0], abs=1e-6)
-    assert estimate.tip.bevel == pytest.approx(GOLDEN[1], abs=1e-6)
-    assert (estimate.radius_mm, estimate.radius_std_mm) == pytest.approx(GOLDEN[2], abs=1e-6)
-    assert estimate.rms_mm == pytest.approx(GOLDEN[3], abs=1e-6)
+    assert estimate.tip.position_mm == pytest.approx(GOLDEN[0], abs=1e-4)
+    assert estimate.tip.bevel == pytest.approx(GOLDEN[1], abs=1e-4)
+    assert (estimate.radius_mm, estimate.radius_std_mm) == pytest.approx(GOLDEN[2], abs=1e-4)
+    assert estimate.rms_mm == pytest.approx(GOLDEN[3], abs=1e-4)
 
 
 def test_the_derivatives_are_those_of_the_positions() -> None:
