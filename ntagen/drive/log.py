@@ -187,11 +187,12 @@ class Log:
         self._time_ns = round(record.time_s * 1e9)
         self._add(self._channels[type(record)], encode(record, self._sequence))
         self._sequence += 1
-        if self._is_due(record):
+        is_due = self._is_due(record)
+        if is_due:
             for topic, message in show_record(record):
                 self._show(topic, message)
         if self._shaft is not None:
-            for topic, message in self._shaft.show(record):
+            for topic, message in self._shaft.show(record, is_due=is_due):
                 self._show(topic, message)
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
         self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))

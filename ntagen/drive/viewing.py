@@ -132,8 +132,8 @@ class Shaft:
         self._depth_mm = 0.0
         self._shown: list[tuple[float, Vector]] = []
 
-    def show(self, record: Record) -> Shown:
-        """The line after a record, if it has changed by about a millimetre."""
+    def show(self, record: Record, *, is_due: bool = True) -> Shown:
+        """The line after a record, if it has changed by about a millimetre and is to be seen."""
         match record:
             case Measured():
                 self._depth_mm = record.depth_mm
@@ -145,7 +145,7 @@ class Shaft:
                 self._points[-1] = (self._depth_mm, record.position_mm)
             case _:
                 return
-        if self._points == self._shown:
+        if not is_due or self._points == self._shown:
             return
         self._shown = self._points.copy()
         update = SceneUpdate()
