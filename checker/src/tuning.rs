@@ -10,7 +10,7 @@ use std::fmt;
 macro_rules! parts {
     ($($name:ident: $says:literal;)*) => {
         /// Which heuristics are used. All are, unless one is switched off.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub struct Tuning {
             $(#[doc = $says] pub $name: bool,)*
         }

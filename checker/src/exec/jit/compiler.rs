@@ -10,13 +10,12 @@ use std::sync::{Arc, Mutex};
 
 use cranelift_module::FuncId;
 
-use crate::exec::optimise::Optimiser;
 use crate::ir::{Constants, Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
 use super::error::JitError;
 use super::needs::AllNeeds;
-use super::pool::{Pool, locked};
+use super::pool::{Key, Pool, locked};
 
 /// A compiled function as it is called from outside.
 #[derive(Clone, Copy, Debug)]
@@ -32,12 +31,12 @@ pub(super) struct Compiler {
     /// Owns the code.
     pool: Arc<Mutex<Pool>>,
     overflow: Overflow,
-    optimiser: Optimiser,
-    /// What the functions need as they were given.
+    tuning: Tuning,
+    functions: Vec<Function>,
+    constants: Constants,
+    /// What the functions need before they are optimised.
     needs: AllNeeds,
-    /// What the optimised functions need.
-    optimised_needs: AllNeeds,
-    /// The numbers in the pool of the optimised functions that are compiled.
+    /// The numbers in the pool of the functions that are compiled.
     numbers: Vec<Option<FuncId>>,
     /// How many instructions were compiled so far.
     compiled: usize,
@@ -48,9 +47,10 @@ impl Compiler {
         Ok(Compiler {
             pool: Pool::shared()?,
             overflow,
-            optimiser: Optimiser::tuned(tuning),
+            tuning,
+            functions: Vec::new(),
+            constants: Constants::default(),
             needs: AllNeeds::default(),
-            optimised_needs: AllNeeds::default(),
             numbers: Vec::new(),
             compiled: 0,
         })
@@ -59,7 +59,10 @@ impl Compiler {
     /// Takes over what was appended since: both arguments are the whole of it, and begin with what
     /// was given before.
     pub(super) fn extend(&mut self, functions: &[Function], constants: &Constants) {
-        self.optimiser.extend(functions, constants);
+        let known = self.functions.len();
+        self.functions.extend_from_slice(&functions[known..]);
+        self.numbers.resize(functions.len(), None);
+        self.constants = constants.clone();
     }
 
     /// How many instructions were compiled so far, counted after optimisation; those that another
@@ -71,8 +74,13 @@ impl Compiler {
     /// Whether a call of the function is likely to run so much that it should be compiled before
     /// the first one.
     pub(super) fn is_heavy(&mut self, function: FunctionId) -> bool {
-        let given = self.optimiser.given();
-        self.needs.of(given, function.0 as usize).are_heavy()
+        let needs = self.needs.of(&self.functions, function.0 as usize);
+        needs.are_heavy()
+    }
+
+    /// The entry of a function if it has native code, since another engine compiled an equal one.
+    pub(super) fn known(&mut self, function: FunctionId) -> Result<Option<NativeEntry>, JitError> {
+        self.entry(function, false)
     }
 
     /// Compiles a function that can be called from outside and all that it calls; `None` if it is
@@ -81,52 +89,63 @@ impl Compiler {
         &mut self,
         function: FunctionId,
     ) -> Result<Option<NativeEntry>, JitError> {
-        let given = self.optimiser.given();
-        let code = &given[function.0 as usize];
-        let needs = self.needs.of(given, function.0 as usize);
+        self.entry(function, true)
+    }
+
+    /// The entry of a function. One that nobody compiled is compiled now or has none.
+    fn entry(
+        &mut self,
+        function: FunctionId,
+        compiles: bool,
+    ) -> Result<Option<NativeEntry>, JitError> {
+        let root = function.0 as usize;
+        let code = &self.functions[root];
+        let needs = self.needs.of(&self.functions, root);
         if !is_callable(code) || !needs.are_modest() {
             return Ok(None);
         }
         let parameters = code.parameters;
-        let index = self.optimiser.optimised(function) as usize;
-        let needs = self.optimised_needs.of(self.optimiser.made(), index);
-        if !needs.are_modest() {
-            return Ok(None);
-        }
-        self.numbers.resize(self.optimiser.made().len(), None);
         let mut pool = locked(&self.pool);
         let before = pool.instructions();
-        for index in self.uncompiled_below(index) {
-            let numbers = &self.numbers;
-            let number_of = |callee: FunctionId| {
-                numbers[callee.0 as usize].expect("what a function calls is compiled before it")
+        for index in self.uncompiled_below(root) {
+            let key = Key::new(
+                &self.functions[index],
+                &self.numbers,
+                self.overflow,
+                self.tuning,
+            );
+            let number = match pool.known(&key, &self.constants) {
+                None if compiles => pool.compiled(key, &self.constants)?,
+                known => known,
             };
-            let optimised = &self.optimiser.made()[index];
-            let number = pool.compiled(optimised, number_of, self.overflow)?;
-            self.numbers[index] = Some(number);
+            if number.is_none() {
+                return Ok(None);
+            }
+            self.numbers[index] = number;
         }
         self.compiled += pool.instructions() - before;
-        let number = self.numbers[index].expect("the function was compiled now or before");
+        let number = self.numbers[root].expect("the function was compiled now or before");
         Ok(Some(NativeEntry {
             code: pool.address_of(number, parameters)?,
-            frame_words: needs.frame_words,
+            frame_words: pool.needs_of(number).frame_words,
         }))
     }
 
     /// The function and all that it calls, without those that are compiled; what is called comes
-    /// before its callers, as the optimiser numbers them.
+    /// before its callers.
     fn uncompiled_below(&self, root: usize) -> Vec<usize> {
-        let functions = self.optimiser.made();
-        let mut found = vec![false; functions.len()];
-        let mut pending = vec![root];
+        let mut found = vec![false; self.functions.len()];
+        let mut pending = vec![(root, false)];
         let mut order = Vec::new();
-        while let Some(index) = pending.pop() {
-            if self.numbers[index].is_none() && !std::mem::replace(&mut found[index], true) {
+        while let Some((index, is_left)) = pending.pop() {
+            if is_left {
                 order.push(index);
-                pending.extend(functions[index].callees().map(|callee| callee.0 as usize));
+            } else if self.numbers[index].is_none() && !std::mem::replace(&mut found[index], true) {
+                pending.push((index, true));
+                let callees = self.functions[index].callees();
+                pending.extend(callees.map(|callee| (callee.0 as usize, false)));
             }
         }
-        order.sort_unstable();
         order
     }
 }

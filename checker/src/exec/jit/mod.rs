@@ -2,7 +2,7 @@
 //!
 //! Functions that loop much are compiled before their first call ([`Jit::prepare`]). Any other
 //! function is interpreted until it has run for a while, and then optimised and compiled with all
-//! that it calls. A model with thousands of small guards pays for the few that matter, and a model
+//! that it calls; or once only, if another engine has compiled an equal one. A model with thousands of small guards pays for the few that matter, and a model
 //! that is solved at once for none. As interpreted and compiled code agree in everything, it makes
 //! no difference to results when this happens.
 //!
@@ -37,7 +37,7 @@ use super::{Context, Executor, Interpreter, ROUND_LIMIT, RunTimeError, Wraps, va
 
 pub use error::JitError;
 
-use compiler::Compiler;
+use compiler::{Compiler, NativeEntry};
 use pool::locked;
 use runtime::{NativeContext, result_of_status};
 
@@ -69,6 +69,14 @@ struct Entry {
     frame_words: AtomicUsize,
     /// How many instructions its calls have taken in the interpreter, or [`NEVER`].
     heat: AtomicU64,
+}
+
+impl Entry {
+    fn set(&self, native: NativeEntry) {
+        self.frame_words
+            .store(native.frame_words, Ordering::Relaxed);
+        self.code.store(native.code.cast_mut(), Ordering::Release);
+    }
 }
 
 impl Jit {
@@ -153,14 +161,22 @@ impl Jit {
         }
         let compiled = compiler.compile(function);
         if let Ok(Some(native)) = compiled {
-            entry
-                .frame_words
-                .store(native.frame_words, Ordering::Relaxed);
-            entry.code.store(native.code.cast_mut(), Ordering::Release);
+            entry.set(native);
         } else {
             entry.heat.store(NEVER, Ordering::Relaxed);
         }
         compiled.map(|_| ())
+    }
+
+    /// Takes over the native code of a function, if another engine compiled an equal one.
+    fn take_over(&self, function: FunctionId) {
+        let entry = &self.entries[function.0 as usize];
+        let mut compiler = locked(&self.compiler);
+        if entry.code.load(Ordering::Acquire).is_null()
+            && let Ok(Some(native)) = compiler.known(function)
+        {
+            entry.set(native);
+        }
     }
 
     /// Compiles those of the functions of which a single call runs so much that interpreting it
@@ -195,11 +211,14 @@ impl Jit {
         if heat == NEVER {
             return result;
         }
+        let is_first = heat == 0;
         let heat = heat + effort.instructions;
         entry.heat.store(heat, Ordering::Relaxed);
         if heat > self.hot_instructions {
             // A function that cannot be compiled stays interpreted, which gives the same results.
             let _ = self.compile_function(function);
+        } else if is_first {
+            self.take_over(function);
         }
         result
     }

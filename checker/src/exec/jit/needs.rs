@@ -42,7 +42,7 @@ impl Needs {
     }
 
     /// The needs of two functions of which one runs after the other.
-    fn then(self, other: Needs) -> Needs {
+    pub(super) fn then(self, other: Needs) -> Needs {
         Needs {
             frame_words: self.frame_words.max(other.frame_words),
             stack_bytes: self.stack_bytes.max(other.stack_bytes),
@@ -53,7 +53,7 @@ impl Needs {
     }
 
     /// The needs of a function, given those of all its calls together.
-    fn below(self, function: &Function) -> Needs {
+    pub(super) fn below(self, function: &Function) -> Needs {
         let instructions = function
             .blocks
             .iter()

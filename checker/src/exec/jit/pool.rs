@@ -6,12 +6,14 @@
 //!
 //! Invariants
 //! * Functions share native code only if all that it depends on is equal: registers, frame, all
-//!   instructions bit by bit, the code of what they call, and the rule for overflows. Constant
-//!   memory and states are reached through the context and the arguments of a call.
+//!   instructions bit by bit, the code of what they call, the rule for overflows, which heuristics
+//!   are used, and the words of constant memory that the optimiser has read. Else, constant memory
+//!   and states are reached through the context and the arguments of a call.
 //! * Code is never moved or freed while an engine holds its pool, which it keeps for life.
 //! * What a function calls is compiled before it.
 //!
-//! Cost: of a function that is known, that of comparing it.
+//! Cost: of a function that is known, that of comparing it as it was given: it is not optimised
+//! again.
 
 use std::collections::HashMap;
 use std::mem::ManuallyDrop;
@@ -24,9 +26,12 @@ use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
+use crate::exec::optimise::optimised;
 use crate::ir::{Function, FunctionId, Instruction, Overflow};
+use crate::tuning::Tuning;
 
 use super::error::JitError;
+use super::needs::Needs;
 use super::translate::{entry_signature, native_signature, translate, translate_entry};
 
 /// New engines begin a new pool after so many instructions, which take some megabytes.
@@ -42,7 +47,12 @@ pub(super) struct Pool {
     convention: CallConv,
     context: Context,
     builder_context: FunctionBuilderContext,
-    known: HashMap<Key, FuncId>,
+    /// By function as it was given: what was made of it, the last first to be tried.
+    known: HashMap<Key, Vec<Known>>,
+    /// By optimised function: its number. Functions that differ may become equal.
+    optimised: HashMap<Key, FuncId>,
+    /// What the functions need, with all that they call.
+    needs: HashMap<FuncId, Needs>,
     /// The entries of functions with parameters.
     entries: HashMap<FuncId, FuncId>,
     /// How many instructions were compiled.
@@ -51,12 +61,51 @@ pub(super) struct Pool {
     is_broken: bool,
 }
 
-/// What the code of a function depends on.
+/// What the code of a function depends on, but for constant memory.
 #[derive(PartialEq, Eq, Hash)]
-struct Key {
+pub(super) struct Key {
     overflow: Overflow,
+    tuning: Tuning,
     /// Without its name; it calls functions by their numbers in the pool.
     function: Function,
+}
+
+impl Key {
+    /// That of a function, given the numbers in the pool of what it calls.
+    pub(super) fn new(
+        function: &Function,
+        numbers: &[Option<FuncId>],
+        overflow: Overflow,
+        tuning: Tuning,
+    ) -> Key {
+        let mut function = Function {
+            name: String::new(),
+            registers: function.registers.clone(),
+            blocks: function.blocks.clone(),
+            ..*function
+        };
+        for block in &mut function.blocks {
+            for instruction in &mut block.instructions {
+                if let Instruction::Call { function, .. } = instruction {
+                    let number = numbers[function.0 as usize];
+                    let number = number.expect("what a function calls is compiled before it");
+                    function.0 = number.as_u32();
+                }
+            }
+        }
+        Key {
+            overflow,
+            tuning,
+            function,
+        }
+    }
+}
+
+/// What was made of a function.
+struct Known {
+    /// The words of constant memory that it depends on.
+    read: Vec<(u32, i32)>,
+    id: FuncId,
 }
 
 impl Pool {
@@ -108,6 +157,8 @@ impl Pool {
             convention,
             builder_context: FunctionBuilderContext::new(),
             known: HashMap::new(),
+            optimised: HashMap::new(),
+            needs: HashMap::new(),
             entries: HashMap::new(),
             instructions: 0,
             is_broken: false,
@@ -119,41 +170,48 @@ impl Pool {
         self.instructions
     }
 
-    /// The number of a function in the pool, which is compiled now if it is not known.
+    /// The number of a function in the pool, if it is known.
+    pub(super) fn known(&self, key: &Key, constants: &[i32]) -> Option<FuncId> {
+        let has = |&(offset, word): &(u32, i32)| constants.get(offset as usize) == Some(&word);
+        let mut known = self.known.get(key)?.iter().rev();
+        known.find(|one| one.read.iter().all(has)).map(|one| one.id)
+    }
+
+    /// Compiles a function that is not known; `None` if it is too large.
     ///
     /// Its code has an address only after [`Pool::address_of`].
-    ///
-    /// # Arguments
-    /// * `function`: an optimised function.
-    /// * `number_of`: the numbers in the pool of what it calls.
     pub(super) fn compiled(
         &mut self,
-        function: &Function,
-        number_of: impl Fn(FunctionId) -> FuncId,
-        overflow: Overflow,
-    ) -> Result<FuncId, JitError> {
-        let mut key = Key {
-            overflow,
-            function: Function {
-                name: String::new(),
-                ..function.clone()
-            },
-        };
-        for block in &mut key.function.blocks {
-            for instruction in &mut block.instructions {
-                if let Instruction::Call { function, .. } = instruction {
-                    function.0 = number_of(*function).as_u32();
-                }
+        key: Key,
+        constants: &[i32],
+    ) -> Result<Option<FuncId>, JitError> {
+        let (function, read) = optimised(key.function.clone(), constants, key.tuning);
+        let calls = function
+            .callees()
+            .map(|callee| self.needs_of(FuncId::from_u32(callee.0)));
+        let needs = calls.fold(Needs::default(), Needs::then).below(&function);
+        if !needs.are_modest() {
+            return Ok(None);
+        }
+        let made = Key { function, ..key };
+        let id = match self.optimised.get(&made) {
+            Some(&id) => id,
+            None => {
+                let defined = self.define(&made);
+                self.is_broken |= defined.is_err();
+                let id = defined?;
+                self.optimised.insert(made, id);
+                self.needs.insert(id, needs);
+                id
             }
-        }
-        if let Some(&id) = self.known.get(&key) {
-            return Ok(id);
-        }
-        let defined = self.define(&key);
-        self.is_broken |= defined.is_err();
-        let id = defined?;
-        self.known.insert(key, id);
-        Ok(id)
+        };
+        self.known.entry(key).or_default().push(Known { read, id });
+        Ok(Some(id))
+    }
+
+    /// What a function of the pool needs, with all that it calls.
+    pub(super) fn needs_of(&self, id: FuncId) -> Needs {
+        self.needs[&id]
     }
 
     /// The address of a function in the pool as it is called from outside: with the signature of an

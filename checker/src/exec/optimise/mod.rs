@@ -5,9 +5,9 @@
 //! round, and the kind and site of a run-time error stay what they were. Only rounds of loops that
 //! are written out are no longer counted.
 //!
-//! A function is optimised after the functions that it calls. Values are numbered, and loops of few
-//! rounds written out, innermost first. Calls stay calls: taking in the code of small functions
-//! gained 8 % on one member of the benchmarks, and nothing on others.
+//! A function is optimised by itself. Values are numbered, and loops of few rounds written out,
+//! innermost first. Calls stay calls: taking in the code of small functions gained 8 % on one member
+//! of the benchmarks, and nothing on others.
 //!
 //! Cost: about a microsecond an instruction of the result.
 
@@ -15,9 +15,9 @@ mod graph;
 mod numbering;
 mod unroll;
 
-use std::collections::BTreeMap;
+use rustc_hash::FxHashMap;
 
-use crate::ir::{Block, Constants, Function, FunctionId, Instruction};
+use crate::ir::{Block, Constants, Function};
 
 use super::rounds::count_rounds;
 use crate::tuning::Tuning;
@@ -27,121 +27,66 @@ const MAX_SIZE: usize = 1500;
 /// Larger functions are left as they are.
 const MAX_SIZE_TO_OPTIMISE: usize = 20_000;
 
-/// Optimises all functions of a program, which must not call each other thousands deep.
+/// Optimises all functions of a program.
 pub fn optimise(functions: &[Function], constants: impl Into<Constants>) -> Vec<Function> {
-    let mut optimiser = Optimiser::default();
-    optimiser.extend(functions, constants);
-    let numbers: Vec<u32> = (0..functions.len() as u32)
-        .map(|index| optimiser.optimised(FunctionId(index)))
-        .collect();
-    // Functions keep their numbers.
-    let mut position = vec![0; functions.len()];
-    for (index, &number) in numbers.iter().enumerate() {
-        position[number as usize] = index as u32;
-    }
-    let mut ordered: Vec<(u32, Function)> = position.iter().copied().zip(optimiser.made).collect();
-    ordered.sort_by_key(|(position, _)| *position);
-    let mut functions: Vec<Function> = ordered.into_iter().map(|(_, function)| function).collect();
-    for block in functions
-        .iter_mut()
-        .flat_map(|function| &mut function.blocks)
-    {
-        for instruction in &mut block.instructions {
-            if let Instruction::Call { function, .. } = instruction {
-                function.0 = position[function.0 as usize];
-            }
-        }
-    }
-    functions
+    let constants = constants.into();
+    let functions = functions.iter().cloned();
+    let optimised = functions.map(|one| optimised(one, &constants, Tuning::default()).0);
+    optimised.collect()
 }
 
-/// Optimises functions on demand.
-#[derive(Debug, Default)]
-pub(super) struct Optimiser {
-    functions: Vec<Function>,
-    constants: Constants,
+/// A function in a faster form, and the words of constant memory that it depends on, in order.
+///
+/// It depends on nothing else: where a program has the same function and these words, the result is
+/// the same.
+pub(super) fn optimised(
+    mut function: Function,
+    constants: &[i32],
     tuning: Tuning,
-    /// The optimised functions; calls in them refer to each other.
-    made: Vec<Function>,
-    /// By function: the number of the optimised one.
-    numbers: BTreeMap<FunctionId, u32>,
+) -> (Function, Vec<(u32, i32)>) {
+    let mut memory = ConstantMemory {
+        words: constants,
+        read: FxHashMap::default(),
+    };
+    improve(&mut function, &mut memory, tuning);
+    count_rounds(&mut function);
+    let mut read: Vec<(u32, i32)> = memory.read.into_iter().collect();
+    read.sort_unstable();
+    (function, read)
 }
 
-impl Optimiser {
-    /// One that knows no functions, with these heuristics only.
-    #[cfg(feature = "jit")]
-    pub(super) fn tuned(tuning: Tuning) -> Optimiser {
-        Optimiser {
-            tuning,
-            ..Optimiser::default()
-        }
-    }
+/// The constant memory, and what was read of it.
+struct ConstantMemory<'a> {
+    words: &'a [i32],
+    read: FxHashMap<u32, i32>,
+}
 
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
-    /// was given before.
-    pub(super) fn extend(&mut self, functions: &[Function], constants: impl Into<Constants>) {
-        let known = self.functions.len();
-        self.functions.extend_from_slice(&functions[known..]);
-        self.constants = constants.into();
+impl ConstantMemory<'_> {
+    fn word(&mut self, offset: u32) -> i32 {
+        let word = self.words[offset as usize];
+        self.read.insert(offset, word);
+        word
     }
+}
 
-    /// The functions as they were given.
-    #[cfg(feature = "jit")]
-    pub(super) fn given(&self) -> &[Function] {
-        &self.functions
+fn improve(function: &mut Function, constants: &mut ConstantMemory, tuning: Tuning) {
+    if size_of(function) > MAX_SIZE_TO_OPTIMISE {
+        return;
     }
-
-    /// The functions that were made so far.
-    #[cfg(feature = "jit")]
-    pub(super) fn made(&self) -> &[Function] {
-        &self.made
+    tidy(function, constants, tuning);
+    while tuning.unrolling && unroll::unroll_one(function, MAX_SIZE) {
+        tidy(function, constants, tuning);
     }
+}
 
-    /// The number of a function among those [made](Optimiser::made).
-    pub(super) fn optimised(&mut self, function: FunctionId) -> u32 {
-        if let Some(&number) = self.numbers.get(&function) {
-            return number;
-        }
-        let mut made = self.functions[function.0 as usize].clone();
-        self.improve(&mut made);
-        count_rounds(&mut made);
-        self.made.push(made);
-        let number = self.made.len() as u32 - 1;
-        self.numbers.insert(function, number);
-        number
-    }
-
-    fn improve(&mut self, function: &mut Function) {
-        self.optimise_calls(function);
-        if size_of(function) > MAX_SIZE_TO_OPTIMISE {
-            return;
-        }
-        self.tidy(function);
-        while self.tuning.unrolling && unroll::unroll_one(function, MAX_SIZE) {
-            self.tidy(function);
-        }
-    }
-
-    /// Numbers the values; once more if branches fell away, for then blocks can be joined.
-    fn tidy(&self, function: &mut Function) {
+/// Numbers the values; once more if branches fell away, for then blocks can be joined.
+fn tidy(function: &mut Function, constants: &mut ConstantMemory, tuning: Tuning) {
+    graph::clean(function);
+    if tuning.value_numbering && numbering::number_values(function, constants) {
         graph::clean(function);
-        if self.tuning.value_numbering && numbering::number_values(function, &self.constants) {
-            graph::clean(function);
-            numbering::number_values(function, &self.constants);
-        }
-        graph::clean(function);
+        numbering::number_values(function, constants);
     }
-
-    /// Lets calls refer to optimised functions.
-    fn optimise_calls(&mut self, function: &mut Function) {
-        for block in &mut function.blocks {
-            for instruction in &mut block.instructions {
-                if let Instruction::Call { function, .. } = instruction {
-                    function.0 = self.optimised(*function);
-                }
-            }
-        }
-    }
+    graph::clean(function);
 }
 
 /// How large a function is: its instructions, terminators included.

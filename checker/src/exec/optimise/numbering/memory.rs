@@ -15,7 +15,7 @@ const MAX_KNOWN_WORDS: usize = 1024;
 /// Copies of at most this number of words become loads and stores, which can be followed.
 pub(super) const MAX_WORDS_TO_EXPAND: u32 = 9;
 
-impl Numbering<'_> {
+impl Numbering<'_, '_> {
     pub(super) fn expand_copy(&mut self, target: Address, source: Address, words: u32) {
         for word in 0..words {
             let at = |address: Address| Address {
@@ -115,13 +115,13 @@ impl Numbering<'_> {
             return Simplified::Value(value);
         }
         if address.base == Base::Constants && address.index.is_none() {
-            let offset = address.offset as usize;
+            let first = self.constants.word(address.offset);
             return Simplified::Literal(match kind {
                 RegisterType::Double => Number::Double(arithmetic::double_of_words(
-                    self.constants[offset],
-                    self.constants[offset + 1],
+                    first,
+                    self.constants.word(address.offset + 1),
                 )),
-                _ => Number::Integer(self.constants[offset]),
+                _ => Number::Integer(first),
             });
         }
         Simplified::Instruction(instruction)

@@ -30,6 +30,7 @@ use crate::ir::{
     RegisterType, Terminator,
 };
 
+use super::ConstantMemory;
 use super::graph::{dominators, predecessors, targets_mut};
 
 use expressions::{Expression, expression_of};
@@ -39,7 +40,7 @@ use memory::MAX_WORDS_TO_EXPAND;
 const MAX_BLOCKS_TO_HAND_ON: usize = 500;
 /// Numbers the values of a [`super::graph::clean`] function over the given constant memory. Says
 /// whether branches fell away, so that cleaning up and numbering once more may find more.
-pub(super) fn number_values(function: &mut Function, constants: &[i32]) -> bool {
+pub(super) fn number_values(function: &mut Function, constants: &mut ConstantMemory) -> bool {
     let predecessors = predecessors(function);
     let dominators = dominators(function, &predecessors);
     let writes = count_writes(function);
@@ -102,8 +103,8 @@ enum Simplified {
     Instruction(Instruction),
 }
 
-struct Numbering<'a> {
-    constants: &'a [i32],
+struct Numbering<'a, 'c> {
+    constants: &'a mut ConstantMemory<'c>,
     registers: Vec<RegisterType>,
     /// The value of a register that is written once.
     replacements: Vec<Register>,
@@ -122,7 +123,7 @@ struct Numbering<'a> {
     has_decided: bool,
 }
 
-impl Numbering<'_> {
+impl Numbering<'_, '_> {
     fn walk(&mut self, function: &mut Function, predecessors: &[Vec<usize>], dominators: &[usize]) {
         let count = function.blocks.len();
         let is_join: Vec<bool> = (0..count)

@@ -6,7 +6,7 @@ use crate::ir::{Instruction, IntegerOperator, Register, Relation};
 
 use super::{Numbering, Simplified};
 
-impl Numbering<'_> {
+impl Numbering<'_, '_> {
     pub(super) fn simplify(&mut self, instruction: Instruction) -> Simplified {
         match instruction {
             Instruction::Integer { value, .. } => Simplified::Literal(Number::Integer(value)),
