@@ -64,7 +64,7 @@ SOURCE: Final = "scene.nsl"
 TREE: Final = "against-tissue.json"
 STRATEGY: Final = "strategy.json.gz"
 
-VIEW_S: Final = 0.5
+VIEW_S: Final = 2.0
 """How often viewers see the needle in a log that is not kept up. Records are never left out."""
 
 _PLANS_LOGGED: Final = 200

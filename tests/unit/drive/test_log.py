@@ -26,7 +26,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
 from ntagen.cli import main
-from ntagen.drive.log import ACTUAL, Log, metadata_of, topic_of
+from ntagen.drive.log import ACTUAL, VIEW_S, Log, metadata_of, topic_of
 from ntagen.drive.messages import KINDS, decode, encode
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import (
@@ -185,11 +185,13 @@ def test_a_log_that_is_not_kept_up_shows_the_needle_seldom_and_has_all_records(
 
     watched = shown("watched.mcap", is_kept_up=True)
     alone = shown("alone.mcap", is_kept_up=False)
-    every_half_second = [0.5 * i for i in range(11)]
+    seldom_s = [VIEW_S * i for i in range(math.floor(0.125 * 40 / VIEW_S) + 1)]
     for topic in ("/needle/measured", "/needle/tip", "/tf"):
         assert watched[topic] == [0.125 * i for i in range(41)]
-        assert alone[topic] == every_half_second
-    assert alone["/scene"] == watched["/scene"]
+        assert alone[topic] == seldom_s
+    # The shaft has grown each time.
+    assert sorted({*alone["/scene"]}) == seldom_s
+    assert {*alone["/scene"]} < {*watched["/scene"]}
 
 
 def test_equal_runs_give_equal_files(tmp_path: Path) -> None:
