@@ -130,6 +130,20 @@ fn reader() -> Function {
     straight_line(1, &[Integer; 3], code, Some(2))
 }
 
+/// Adds a constant, which the optimiser reads: then the function is that of an [`adder`].
+fn adder_of_constant(offset: u32) -> Function {
+    let load = Instruction::LoadInteger {
+        target: Register(1),
+        address: Address {
+            base: Base::Constants,
+            offset,
+            index: None,
+        },
+    };
+    let sum = arithmetic(IntegerOperator::Add, [2, 0, 1], 3);
+    straight_line(1, &[Integer; 3], vec![load, sum], Some(2))
+}
+
 /// Calls the second function with what it was given, and keeps a word in its own frame meanwhile.
 fn caller(frame_words: u32) -> Function {
     let kept = Address {
@@ -210,6 +224,13 @@ fn programs() -> Vec<Program> {
         constants: vec![-1, -2, -3],
         ..Program::of(vec![reader()])
     });
+    for constants in [[5, 6, 7], [5, -2, 7], [-1, 6, -3], [5, 1, 7]] {
+        programs.push(Program {
+            constants: constants.to_vec(),
+            ..Program::of(vec![adder_of_constant(1)])
+        });
+    }
+    programs.push(Program::of(vec![adder_of_constant(0)]));
     programs
 }
 

@@ -46,12 +46,24 @@ pub(crate) fn engines(
             "compiled code",
             Box::new(compiled(functions, constants, overflow)),
         ),
+        // The engine before has compiled it, and this one has not.
+        #[cfg(feature = "jit")]
+        (
+            "shared code",
+            Box::new(sharing(functions, constants, overflow)),
+        ),
     ]
 }
 
 #[cfg(feature = "jit")]
 fn compiled(functions: &[Function], constants: &[i32], overflow: Overflow) -> checker::exec::Jit {
     checker::exec::Jit::compile(functions, constants, overflow).expect("the host is supported")
+}
+
+#[cfg(feature = "jit")]
+fn sharing(functions: &[Function], constants: &[i32], overflow: Overflow) -> checker::exec::Jit {
+    let jit = checker::exec::Jit::with_overflow(functions, constants, overflow);
+    jit.expect("the host is supported")
 }
 
 /// Calls a function on one engine.
