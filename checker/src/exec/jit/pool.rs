@@ -194,16 +194,15 @@ impl Pool {
             return Ok(None);
         }
         let made = Key { function, ..key };
-        let id = match self.optimised.get(&made) {
-            Some(&id) => id,
-            None => {
-                let defined = self.define(&made);
-                self.is_broken |= defined.is_err();
-                let id = defined?;
-                self.optimised.insert(made, id);
-                self.needs.insert(id, needs);
-                id
-            }
+        let id = if let Some(&id) = self.optimised.get(&made) {
+            id
+        } else {
+            let defined = self.define(&made);
+            self.is_broken |= defined.is_err();
+            let id = defined?;
+            self.optimised.insert(made, id);
+            self.needs.insert(id, needs);
+            id
         };
         self.known.entry(key).or_default().push(Known { read, id });
         Ok(Some(id))
