@@ -154,6 +154,12 @@ impl SourceMap {
         }
     }
 
+    /// The bytes of the file that a span stands for.
+    pub fn file_range(&self, span: Span) -> Range<usize> {
+        let source = self.get(span.source);
+        source.file_offset(span.start) as usize..source.file_offset(span.end) as usize
+    }
+
     /// The text that a span covers.
     pub fn text(&self, span: Span) -> &str {
         self.get(span.source)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ntagen import _checker
 from ntagen.checker.answer import Answer
+from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
 from ntagen.checker.options import CodeEngine, Options, by_keywords
@@ -169,6 +170,35 @@ class Model:
     def load_seconds(self) -> float:
         """The seconds that loading took, and compiling the code once a query was checked."""
         return self._raw.load_seconds
+
+    @property
+    def text(self) -> str:
+        """The text that was loaded: UPPAAL XML or XTA."""
+        return self._raw.text
+
+    def with_constants(
+        self, values: Mapping[str, Value] | None = None, /, **named: Value
+    ) -> Model:
+        """The same model with other values of some of its constants, loaded again.
+
+        Sizes, ranges and instances that depend on them follow. This model stays as it is. A sweep::
+
+            for n in range(2, 8):
+                print(n, model.with_constants(N=n).check("A[] not deadlock"))
+
+        Args:
+            values: By name. That of a constant in a template is ``"Train.LENGTH"``.
+            named: The same, for names without a dot. A value is a number, the text of an
+                expression, or lists (of arrays) and mappings (of structs) of them.
+
+        Raises:
+            RejectedError: There is no such constant, or the model is wrong with these values.
+            TypeError, ValueError: A value is none that a constant can have.
+        """
+        wanted = {**(values or {}), **named}
+        with rejecting():
+            raw = self._raw.with_constants([(name, written(one)) for name, one in wanted.items()])
+        return Model(raw)
 
     def read_queries(self, path: Path) -> tuple[Query, ...]:
         """Reads a ``.q`` file.

@@ -7,9 +7,10 @@ use std::time::Instant;
 
 use super::code::PreparedCode;
 use super::codes;
+use super::constants;
 use super::options::{CodeEngine, Options};
 use super::rejection::Rejection;
-use crate::diagnostics::{Diagnostic, SourceMap, Span};
+use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
 use crate::exec::Executor;
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
@@ -25,6 +26,10 @@ pub struct LoadedModel {
     pub(super) model: Model,
     pub(super) sources: SourceMap,
     pub(super) templates: Vec<Template>,
+    /// The file as the user named it.
+    path: String,
+    /// The text of the file.
+    text: Text,
     /// The folder of the file.
     pub(super) folder: PathBuf,
     /// The strategies that queries defined, in the order of their definition.
@@ -63,6 +68,8 @@ impl LoadedModel {
             model,
             sources,
             templates: parsed.document.templates,
+            path: path.to_owned(),
+            text: parsed.text,
             folder: Path::new(path)
                 .parent()
                 .map(Path::to_owned)
@@ -74,6 +81,19 @@ impl LoadedModel {
             load_seconds,
             code: None,
         })
+    }
+
+    /// The same model with other values of some of its constants: see [`constants::replaced`].
+    pub fn with_constants(&self, values: &[(String, String)]) -> Result<LoadedModel, Rejection> {
+        let text = constants::replaced(&self.path, &self.text, values)?;
+        let mut model = LoadedModel::load(&self.path, text)?;
+        model.set_overflow(self.model.network.overflow);
+        Ok(model)
+    }
+
+    /// The text of the model.
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// The network.

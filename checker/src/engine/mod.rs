@@ -7,6 +7,7 @@ pub mod answer;
 mod check;
 mod code;
 pub mod codes;
+mod constants;
 pub mod evidence;
 pub mod format;
 pub mod limits;

@@ -93,6 +93,20 @@ impl Model {
         self.with(|model| model.warnings.clone())
     }
 
+    /// The text of the file.
+    #[getter]
+    fn text(&self) -> String {
+        self.with(|model| model.text().to_owned())
+    }
+
+    /// The same model with other values of some of its constants.
+    fn with_constants(slf: &Bound<'_, Self>, values: Vec<(String, String)>) -> PyResult<Model> {
+        let model = slf.get();
+        let load = || model.with(|model| model.with_constants(&values));
+        let inner = Mutex::new(until_signal(slf.py(), load)?.map_err(rejected)?);
+        Ok(Model { inner })
+    }
+
     /// What happens where results of integer arithmetic do not fit: "wrap" or "error".
     #[getter]
     fn overflow(&self) -> &'static str {

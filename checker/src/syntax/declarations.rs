@@ -276,7 +276,7 @@ impl Parser<'_> {
         });
     }
 
-    fn initialiser(&mut self) -> Initialiser {
+    pub(super) fn initialiser(&mut self) -> Initialiser {
         if self.at(TokenKind::Table) {
             let table = self.bump();
             return Initialiser::Table(self.span_of(table));

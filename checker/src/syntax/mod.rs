@@ -56,6 +56,8 @@ mod prelude;
 mod print;
 
 use codes::MOST_MISTAKES;
+use keywords::Dialect;
+use parser::Parser;
 
 use crate::diagnostics::{Diagnostic, Source, SourceMap, Span, Text};
 
@@ -66,6 +68,8 @@ pub use tables::{Piece, TableReader};
 
 /// A model as read: the tree is complete where no diagnostic says otherwise.
 pub struct Parsed {
+    /// The text, whatever its encoding was.
+    pub text: Text,
     /// The tree.
     pub document: ast::Document,
     /// What is wrong, by source and place in it.
@@ -76,19 +80,38 @@ pub struct Parsed {
 /// textual model, in the old syntax if it uses what only that one has.
 pub fn read_model(path: &str, bytes: impl Into<Vec<u8>>, sources: &mut SourceMap) -> Parsed {
     let mut diagnostics = Vec::new();
-    let document = match encoding::decode_model(path, bytes.into(), sources, &mut diagnostics) {
-        Some(text) if text.trim_start().starts_with('<') => {
-            xml::read(path, &text.into(), sources, &mut diagnostics)
-        }
-        Some(text) => xta::read(path, text, sources, &mut diagnostics),
-        None => ast::Document::default(),
+    let decoded = encoding::decode_model(path, bytes.into(), sources, &mut diagnostics);
+    let text = Text::from(decoded.unwrap_or_default());
+    let document = if text.is_empty() {
+        ast::Document::default()
+    } else if is_xml(&text) {
+        xml::read(path, &text, sources, &mut diagnostics)
+    } else {
+        xta::read(path, text.clone(), sources, &mut diagnostics)
     };
     diagnostics.sort_by_key(|diagnostic| (diagnostic.span.source, diagnostic.span.start));
     limit(&mut diagnostics);
     Parsed {
+        text,
         document,
         diagnostics,
     }
+}
+
+/// Whether the text of a model is XML.
+pub fn is_xml(text: &str) -> bool {
+    text.trim_start().starts_with('<')
+}
+
+/// Reads the initial value of a variable or constant, for what is wrong with it.
+pub fn read_value(span: Span, sources: &SourceMap) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    let mut parser = Parser::new(span, sources, Dialect::New, &mut diagnostics);
+    parser.initialiser();
+    if !parser.at_end() {
+        parser.expected("the end of the value");
+    }
+    diagnostics
 }
 
 /// Splits a `.q` file into the texts of its queries.

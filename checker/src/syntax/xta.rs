@@ -6,7 +6,7 @@ use super::keywords::{self, Dialect};
 use super::lexer::{Token, TokenKind, lex};
 use super::parser::Parser;
 use super::processes::{Part, query_texts};
-use crate::diagnostics::{Diagnostic, SourceMap, Span};
+use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
 
 /// How many tokens of a parameter list are looked at to tell the syntax.
 const LONGEST_PARAMETER_LIST: usize = 100;
@@ -14,7 +14,7 @@ const LONGEST_PARAMETER_LIST: usize = 100;
 /// Reads a textual model.
 pub(super) fn read(
     path: &str,
-    text: String,
+    text: Text,
     sources: &mut SourceMap,
     diagnostics: &mut Vec<Diagnostic>,
 ) -> Document {
