@@ -176,9 +176,7 @@ class Model:
         """The text that was loaded: UPPAAL XML or XTA."""
         return self._raw.text
 
-    def with_constants(
-        self, values: Mapping[str, Value] | None = None, /, **named: Value
-    ) -> Model:
+    def with_constants(self, values: Mapping[str, Value] | None = None, /, **named: Value) -> Model:
         """The same model with other values of some of its constants, loaded again.
 
         Sizes, ranges and instances that depend on them follow. This model stays as it is. A sweep::

@@ -19,6 +19,7 @@ from ntagen.cli.asked import is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
 from ntagen.cli.models import (
+    constant_option,
     include_option,
     load_model,
     pointing_to_explanations,
@@ -156,6 +157,7 @@ class _CheckCommand(click.Command):
 @rank_option("plans of an environment")
 @engine_options
 @overflow_rule()
+@constant_option()
 @include_option()
 def command(
     model_path: Path,
@@ -174,6 +176,7 @@ def command(
     ranking: str | None,
     given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
+    constants: dict[str, str],
     include: tuple[Path, ...],
 ) -> int:
     """Answer the queries of a model or an environment.
@@ -238,7 +241,7 @@ def command(
     shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
     outcomes: list[Outcome] = []
     with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
-        loaded = load_model(model_path, include, overflow)
+        loaded = load_model(model_path, include, overflow, constants)
         shown_already = len(loaded.model.warnings)
         todo = queries_of(loaded.model, asked, query_path)
         if loaded.task is not None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -35,6 +36,29 @@ def include_option() -> Decorator:
     )
 
 
+def constant_option() -> Decorator:
+    """The option ``--constant``: pairs of a name and a value."""
+
+    def pairs(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+        values = {}
+        for one in given:
+            name, sign, value = one.partition("=")
+            if not (name.strip() and sign and value.strip()):
+                raise click.BadParameter(f"{one!r} is not NAME=VALUE, such as N=4")
+            values[name.strip()] = value.strip()
+        return values
+
+    return click.option(
+        "--constant",
+        "constants",
+        metavar="NAME=VALUE",
+        multiple=True,
+        callback=pairs,
+        help="Give a constant of the model another value, such as N=4; that of a template is "
+        "TEMPLATE.NAME=VALUE. You can give this option several times.",
+    )
+
+
 def rank_option(what: str = "plans") -> Decorator:
     """The option ``--rank``."""
     return click.option(
@@ -47,16 +71,22 @@ def rank_option(what: str = "plans") -> Decorator:
     )
 
 
-def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wrap") -> Loaded:
+def load_model(
+    path: Path,
+    include: Sequence[Path],
+    overflow: OverflowRule = "wrap",
+    constants: Mapping[str, str] | None = None,
+) -> Loaded:
     """Loads the model of a file. Prints warnings to standard error.
 
     Args:
         path: The file.
         include: The folders below which an environment may include files, besides its own.
         overflow: What happens if a result of integer arithmetic does not fit into 32 bits.
+        constants: Other values for constants of the model.
 
     Raises:
-        InputError: The file is wrong.
+        InputError: The file or a value is wrong.
         OSError: The file cannot be read.
     """
     from ntagen.loading import load_file
@@ -64,6 +94,13 @@ def load_model(path: Path, include: Sequence[Path], overflow: OverflowRule = "wr
     loaded = load_file(path, include=include)
     if loaded.task is None:
         say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
+    if constants:
+        if loaded.task is not None:
+            raise InputError(
+                "--constant is for UPPAAL models, and an environment has none\n"
+                "hint: change the values in the environment itself"
+            )
+        loaded = replace(loaded, model=loaded.model.with_constants(constants))
     loaded.model.overflow = overflow
     show_warnings((*loaded.warnings, *loaded.model.warnings))
     return loaded

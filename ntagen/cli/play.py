@@ -12,7 +12,7 @@ import click
 
 from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limit_options
-from ntagen.cli.models import include_option, load_model, pointing_to_explanations
+from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.session import Session
@@ -69,6 +69,7 @@ DEFEATED: Final = 1
 @priority_rule("Whether priorities of channels and processes count.  [default: ignore]")
 @overflow_rule()
 @limit_options("--query")
+@constant_option()
 @include_option()
 def command(
     model_path: Path,
@@ -83,6 +84,7 @@ def command(
     states: int | None,
     memory_bytes: int | None,
     timeout_s: float | None,
+    constants: dict[str, str],
     include: tuple[Path, ...],
 ) -> int:
     """Play a timed game against a strategy.
@@ -125,7 +127,7 @@ def command(
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
     with pointing_to_explanations(True):
-        model = load_model(model_path, include, overflow).model
+        model = load_model(model_path, include, overflow, constants).model
         if strategy_path:
             strategy = model.load_strategy(strategy_path, forced, priorities)
         else:

@@ -9,7 +9,7 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.models import include_option, load_model, pointing_to_explanations
+from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -40,6 +40,7 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
     "For strategies: whether priorities of channels and processes count. Give the rule that the "
     "strategy was made with.  [default: ignore]"
 )
+@constant_option()
 @include_option()
 @overflow_rule()
 def command(
@@ -47,6 +48,7 @@ def command(
     file: Path,
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
+    constants: dict[str, str],
     include: tuple[Path, ...],
     overflow: Any,  # noqa: ANN401
 ) -> int:
@@ -76,7 +78,7 @@ def command(
       ntagen verify game.xml win.json
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
-        loaded = load_model(model_path, include, overflow)
+        loaded = load_model(model_path, include, overflow, constants)
         text = _read(file)
         checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
     kind = _WITHOUT_RULES.match(text)

@@ -245,7 +245,9 @@ def place(
     return start, placed
 
 
-def positions(parts: Sequence[Placed], part_of: _Indices, along_mm: _Array) -> tuple[_Array, _Array]:
+def positions(
+    parts: Sequence[Placed], part_of: _Indices, along_mm: _Array
+) -> tuple[_Array, _Array]:
     """Positions on stretches, and their derivatives; all at once, since each call of NumPy counts.
 
     Args:
