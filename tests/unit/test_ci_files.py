@@ -7,8 +7,10 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 from ntagen.cli import main
 
@@ -82,3 +84,61 @@ def test_the_action_names_its_script_and_its_inputs() -> None:
     for name in ("models", "queries", "arguments"):
         assert f"{name.upper()}: ${{{{ inputs.{name} }}}}" in action
         assert f"${name.upper()}" in script or f"${{{name.upper()}:-}}" in script
+
+
+def release_jobs() -> dict[str, Any]:
+    """The jobs of the workflow that makes a release."""
+    text = (ROOT / ".github" / "workflows" / "release.yml").read_text()
+    jobs: dict[str, Any] = yaml.safe_load(text)["jobs"]
+    return jobs
+
+
+@pytest.mark.parametrize("name", ["run", "check_models.sh", "wheels", "try_wheel"])
+def test_scripts_can_be_read_and_run(name: str) -> None:
+    script = ROOT / ".ci" / name
+    assert os.access(script, os.X_OK)
+    subprocess.run(["bash", "-n", str(script)], check=True)
+
+
+def test_a_release_builds_each_target_of_the_script_once() -> None:
+    script = (ROOT / ".ci" / "wheels").read_text()
+    known = [
+        target for found in re.findall(r"targets=\(([^)\"]+)\)", script) for target in found.split()
+    ]
+    jobs = release_jobs()
+    built = [one["target"] for one in jobs["wheels"]["strategy"]["matrix"]["include"]]
+    assert sorted(built) == sorted(known)
+    assert len(set(built)) == 5
+    page = (ROOT / "docs" / "releasing.md").read_text()
+    assert all(f"`{target}`" in page for target in built)
+
+
+def test_a_release_tries_each_wheel_before_any_is_published() -> None:
+    jobs = release_jobs()
+    steps = [step["run"] for step in jobs["wheels"]["steps"] if "run" in step]
+    assert [step.split()[1] for step in steps] == [".ci/wheels", ".ci/try_wheel"]
+    assert (jobs["wheels"]["needs"], jobs["publish"]["needs"]) == ("sources", "wheels")
+    assert jobs["publish"]["if"] == "github.ref_type == 'tag'"
+
+
+def test_a_release_uses_the_maturin_of_development() -> None:
+    (pin,) = re.findall(r"^maturin==[\w.]+", (ROOT / "requirements-dev.lock").read_text(), re.M)
+    for name in (".ci/wheels", ".github/workflows/release.yml"):
+        assert re.findall(r"maturin==[\w.]+", (ROOT / name).read_text()) == [pin]
+
+
+def test_a_wheel_is_tried_without_the_package_beside_it() -> None:
+    # What the script copies is there, and the package itself is not among it.
+    script = (ROOT / ".ci" / "try_wheel").read_text().replace("\\\n", " ")
+    (copied,) = re.findall(r'^cp -r (.+) "\$folder/work"$', script, re.M)
+    assert "ntagen" not in copied.split()
+    assert all((ROOT / name).exists() for name in copied.split())
+    named = re.findall(r"\bexamples/[\w./]+", script + (ROOT / "README.md").read_text())
+    assert all((ROOT / name).exists() for name in named)
+
+
+def test_trying_nothing_is_refused() -> None:
+    found = subprocess.run(
+        ["bash", str(ROOT / ".ci" / "try_wheel")], capture_output=True, text=True, check=False
+    )
+    assert (found.returncode, found.stderr[:6]) == (2, "usage:")
