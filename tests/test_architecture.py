@@ -37,6 +37,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "render": BASE | {"files"},
     "files": {"errors", "system"},
     "frames": {"errors"},
+    "checker.constants": set(),
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
@@ -60,6 +61,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.query_form": {"_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
+    | {"checker.constants"}
     | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
