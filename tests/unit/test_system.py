@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import subprocess
 import sys
 import types
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from ntagen import system
+from ntagen.cli.operator import signalled_operator
 from ntagen.errors import InputError
 from ntagen.files import GrowingFile, open_file
 from ntagen.grbl.port import SerialPort
@@ -156,3 +158,12 @@ def test_the_cores_are_counted_where_they_cannot_be_chosen(monkeypatch: pytest.M
     assert system.core_count() == len(os.sched_getaffinity(0))
     monkeypatch.delattr(os, "sched_getaffinity")
     assert system.core_count() == os.cpu_count()
+
+
+def test_a_closed_terminal_ends_a_run() -> None:
+    assert system.HANG_UPS == (signal.SIGHUP,)
+    with signalled_operator() as operator:
+        signal.raise_signal(signal.SIGHUP)
+    assert operator.was_terminated
+    with pytest.raises(KeyboardInterrupt, match=r"the terminal was closed \(SIGHUP\)"):
+        operator.listen()
