@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from ntagen.errors import InputError, ModelError, NtagenError, UndecidedError
     from ntagen.experiment.scripting import campaign
     from ntagen.loading import load, load_strategy
+    from ntagen.nsl import Task
     from ntagen.plot.face import animate, view
     from ntagen.traces.face import match
 
@@ -32,6 +33,7 @@ __all__ = [
     "NtagenError",
     "RejectedError",
     "Strategy",
+    "Task",
     "UndecidedError",
     "animate",
     "campaign",
@@ -50,6 +52,7 @@ _HOMES = {
     "NtagenError": "ntagen.errors",
     "RejectedError": "ntagen.checker",
     "Strategy": "ntagen.checker.strategy",
+    "Task": "ntagen.nsl",
     "UndecidedError": "ntagen.errors",
     "animate": "ntagen.plot.face",
     "build": "ntagen.build",

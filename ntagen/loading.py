@@ -5,6 +5,7 @@ An environment (``.nsl``) is turned into a UPPAAL model first; the engine reads 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from ntagen.values import dataclass
 if TYPE_CHECKING:
     from ntagen.checker.strategy import Strategy
     from ntagen.nsl import Task
+    from ntagen.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,7 @@ class Loaded:
 
 
 def load(
-    source: str | Path,
+    source: str | Path | Scene | Task,
     *,
     include: Sequence[str | Path] = (),
     overflow: OverflowRule = "wrap",
@@ -44,7 +46,8 @@ def load(
 
     Args:
         source: A path to a file (UPPAAL XML or XTA, or an environment ``.nsl``), or the text of a
-            UPPAAL model. A string is a text if it has a line break, a ``;`` or a ``<``.
+            UPPAAL model. A string is a text if it has a line break, a ``;`` or a ``<``. A scene or
+            a task made in Python is checked as its text would be (`ntagen.Task.to_nsl`).
         include: Folders below which an environment may include files, besides its own folder.
         overflow: What happens if a result of integer arithmetic does not fit into 32 bits; see
             `Model.overflow`.
@@ -59,8 +62,10 @@ def load(
     """
     if isinstance(source, str) and any(sign in source for sign in "\n;<"):
         model = checker.load(source)
-    else:
+    elif isinstance(source, str | os.PathLike):
         model = load_file(Path(source), include=include).model
+    else:
+        model = _load_value(source).model
     model.overflow = overflow
     return model
 
@@ -90,9 +95,28 @@ def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
                 raise InputError(message) from None
             raise
     from ntagen.nsl import load_task
-    from ntagen.render import render
 
     task = load_task(path, include=include)
+    return _rendered(task, path)
+
+
+def _load_value(value: object) -> Loaded:
+    """Loads the model of a scene or a task that was made in Python."""
+    from ntagen.nsl import Task
+    from ntagen.scene import Scene
+
+    if not isinstance(value, Scene | Task):
+        raise InputError(
+            f"a {type(value).__name__} is no model\nhint: give a path, a text, a scene or a task"
+        )
+    task = (value if isinstance(value, Task) else Task(value)).checked()
+    return _rendered(task, Path(f"{task.scene.name}.nsl"))
+
+
+def _rendered(task: Task, path: Path) -> Loaded:
+    """The model of a task; `path` is the file of the environment, or what it might be called."""
+    from ntagen.render import render
+
     text = render(task.scene, source=path.name)
     model = checker.load(text, path=str(path.with_suffix(".xml")))
     return Loaded(model, task, tuple(warning.render() for warning in task.warnings))

@@ -313,6 +313,11 @@ class Scene:
             raise InputError(f"there is no safety `{self.safety}`\nhint: write sampled or swept")
         kinds = (self.targets, self.criticals, self.detections, self.unexplored, self.safe)
         for kind, regions in zip(_KINDS, kinds, strict=True):
+            if not isinstance(regions, tuple):
+                raise InputError(
+                    f"the {kind} regions are a {type(regions).__name__}, and a scene never "
+                    "changes\nhint: write them in parentheses, `(region,)`, or make a tuple of it"
+                )
             for region in regions:
                 if region.kind != kind:
                     raise InputError(

@@ -58,6 +58,32 @@ class Task:
     tracker: OpenIGTLinkTracker | None = None
     warnings: tuple[Diagnostic, ...] = ()
 
+    def to_nsl(self) -> str:
+        """The text of an environment file that describes the task, in the standard layout.
+
+        The text, loaded again, is the same scene, device, tracker and settings; turned shapes,
+        slanted directions and slanted ways may differ in their last digits.
+
+        Raises:
+            SourceError: The task breaks the rules for environments; the error has all mistakes,
+                each with the line of the text and the part of the task.
+            InputError: The language cannot say something of the task, such as a shape whose file is
+                not known or a name with a space.
+        """
+        from ntagen.nsl.writing import write
+
+        return write(self)[0]
+
+    def checked(self) -> Task:
+        """The task after the rules for environments were applied, with its warnings.
+
+        Raises:
+            SourceError, InputError: As in `to_nsl`.
+        """
+        from ntagen.nsl.writing import write
+
+        return write(self)[1]
+
 
 def load(path: str | Path, *, include: Sequence[str | Path] = ()) -> Scene:
     """The scene that a file describes.

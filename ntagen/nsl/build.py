@@ -21,7 +21,7 @@ from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, Placed
 from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
-from ntagen.nsl.vectors import dot, minus, times, unit
+from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
 from ntagen.parameters import Given
 from ntagen.scene import (
     DEFAULT_LENGTH_MM,
@@ -187,7 +187,8 @@ class _Builder:
             self._report_skew(heading, bevel, breach)
             return None
         # The rest of the skew, below the tolerance, goes into the bevel.
-        bevel = unit(minus(bevel, times(cosine, heading)))
+        if abs(cosine) > ROUNDING:
+            bevel = unit(minus(bevel, times(cosine, heading)))
         return Pose(position, heading, bevel)
 
     def _direction(self, keyword: str, default: Vector) -> Vector | None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from ntagen.scene import Vector
+
+ROUNDING: Final = 1e-15
+"""A length or a scalar product of unit vectors that is off by no more than this is exact."""
 
 
 def dot(a: Vector, b: Vector) -> float:
@@ -23,7 +27,12 @@ def times(factor: float, a: Vector) -> Vector:
 
 
 def unit(a: Vector) -> Vector:
-    """The vector of length 1 in the same direction; exact for directions along an axis."""
+    """The vector of length 1 in the same direction; exact for directions along an axis.
+
+    One that has this length but for rounding stays as it is: what was written out comes back.
+    """
+    if abs(math.hypot(*a) - 1.0) <= ROUNDING:
+        return a[0] + 0.0, a[1] + 0.0, a[2] + 0.0
     # Scaling first keeps the squares of very large and very small components in range.
     largest = max(map(abs, a))
     scaled = (a[0] / largest, a[1] / largest, a[2] / largest)
