@@ -72,8 +72,14 @@ class Template:
         """Adds a location; the keywords are its attributes, and `initial` makes it the first one.
 
         Raises:
-            InputError: There is a location with this name.
+            InputError: There is a location with this name, or another initial one.
         """
+        if initial and self.initial is not None:
+            raise InputError(
+                f"template {self.name}, location {name}: {self.initial.name or 'a location'} is "
+                "initial already\nhint: a template starts in one location; to change it, set "
+                "template.initial"
+            )
         if name and any(one.name == name for one in self.locations):
             raise InputError(
                 f"template {self.name} has a location {name} already\n"

@@ -76,6 +76,15 @@ def test_parts_that_say_something_else_are_not_equal(model: build.Model) -> None
         assert build.parse(other.xml()) == other != model
 
 
+def test_a_second_initial_location_is_refused_and_not_added() -> None:
+    template = build.Model().template("A")
+    first = template.location("First", initial=True)
+    with pytest.raises(InputError, match="template A, location Second: First is initial already"):
+        template.location("Second", initial=True)
+    assert template.initial is first
+    assert template.locations == [first]
+
+
 def test_what_exists_can_be_changed(model: build.Model) -> None:
     train = model["Train"]
     train["Coming"].invariant = "x <= 7"
