@@ -37,7 +37,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "render": BASE | {"files"},
     "files": {"errors", "system"},
     "frames": {"errors"},
-    "checker.constants": set(),
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
@@ -59,6 +58,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.story", "checker.strategy", "_checker"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.query_form": {"_checker"},
+    "checker.constants": set(),
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
     | {"checker.constants"}
@@ -72,6 +72,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
     "serve": {"errors"},
+    "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},
@@ -103,7 +104,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture", "system"}
-    | {"serve", "verifyta"}
+    | {"editor", "serve", "verifyta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},

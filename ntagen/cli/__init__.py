@@ -51,6 +51,7 @@ COMMANDS: Final = {
     "replay": "Repeat the decisions of a logged run and compare them.",
     "verifyta": "Stand in for UPPAAL's verifyta: its options, output and files.",
     "fmt": "Format environment files.",
+    "lsp": "Answer an editor about environment files.",
 }
 """The commands in the order of the help, each with its line there."""
 

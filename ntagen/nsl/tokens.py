@@ -150,7 +150,7 @@ _TERMINALS: Final = {
 
 _LEXER: Final = re.compile("|".join(f"(?P<{name}>{form})" for name, form in _TERMINALS.items()))
 
-_WORDS: Final = {
+WORDS: Final = {
     word: "REGION_KIND" if word in REGIONS else word.upper()
     for word in KEYWORDS | _OTHER_WORDS | _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
 }
@@ -196,7 +196,7 @@ def _lex(
         counted = start
         word, span = match[0], Span(source, start, match.end())
         if terminal == "NAME":
-            found.append(Token(_WORDS.get(word, terminal), word, span, line))
+            found.append(Token(WORDS.get(word, terminal), word, span, line))
         elif terminal in ("LINE_COMMENT", "BLOCK_COMMENT"):
             found.append(Comment(word.rstrip(), span, line))
         else:

@@ -1,0 +1,24 @@
+"""`ntagen lsp`: the language server for environments."""
+
+from __future__ import annotations
+
+import click
+
+from ntagen.errors import InputError
+
+
+@click.command("lsp")
+def command() -> None:
+    """Answer an editor about environments (.nsl), over standard input and output.
+
+    Editors start it; docs/editors.md says how to set up two of them. It speaks the language server
+    protocol: mistakes while you type, what words mean, completion, layout, names.
+    """
+    try:
+        from ntagen.editor.server import make_server
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"the language server needs the package {error.name}, which is not installed\n"
+            "hint: pip install 'ntagen[editor]'"
+        ) from None
+    make_server().start_io()
