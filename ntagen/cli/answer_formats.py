@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
-from xml.sax.saxutils import escape, quoteattr
 
 from ntagen.cli.outcomes import Mistake, Outcome, fault_of, mistakes_in, summary
 from ntagen.cli.terminal import echo, safe
@@ -175,6 +174,9 @@ def _case(path: str, name: str, tag: str, text: str, kind: str | None, seconds: 
         f"<testcase classname={_attribute(path)} name={_attribute(name)} "
         f'file={_attribute(path)} time="{seconds:.3f}"'
     )
+    # It imports what reads from the network, which takes longer than a small model.
+    from xml.sax.saxutils import escape
+
     return f"{start}>{tag}{escape(safe(text))}</{kind}></testcase>" if kind else f"{start}/>"
 
 
@@ -262,6 +264,8 @@ def _seconds(outcome: Outcome) -> float:
 
 
 def _attribute(text: str) -> str:
+    from xml.sax.saxutils import quoteattr
+
     return quoteattr(safe(text), {"\n": "&#10;"})
 
 
