@@ -119,7 +119,7 @@ fn known(document: &Document) -> String {
 fn variables(document: &Document) -> impl Iterator<Item = (String, &Variable)> {
     let of_system = document.system.items.iter().filter_map(|item| match item {
         SystemItem::Declaration(declaration) => Some(declaration),
-        _ => None,
+        SystemItem::Instantiation { .. } => None,
     });
     let outside = document.declarations.iter().chain(of_system);
     let outside = outside.map(|declaration| (String::new(), declaration));

@@ -102,7 +102,7 @@ impl Model {
     /// The same model with other values of some of its constants.
     fn with_constants(slf: &Bound<'_, Self>, values: Vec<(String, String)>) -> PyResult<Model> {
         let model = slf.get();
-        let load = || model.with(|model| model.with_constants(&values));
+        let load = move || model.with(|model| model.with_constants(&values));
         let inner = Mutex::new(until_signal(slf.py(), load)?.map_err(rejected)?);
         Ok(Model { inner })
     }

@@ -12,6 +12,7 @@ pub(crate) fn document(text: &str) -> Document {
     let Parsed {
         document,
         diagnostics,
+        ..
     } = read_model("model", text.as_bytes(), &mut sources);
     assert!(
         diagnostics.iter().all(|d| !d.is_error()),
