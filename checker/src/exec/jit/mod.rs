@@ -2,9 +2,10 @@
 //!
 //! Functions that loop much are compiled before their first call ([`Jit::prepare`]). Any other
 //! function is interpreted until it has run for a while, and then optimised and compiled with all
-//! that it calls; or once only, if another engine has compiled an equal one. A model with thousands of small guards pays for the few that matter, and a model
-//! that is solved at once for none. As interpreted and compiled code agree in everything, it makes
-//! no difference to results when this happens.
+//! that it calls; or once only, if another engine has compiled an equal one. A model with thousands
+//! of small guards pays for the few that matter, and a model that is solved at once for none. As
+//! interpreted and compiled code agree in everything, it makes no difference to results when this
+//! happens.
 //!
 //! Invariants
 //! * Compiled code is never moved or freed before the engine is dropped; queries that come later
