@@ -93,8 +93,8 @@ impl LoadedModel {
 
     /// The reachable states, breadth first, the fewest moves first, at most `limits.states` of
     /// them; and what stopped the search, if they are not all. A state that an earlier one contains
-    /// is left out. Zones are extrapolated by the constants of the model. With `has_links`, also all
-    /// moves between these states.
+    /// is left out. Zones are extrapolated by the constants of the model. With `has_links`, also
+    /// all moves between these states.
     pub fn reached(&self, limits: Limits, has_links: bool) -> Result<Space, Failure> {
         let network = self.network();
         let abstraction = if has_differences(network, &[]) {

@@ -6,8 +6,8 @@
 //! are written out are no longer counted.
 //!
 //! A function is optimised by itself. Values are numbered, and loops of few rounds written out,
-//! innermost first. Calls stay calls: taking in the code of small functions gained 8 % on one member
-//! of the benchmarks, and nothing on others.
+//! innermost first. Calls stay calls: taking in the code of small functions gained 8 % on one
+//! member of the benchmarks, and nothing on others.
 //!
 //! Cost: about a microsecond an instruction of the result.
 
