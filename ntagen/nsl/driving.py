@@ -132,10 +132,10 @@ class DriverResolver:
             # Dimensions are computed per rad; controllers and people count per degree.
             steps *= RAD_PER["deg"]
         letter = Placed(statement.letter.text, statement.letter.span)
-        draft.devices["device"].axes[statement.keyword] = (
-            letter,
-            Placed(steps, statement.steps.span),
-        )
+        device = draft.devices.get("device")
+        # Without one, the statement before the braces has a mistake, which was reported.
+        if device is not None:
+            device.axes[statement.keyword] = (letter, Placed(steps, statement.steps.span))
 
     def tracker(self, statement: tree.Tracker, draft: Draft) -> None:
         """A tracker."""
