@@ -8,12 +8,22 @@ from ntagen.errors import InputError
 
 
 @click.command("lsp")
+@click.option(
+    "--stdio",
+    is_flag=True,
+    expose_value=False,
+    help="Talk over standard input and output. It is the only way; some editors write this option.",
+)
 def command() -> None:
     """Answer an editor about environments (.nsl), over standard input and output.
 
     Editors start it; docs/editors.md says how to set up two of them. It speaks the language server
     protocol: mistakes while you type, what words mean, completion, layout, names.
-    """
+
+    \b
+    Example (an editor writes it):
+      ntagen lsp --stdio
+    """  # noqa: D301  click wants the control character
     try:
         from ntagen.editor.server import make_server
     except ModuleNotFoundError as error:

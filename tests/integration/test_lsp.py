@@ -161,7 +161,9 @@ def test_mistakes_of_included_files_stand_in_these_files(tmp_path: Path) -> None
 
 def test_the_server_ends_with_its_client() -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "ntagen", "lsp"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-m", "ntagen", "lsp", "--stdio"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     ) as process:
         assert process.stdin is not None
         process.stdin.close()
