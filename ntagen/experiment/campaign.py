@@ -13,9 +13,12 @@ from ntagen.experiment.description import Experiment
 from ntagen.experiment.identity import identity
 from ntagen.experiment.making import Block
 from ntagen.experiment.record import Run
-from ntagen.experiment.results import Campaign, campaign_of
+from ntagen.experiment.results import Campaign
+from ntagen.experiment.sections import Sections
 from ntagen.experiment.store import finished, finished_in, taken
 from ntagen.experiment.table import document_of
+from ntagen.nsl import load
+from ntagen.scene import Scene
 
 _DEATHS: Final = 2
 """A run that kills its worker so often is given up."""
@@ -79,12 +82,21 @@ def carry_out(
     """
     folder = folder.absolute()
     with taken(folder, experiment, resume=resume):
-        work = _Work(experiment, folder, logs, notify, finished(folder, experiment))
-        work.make(crew_of)
-        document = document_of(experiment, work.runs, work.lost)
-        made = campaign_of(document, experiment, folder)
+        scenes = _scenes_of(experiment)
+        with Sections(experiment, scenes) as sections:
+            runs = finished(folder, experiment)
+            work = _Work(experiment, folder, logs, notify, sections, runs)
+            work.make(crew_of)
+            document = document_of(experiment, work.runs, work.lost)
+            made = Campaign(document, folder, scenes, sections.texts())
         made.write()
     return made
+
+
+def _scenes_of(experiment: Experiment) -> dict[str, Scene]:
+    """The scene of each row, by the name of the row."""
+    scenes = {path: load(path) for path in {row.scenario for row in experiment.rows}}
+    return {row.id: scenes[row.scenario] for row in experiment.rows}
 
 
 @dataclass(slots=True)
@@ -95,9 +107,11 @@ class _Work:
     folder: Path
     logs: bool
     notify: Callable[[Progress], None]
+    sections: Sections
     runs: dict[Key, Run]
     lost: dict[Key, str] = field(default_factory=dict)
     deaths: Counter[Key] = field(default_factory=Counter)
+    missing: Counter[str] = field(default_factory=Counter)
     before: int = 0
     reached: int = 0
     hits: int = 0
@@ -105,6 +119,7 @@ class _Work:
     def make(self, crew_of: Callable[[], Crew]) -> None:
         """Makes what is missing."""
         self.before = len(self.runs)
+        self.missing.update({row.id: len(row.seeds) for row in self.experiment.rows})
         self._count(self.runs.values())
         self._tell()
         if self.before == self.experiment.runs:
@@ -145,10 +160,16 @@ class _Work:
         self._tell()
 
     def _count(self, runs: Iterable[Run]) -> None:
-        """Counts new runs: to count all of them after each block would take ever longer."""
+        """Counts new runs: to count all of them after each block would take ever longer.
+
+        The section of a row is drawn with its last run.
+        """
         for run in runs:
             self.reached += run.is_reached
             self.hits += run.is_hit
+            self.missing[run.row] -= 1
+            if not self.missing[run.row]:
+                self.sections.draw(run.row, self.runs)
 
     def _left_by_death(self, block: Block) -> list[Block]:
         """What is left of a block whose worker died: the run at which it died is the first one."""

@@ -29,18 +29,24 @@ h2 { margin-top: 2.5rem; border-bottom: 2px solid #e2e5ea; }
 """
 
 
-def report_of(document: Mapping[str, Any], scenes: Mapping[str, Scene]) -> str:
+def report_of(
+    document: Mapping[str, Any],
+    scenes: Mapping[str, Scene],
+    sections: Mapping[str, str] | None = None,
+) -> str:
     """The report as a page that needs no other file.
 
     Args:
         document: The table.
         scenes: The scene of each row, by the name of the row; a row without one has no picture of
             where regions were felt.
+        sections: The sections that are drawn already (`section_of`), by the name of the row.
     """
-    name = html.escape(document["name"])
+    drawn = sections or {}
+    title = html.escape(document["name"])
     parts = [
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{name}</title>',
-        f"<style>{_STYLE}</style></head><body><h1>{name}</h1>",
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
+        f"<style>{_STYLE}</style></head><body><h1>{title}</h1>",
         table_of(document),
         f'<p class="note">{html.escape(NOTE)}</p>',
         *_lost(document),
@@ -49,11 +55,26 @@ def report_of(document: Mapping[str, Any], scenes: Mapping[str, Scene]) -> str:
         *_sweeps(document),
     ]
     for row in document["rows"]:
-        if row["runs"]:
-            parts += _section(document, row, scenes.get(row["id"]))
+        name = row["id"]
+        if name in drawn:
+            parts.append(drawn[name])
+        elif row["runs"]:
+            parts.append(section_of(document, name, scenes.get(name)))
     parts.append(f'<p class="note">Made by ntagen {html.escape(document["ntagen"])}.</p>')
     parts.append("</body></html>\n")
     return "\n".join(parts)
+
+
+def section_of(document: Mapping[str, Any], name: str, scene: Scene | None) -> str:
+    """The part of the report about a row that has runs.
+
+    Args:
+        document: A table with this row and its runs; others count for nothing.
+        name: The name of the row.
+        scene: Its scene; without one, there is no picture of where regions were felt.
+    """
+    row = next(row for row in document["rows"] if row["id"] == name)
+    return "\n".join(_section(document, row, scene))
 
 
 def table_of(document: Mapping[str, Any]) -> str:
@@ -100,7 +121,6 @@ def _sweeps(document: Mapping[str, Any]) -> Iterator[str]:
 def _section(
     document: Mapping[str, Any], row: Mapping[str, Any], scene: Scene | None
 ) -> Iterator[str]:
-    """The part of the page about a row."""
     name = row["id"]
     settings = ", ".join(f"{words} {value}" for words, value in row["settings"].items())
     facts = f"{row['scenario']}, known: {row['known']}, needle: {row['needle']}"

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ntagen.errors import InputError
-from ntagen.experiment.description import Experiment
 from ntagen.experiment.report import report_of
 from ntagen.experiment.table import FORMAT_VERSION
 from ntagen.experiment.writing import csv_of, flat, latex_of, markdown_of
 from ntagen.files import MODEL_BYTES, read_file, write_files
 from ntagen.frames import frame_of
-from ntagen.nsl import load
 from ntagen.scene import Scene
 
 FILES = ("table.json", "table.csv", "table.md", "table.tex", "report.html")
@@ -30,11 +28,13 @@ class Campaign:
         document: All of it, as ``table.json`` has it.
         folder: Its folder, with the logs.
         scenes: The scene of each row, by the name of the row.
+        sections: The sections of the report that are drawn already, by the name of the row.
     """
 
     document: Mapping[str, Any]
     folder: Path
     scenes: Mapping[str, Scene]
+    sections: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def table(self) -> list[dict[str, Any]]:
@@ -71,15 +71,9 @@ class Campaign:
             csv_of(self.document),
             markdown_of(self.document),
             latex_of(self.document),
-            report_of(self.document, self.scenes),
+            report_of(self.document, self.scenes, self.sections),
         )
         write_files({self.folder / name: text for name, text in zip(FILES, texts, strict=True)})
-
-
-def campaign_of(document: Mapping[str, Any], experiment: Experiment, folder: Path) -> Campaign:
-    """The campaign of a table."""
-    scenes = {path: load(path) for path in {row.scenario for row in experiment.rows}}
-    return Campaign(document, folder, {row.id: scenes[row.scenario] for row in experiment.rows})
 
 
 def read_table(folder: Path) -> Campaign:

@@ -22,8 +22,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg  # type: ignore[import-untyped]
-import scipy.optimize  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ntagen.needle.vectors import combine, cross, dot, scale, subtract, unit
@@ -132,7 +130,7 @@ def _algebraic(flat: _Array) -> _Array:
             [2.0, 0.0, 0.0, 0.0],
         ]
     )
-    values, vectors = scipy.linalg.eig(np.linalg.solve(constraint, moments))
+    values, vectors = np.linalg.eig(np.linalg.solve(constraint, moments))
     a, b, c, d = np.real(vectors[:, np.argsort(np.real(values))[1]])
     if a < 0.0:
         a, b, c, d = -a, -b, -c, -d
@@ -159,6 +157,8 @@ def _geometric(
     flat: _Array, start: _Array, noise_mm: float, prior: CurvaturePrior | None
 ) -> tuple[_Array, float]:
     """The shape of least squared distances (and prior), and its curvature's standard deviation."""
+    # Few runs need a circle, and the import takes half a second.
+    from scipy.optimize import OptimizeResult, least_squares  # type: ignore[import-untyped]
 
     def weighted(shape: _Array) -> _Array:
         residuals = _residuals(shape, flat) / noise_mm
@@ -166,9 +166,9 @@ def _geometric(
             return residuals
         return np.append(residuals, (shape[0] - prior.mean_per_mm) / prior.std_per_mm)
 
-    def solve(first: _Array) -> scipy.optimize.OptimizeResult:
+    def solve(first: _Array) -> OptimizeResult:
         # Three points without a prior leave as many residuals as unknowns, which the method allows.
-        return scipy.optimize.least_squares(weighted, first, method="lm", x_scale="jac")
+        return least_squares(weighted, first, method="lm", x_scale="jac")
 
     result = solve(start)
     if prior is not None:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import scipy.optimize  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from ntagen.scene import Vector
@@ -100,7 +99,10 @@ def ball_of(
 
     start = np.append(ahead.mean(axis=0), radius_mm)
     lower = [-np.inf, -np.inf, -np.inf, min(_LEAST_RADIUS_MM, 0.5 * radius_mm)]
-    result = scipy.optimize.least_squares(residuals, start, bounds=(lower, np.inf))
+    # Few runs feel a region, and the import takes half a second.
+    from scipy.optimize import least_squares  # type: ignore[import-untyped]
+
+    result = least_squares(residuals, start, bounds=(lower, np.inf))
     found = result.x
     felt, near = parts(found)
     worst_mm = max(float(np.max(np.abs(felt))), float(np.max(-near, initial=0.0)))

@@ -20,6 +20,7 @@ from ntagen.experiment.campaign import Progress, carry_out
 from ntagen.experiment.crew import Done, Here
 from ntagen.experiment.making import make_block
 from ntagen.experiment.reading import read_experiment
+from ntagen.experiment.report import report_of
 from ntagen.experiment.table import timeless
 from tests.unit.experiment.files import QUICK, written
 
@@ -67,6 +68,14 @@ def test_the_table_has_rates_and_spreads(whole: tuple[Path, Mapping[str, Any]]) 
     lines = (folder / "table.csv").read_text("utf-8").splitlines()
     assert lines[0].startswith("id,scenario,known,needle,speed,settings.noise,")
     assert len(lines) == 3
+
+
+def test_sections_drawn_beside_the_runs_are_those_of_the_whole_table(tmp_path: Path) -> None:
+    experiment = read_experiment(written(tmp_path))
+    made = carry_out(experiment, tmp_path / "x", Backwards)
+    assert set(made.sections) == {"blocked", "free"}
+    text = (tmp_path / "x" / "report.html").read_text("utf-8")
+    assert text == report_of(made.document, made.scenes)
 
 
 def test_each_run_says_each_synthesis_and_has_its_log(
