@@ -1,10 +1,12 @@
 """Runs what documents tell readers to type, and compares what they say comes out.
 
-A document has three kinds of steps:
+A document has these kinds of steps:
 
 * "Save this as `NAME`:" before a block of code makes a file;
 * a block `console` has commands after `$ `, each with the expected output below it. `…` in a line
   stands for any text, a line with only `…` for any number of lines. Every command ends with 0;
+* an indented line that begins with `ntagen` or `cp` is a command too, which may say anything, but
+  for those that `NOT_HERE` names: what a reader has and a test has not;
 * the blocks `python` are one program.
 """
 
@@ -20,9 +22,21 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 ANY = "…"
+NOT_HERE = {
+    "hardware, or a server": r"/dev/|localhost:|tcp://|mystage:|mytracker:",
+    "a file of the reader": (
+        r"\b(?:model\.xml|gate\.xml|task\.nsl|FILE\.toml|[Tt]rial\*|paper\.nsl run\.mcap)"
+    ),
+    "what another page made": r"demo/\{",
+    "runs until Ctrl-C": r"device simulate",
+    "takes minutes": r"--runs 200|real\.toml",
+}
+"""Why a command cannot be run by a test, with a pattern of such commands."""
+
 _BLOCK = re.compile(
     r"(?:[Ss]ave (?:this|it) as `(?P<name>[\w.-]+)`:\n\n)?"
-    r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$",
+    r"^```(?P<kind>\w+)\n(?P<text>.*?)^```$"
+    r"|^ {4}(?P<line>(?:\w+=\S+ )?(?:ntagen|cp) (?:[^\n]*\\\n)*[^\n]*)$",
     re.MULTILINE | re.DOTALL,
 )
 
@@ -51,13 +65,21 @@ def steps_of(document: str) -> Iterator[Step]:
         if block["name"]:
             yield Step("file", block["text"], block["name"])
         elif block["kind"] == "console":
-            for part in re.split(r"^\$ ", block["text"], flags=re.MULTILINE)[1:]:
-                command, _, expected = part.partition("\n")
+            for command, expected in commands_of(block["text"]):
                 yield Step("command", command, expected=expected)
+        elif block["line"] and not any(re.search(one, block["line"]) for one in NOT_HERE.values()):
+            yield Step("command", block["line"], expected=ANY)
         elif block["kind"] == "python":
             program += block["text"]
     if program:
         yield Step("python", program)
+
+
+def commands_of(console: str) -> Iterator[tuple[str, str]]:
+    """The commands of a block `console`, each with what it prints."""
+    for part in re.split(r"^\$ ", console, flags=re.MULTILINE)[1:]:
+        command, _, printed = part.partition("\n")
+        yield command, printed
 
 
 def agrees(expected: str, said: str) -> bool:
@@ -77,7 +99,9 @@ def follow(document: str, folder: Path) -> Iterator[str]:
     Yields:
         What differs from what the document says.
     """
-    (folder / "examples").symlink_to(ROOT / "examples")
+    for name in ("examples", "tests"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "demo").mkdir()
     for step in steps_of(document):
         if step.kind == "file":
             (folder / step.name).write_text(step.text, "utf-8")
@@ -93,6 +117,7 @@ def follow(document: str, folder: Path) -> Iterator[str]:
             command,
             cwd=folder,
             env={**os.environ, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "COLUMNS": "120"},
+            stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -8,10 +8,20 @@ import pytest
 
 from tests.tutorials import ROOT, agrees, follow, steps_of
 
+PAGES = (
+    "adversary",
+    "anatomy",
+    "building",
+    "matching",
+    "models",
+    "moving",
+    "pictures",
+    "steering",
+    "steppers",
+)
 TUTORIALS = [
     ROOT / "README.md",
-    ROOT / "docs" / "building.md",
-    ROOT / "docs" / "pictures.md",
+    *(ROOT / "docs" / f"{name}.md" for name in PAGES),
     *sorted((ROOT / "docs" / "tutorials").glob("[!i]*.md")),
 ]
 

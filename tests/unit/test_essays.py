@@ -26,6 +26,7 @@ import pytest
 
 import ntagen
 from ntagen.cli import main
+from tests.tutorials import commands_of
 
 ROOT = Path(__file__).resolve().parents[2]
 ESSAYS = sorted((ROOT / "docs" / "algorithms").glob("*.md"))
@@ -152,9 +153,8 @@ def test_commands_print_what_the_essay_shows(
 
 
 def check_console(block: Block, capsys: pytest.CaptureFixture[str]) -> None:
-    for entry in "\n".join(block.lines).split("$ ntagen ")[1:]:
-        command, _, shown = entry.partition("\n")
-        main(shlex.split(command))
+    for command, shown in commands_of("\n".join(block.lines)):
+        main(shlex.split(command.removeprefix("ntagen ")))
         captured = capsys.readouterr()
         printed = iter(without_times(captured.out + captured.err))
         for line in without_times(shown):
