@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -48,9 +49,13 @@ class Template:
     def __getitem__(self, name: str) -> Location:
         found = [one for one in self.locations if one.name == name]
         if not found:
-            known = ", ".join(one.name for one in self.locations if one.name) or "no named one"
-            raise KeyError(f"template {self.name} has no location {name}; it has {known}")
+            raise KeyError(f"template {self.name} has no location {name}; it has {self._known}")
         return found[0]
+
+    @property
+    def _known(self) -> str:
+        """The names of its locations, for messages."""
+        return ", ".join(one.name for one in self.locations if one.name) or "no named one"
 
     def __repr__(self) -> str:
         counts = f"{len(self.locations)} locations, {len(self.edges)} edges"
@@ -109,6 +114,21 @@ class Template:
         self.branch_points.append(point)
         return point
 
+    def _end(self, name: str) -> Location:
+        """The location of an end of an edge.
+
+        Raises:
+            InputError: There is none with this name.
+        """
+        try:
+            return self[name]
+        except KeyError:
+            near = difflib.get_close_matches(name, [one.name for one in self.locations], 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"it has {self._known}"
+            raise InputError(
+                f"template {self.name} has no location {name!r}\nhint: {hint}"
+            ) from None
+
     def edge(
         self,
         source: Node | str,
@@ -128,9 +148,9 @@ class Template:
 
         Raises:
             InputError: An end belongs to another template.
-            KeyError: There is no location with this name.
+            InputError: There is no location with this name.
         """
-        ends = [self[one] if isinstance(one, str) else one for one in (source, target)]
+        ends = [self._end(one) if isinstance(one, str) else one for one in (source, target)]
         edge = Edge(
             ends[0],
             ends[1],

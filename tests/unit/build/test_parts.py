@@ -167,6 +167,8 @@ def test_mistakes_are_told_when_they_are_made(model: build.Model) -> None:
         model.template("Gate")
     with pytest.raises(InputError, match="edge 3 → Safe: 3 is no location\nhint: "):
         train.edge(3, train["Safe"])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"no location 'Saf'\nhint: did you mean 'Safe'\?"):
+        train.edge("Safe", "Saf")
     with pytest.raises(KeyError, match="no location Saf; it has Safe, Coming, Crossing"):
         train["Saf"]
     with pytest.raises(KeyError, match="no template Trains; the model has Train, Gate"):

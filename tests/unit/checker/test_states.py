@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+import ntagen
 from ntagen import checker
 from ntagen.errors import LimitError, ModelError
+
+CORPUS = Path(__file__).resolve().parents[2] / "corpus"
 
 LAMP = """
 clock x, y;
@@ -72,3 +77,24 @@ def test_other_limits_are_errors() -> None:
 def test_failing_model_is_an_error() -> None:
     with pytest.raises(ModelError):
         checker.load(CHAIN.replace("int n;", "int[0,5] n;")).states()
+
+
+@pytest.mark.parametrize(
+    ("name", "zone"),
+    [
+        ("with_a_clock_guard", ("x <= 2",)),
+        ("without_a_first_moment", ("x <= 1",)),
+        ("stops_time_for_the_controller", ("x <= 2",)),
+    ],
+)
+def test_a_walk_stops_where_urgent_synchronisations_stop_time(
+    name: str, zone: tuple[str, ...]
+) -> None:
+    model = ntagen.load(CORPUS / "games" / f"urgent_channel_{name}.xta")
+    walk = model.walk()
+    assert walk.zone == zone == next(iter(model.states())).zone
+    reached = {tuple(state.locations.items()) for state in model.states()}
+    for index in range(len(walk.moves())):
+        after = model.walk()
+        after.take(index)
+        assert tuple(after.locations.items()) in reached

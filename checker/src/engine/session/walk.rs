@@ -65,7 +65,12 @@ impl LoadedModel {
 
     /// The initial state.
     pub fn start(&self) -> Result<Point, Failure> {
-        let (words, zone) = self.symbolic().initial()?;
+        let mut symbolic = self.symbolic();
+        let (mut words, zone, invariant) = symbolic.start()?;
+        let mut zones = vec![zone];
+        symbolic.let_time_pass(&mut words, &invariant, &mut zones)?;
+        // From one valuation, time reaches one zone.
+        let zone = zones.swap_remove(0);
         Ok(Point { words, zone })
     }
 
@@ -141,7 +146,7 @@ pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symboli
 }
 
 /// The moves of a state, and where each leads. More than one entry for a move if a receiver
-/// abstains.
+/// abstains, or if an urgent synchronisation stops time in a part of its zone.
 pub fn successors(symbolic: &mut Symbolic<'_>, point: &Point) -> Result<Successors, Failure> {
     successors_or_failure(symbolic, point).map_err(|(failure, _)| failure)
 }
@@ -180,11 +185,10 @@ fn taken(
     };
     let mut entries = Vec::new();
     effect.entry_zones(zone.bounds(), symbolic.dimension(), &mut entries);
-    for mut zone in entries {
-        let may_delay = symbolic.may_delay(&mut target)?;
-        symbolic.delay(&target, may_delay, &effect.invariant, zone.bounds_mut())?;
+    symbolic.let_time_pass(&mut target, &effect.invariant, &mut entries)?;
+    successors.extend(entries.into_iter().map(|zone| {
         let words = target.clone();
-        successors.push((one.parts.to_vec(), Point { words, zone }));
-    }
+        (one.parts.to_vec(), Point { words, zone })
+    }));
     Ok(())
 }
