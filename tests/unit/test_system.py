@@ -162,8 +162,13 @@ def test_the_cores_are_counted_where_they_cannot_be_chosen(monkeypatch: pytest.M
 
 def test_a_closed_terminal_ends_a_run() -> None:
     assert system.HANG_UPS == (signal.SIGHUP,)
-    with signalled_operator() as operator:
-        signal.raise_signal(signal.SIGHUP)
+    # Tests that nohup runs ignore the signal; so would the run, as its user wishes.
+    inherited = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        with signalled_operator() as operator:
+            signal.raise_signal(signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, inherited)
     assert operator.was_terminated
     with pytest.raises(KeyboardInterrupt, match=r"the terminal was closed \(SIGHUP\)"):
         operator.listen()
