@@ -154,7 +154,7 @@ ONLY_IN: dict[str, set[str]] = {
     "socket": {"drive", "openigtlink"},
     "selectors": {"openigtlink"},
     "select": {"drive", "grbl"},
-    "asyncio": {"drive"},
+    "asyncio": {"drive", "editor"},
     # Windows has none of these.
     "fcntl": {"system"},
     "pty": {"grbl"},

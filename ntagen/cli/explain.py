@@ -10,8 +10,8 @@ import click
 
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
+from ntagen.nsl.diagnostics import CAPTIONS
 
-_CAPTIONS: Final = {"model": "The model:", "wrong": "Wrong:", "right": "Right:"}
 _LONGEST_LINE: Final = 400
 """Longer lines of examples are shortened: these examples show that something is too long."""
 
@@ -58,7 +58,7 @@ def _shown(page: str) -> str:
             text = click.wrap_text(parts[index].strip(), 80, preserve_paragraphs=True)
             blocks.append(text)
         if index + 2 < len(parts):
-            blocks.append(f"{_CAPTIONS[parts[index + 1]]}\n\n{_indented(parts[index + 2])}")
+            blocks.append(f"{CAPTIONS[parts[index + 1]]}\n\n{_indented(parts[index + 2])}")
     return "\n\n".join(blocks)
 
 

@@ -1,13 +1,19 @@
 """The language server for ``.nsl``, over standard input and output.
 
 Invariants: a request about any text has an answer, never an exception; mistakes are published for
-each text that is open, and taken back when it is closed; nothing is read but the file's includes.
+each text that is open, and taken back when it is closed; those of a text that has changed since
+are not published; nothing is read but the files that an environment names.
+
+While somebody types, mistakes are looked for when the keys rest: see `REST_S` and
+`ntagen.editor.checks`.
 
 The protocol counts places as the editor wishes (mostly in UTF-16), the language in characters.
 """
 
 from __future__ import annotations
 
+import asyncio
+from typing import Final
 from urllib.parse import urlsplit
 
 from lsprotocol import types
@@ -16,8 +22,12 @@ from pygls.uris import from_fs_path, to_fs_path
 from pygls.workspace import TextDocument
 
 from ntagen.editor import language
+from ntagen.editor.checks import CheckEndedError, Checks
 from ntagen.nsl import Diagnostic, SourceError, format_text
 from ntagen.version import VERSION
+
+REST_S: Final = 0.15
+"""So long no key is pressed before mistakes are looked for."""
 
 _SEVERITIES = {
     "error": types.DiagnosticSeverity.Error,
@@ -42,25 +52,66 @@ class Server(LanguageServer):
     def __init__(self) -> None:
         super().__init__("ntagen", VERSION)
         self._told: dict[str, set[str]] = {}
+        self._published: dict[str, list[types.Diagnostic]] = {}
+        self._checks = Checks()
+        self._running: dict[str, asyncio.Task[None]] = {}
 
-    def tell(self, uri: str) -> None:
+    def look(self, uri: str, rest_s: float = 0.0) -> None:
+        """Looks for mistakes of a text after a rest; what was begun for it before is given up."""
+        self._give_up(uri)
+        self._running[uri] = asyncio.create_task(self._tell(uri, rest_s))
+
+    def _give_up(self, uri: str) -> None:
+        task = self._running.pop(uri, None)
+        if task is not None:
+            task.cancel()
+
+    async def _tell(self, uri: str, rest_s: float) -> None:
         """Publishes the mistakes of a text and of the files that it includes."""
+        await asyncio.sleep(rest_s)
         document = self.workspace.get_text_document(uri)
         path = _path(uri)
+        try:
+            mistakes = await self._checks.mistakes(document.source, path)
+        except CheckEndedError:
+            message = f"the check of {path} ended without an answer; standard error says why"
+            self.window_show_message(types.ShowMessageParams(types.MessageType.Error, message))
+            return
         by_uri: dict[str, list[types.Diagnostic]] = {uri: []}
-        for one in language.mistakes(document.source, path):
+        for one in mistakes:
             of = uri if one.path == path else from_fs_path(one.path) or uri
-            by_uri.setdefault(of, []).append(self._published(document if of == uri else None, one))
+            by_uri.setdefault(of, []).append(self._shown(document if of == uri else None, one))
         for gone in self._told.get(uri, set()) - set(by_uri):
             by_uri[gone] = []
         self._told[uri] = set(by_uri)
         for of, found in by_uri.items():
-            self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(of, found))
+            self._publish(of, found, document.version if of == uri else None)
 
     def take_back(self, uri: str) -> None:
         """Takes back the mistakes of a text that was closed."""
+        self._give_up(uri)
         for of in self._told.pop(uri, {uri}):
-            self.text_document_publish_diagnostics(types.PublishDiagnosticsParams(of, []))
+            self._publish(of, [])
+
+    def _publish(self, uri: str, found: list[types.Diagnostic], version: int | None = None) -> None:
+        self._published[uri] = found
+        params = types.PublishDiagnosticsParams(uri, found, version)
+        self.text_document_publish_diagnostics(params)
+
+    def hover(self, document: TextDocument, place: types.Position) -> types.Hover | None:
+        """What the mistakes mean that are shown at a place, and then what its word means."""
+        here = [one for one in self._published.get(document.uri, []) if _is_in(place, one.range)]
+        texts = list(dict.fromkeys(language.explained(str(one.code)) for one in here))
+        area = here[0].range if here else None
+        found = language.meaning(document.source, self.offset(document, place))
+        if found is not None:
+            told, start, end = found
+            texts.append(told)
+            area = types.Range(self.place(document, start), self.place(document, end))
+        if not texts:
+            return None
+        text = "\n\n---\n\n".join(texts)
+        return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, text), area)
 
     def place(self, document: TextDocument, offset: int) -> types.Position:
         """Where a character stands."""
@@ -87,7 +138,7 @@ class Server(LanguageServer):
         text = lines[line] if line < len(lines) else ""
         return types.Position(line, document.position_codec.client_num_units(text[:column]))
 
-    def _published(self, document: TextDocument | None, one: Diagnostic) -> types.Diagnostic:
+    def _shown(self, document: TextDocument | None, one: Diagnostic) -> types.Diagnostic:
         line = max(0, one.line - 1)
         start, end = one.column - 1, one.column - 1 + one.length
         if one.line == 0:
@@ -120,11 +171,11 @@ def make_server() -> Server:
 
     @server.feature(types.TEXT_DOCUMENT_DID_OPEN)
     def opened(params: types.DidOpenTextDocumentParams) -> None:
-        server.tell(params.text_document.uri)
+        server.look(params.text_document.uri)
 
     @server.feature(types.TEXT_DOCUMENT_DID_CHANGE)
     def changed(params: types.DidChangeTextDocumentParams) -> None:
-        server.tell(params.text_document.uri)
+        server.look(params.text_document.uri, REST_S)
 
     @server.feature(types.TEXT_DOCUMENT_DID_CLOSE)
     def closed(params: types.DidCloseTextDocumentParams) -> None:
@@ -133,12 +184,7 @@ def make_server() -> Server:
     @server.feature(types.TEXT_DOCUMENT_HOVER)
     def hover(params: types.HoverParams) -> types.Hover | None:
         document = server.workspace.get_text_document(params.text_document.uri)
-        found = language.meaning(document.source, server.offset(document, params.position))
-        if found is None:
-            return None
-        told, start, end = found
-        area = types.Range(server.place(document, start), server.place(document, end))
-        return types.Hover(types.MarkupContent(types.MarkupKind.Markdown, told), area)
+        return server.hover(document, params.position)
 
     @server.feature(types.TEXT_DOCUMENT_COMPLETION)
     def complete(params: types.CompletionParams) -> list[types.CompletionItem]:
@@ -178,6 +224,11 @@ def make_server() -> Server:
         return found
 
     return server
+
+
+def _is_in(place: types.Position, area: types.Range) -> bool:
+    """Whether a place is in an area, or at its end: there the cursor stands after the last key."""
+    return area.start <= place <= area.end
 
 
 def _path(uri: str) -> str:

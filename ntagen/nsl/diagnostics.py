@@ -198,6 +198,10 @@ KINDS: Final = _kinds(
 _PAGES: Final = Path(__file__).parent / "pages"
 
 
+CAPTIONS: Final = {"model": "The model:", "wrong": "Wrong:", "right": "Right:"}
+"""What is written above an example, by the word after its language."""
+
+
 def page_of(kind: Kind) -> str:
     r"""The page of a kind of mistake, in Markdown: meaning, example, how to fix it.
 

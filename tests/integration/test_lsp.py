@@ -12,6 +12,8 @@ from pathlib import Path
 from lsprotocol import types
 from pygls.lsp.client import LanguageClient
 
+from tests import anatomy
+
 PAPER = (Path(__file__).parents[2] / "examples" / "paper.nsl").read_text("utf-8")
 MOST_S = 60.0
 
@@ -27,23 +29,46 @@ class Editor(LanguageClient):
         def _published(params: types.PublishDiagnosticsParams) -> None:
             self.published.put_nowait(params)
 
-    async def mistakes(self, uri: str) -> list[types.Diagnostic]:
+    async def next(self, uri: str) -> types.PublishDiagnosticsParams:
         """What is published next about a file."""
         while True:
             params = await asyncio.wait_for(self.published.get(), MOST_S)
             if params.uri == uri:
-                return list(params.diagnostics)
+                return params
 
-    async def open(self, uri: str, text: str) -> list[types.Diagnostic]:
+    async def mistakes(self, uri: str) -> list[types.Diagnostic]:
+        return list((await self.next(uri)).diagnostics)
+
+    def show(self, uri: str, text: str) -> None:
+        """Opens a text, and waits for nothing."""
         item = types.TextDocumentItem(uri, "nsl", 1, text)
         self.text_document_did_open(types.DidOpenTextDocumentParams(item))
+
+    async def open(self, uri: str, text: str) -> list[types.Diagnostic]:
+        self.show(uri, text)
         return await self.mistakes(uri)
 
-    async def change(self, uri: str, version: int, text: str) -> list[types.Diagnostic]:
+    def press(self, uri: str, version: int, text: str) -> None:
+        """Changes a text, and waits for nothing."""
         change = types.TextDocumentContentChangeWholeDocument(text)
         named = types.VersionedTextDocumentIdentifier(version, uri)
         self.text_document_did_change(types.DidChangeTextDocumentParams(named, [change]))
+
+    async def change(self, uri: str, version: int, text: str) -> list[types.Diagnostic]:
+        self.press(uri, version, text)
         return await self.mistakes(uri)
+
+    async def hover(self, uri: str, text: str, word: str) -> str | None:
+        """What is told about a word."""
+        line = text[: text.index(word)].count("\n")
+        place = types.Position(line, text.splitlines()[line].index(word))
+        found = await asyncio.wait_for(
+            self.text_document_hover_async(types.HoverParams(identified(uri), place)), MOST_S
+        )
+        if found is None:
+            return None
+        assert isinstance(found.contents, types.MarkupContent)
+        return found.contents.value
 
 
 @asynccontextmanager
@@ -57,8 +82,9 @@ async def editor() -> AsyncIterator[Editor]:
     try:
         yield client
         await asyncio.wait_for(client.shutdown_async(None), MOST_S)
-        client.exit(None)
     finally:
+        # After a failure, too: the client waits for the end of the server.
+        client.exit(None)
         await client.stop()
 
 
@@ -155,6 +181,62 @@ def test_mistakes_of_included_files_stand_in_these_files(tmp_path: Path) -> None
             part.write_text("let near = 3 mm\n", "utf-8")
             await client.change(uri, 2, 'include "part.nsl"\n' + PAPER + "\n")
             assert await client.mistakes(part.as_uri()) == []
+
+    asyncio.run(session())
+
+
+def test_the_mistakes_of_a_text_that_is_typed_come_when_the_keys_rest(tmp_path: Path) -> None:
+    async def session() -> None:
+        uri = (tmp_path / "a.nsl").as_uri()
+        async with editor() as client:
+            assert await client.open(uri, PAPER) == []
+            for version in range(2, 40):
+                client.press(uri, version, PAPER + "}" * version)
+            client.press(uri, 40, PAPER.replace("radius 10 mm", "raduis 10 mm"))
+            found = await client.next(uri)
+            assert (found.version, [one.code for one in found.diagnostics]) == (40, ["N015"])
+
+    asyncio.run(session())
+
+
+def test_a_long_check_holds_up_nothing(tmp_path: Path) -> None:
+    """The grid is as fine as one may be: such a check takes many seconds."""
+    points, faces = anatomy.box((0.0, 0.0, -50.0), (60.0, 60.0, 60.0))
+    anatomy.write_stl(tmp_path / "box.stl", points, faces)
+    text = (
+        "environment e {\n"
+        "  needle { tip (0, 0, 0) mm heading -z bevel +x radius 60 mm speed 1 mm/s length 90 mm }\n"
+        f"  {anatomy.FRAME}\n"
+        '  target T1 mesh "box.stl" in LPS mm grid 0.6 mm\n'
+        "}\n"
+    )
+
+    async def session() -> None:
+        uri = (tmp_path / "a.nsl").as_uri()
+        async with editor() as client:
+            client.show(uri, text)
+            assert "bevel" in (await client.hover(uri, text, "bevel") or "")
+            await asyncio.sleep(1)
+            client.press(uri, 2, PAPER)
+            found = await client.next(uri)
+            assert (found.version, list(found.diagnostics)) == (2, [])
+
+    asyncio.run(session())
+
+
+def test_a_mistake_is_explained_where_it_stands(tmp_path: Path) -> None:
+    async def session() -> None:
+        uri = (tmp_path / "a.nsl").as_uri()
+        wrong = PAPER.replace("radius 10 mm", "raduis 10 mm")
+        async with editor() as client:
+            await client.open(uri, wrong)
+            told = await client.hover(uri, wrong, "raduis")
+            assert told is not None
+            assert told.startswith("**error[N015]: unexpected-word**")
+            assert "Right:\n\n```nsl\n" in told
+            assert "nsl wrong" not in told
+            await client.change(uri, 2, PAPER)
+            assert "N015" not in (await client.hover(uri, PAPER, "radius 10 mm") or "")
 
     asyncio.run(session())
 
