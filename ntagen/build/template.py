@@ -147,8 +147,7 @@ class Template:
         """Adds an edge; its ends are locations, names of locations, or branch points.
 
         Raises:
-            InputError: An end belongs to another template.
-            InputError: There is no location with this name.
+            InputError: An end belongs to another template, or no location has its name.
         """
         ends = [self._end(one) if isinstance(one, str) else one for one in (source, target)]
         edge = Edge(
