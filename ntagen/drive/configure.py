@@ -104,9 +104,10 @@ def configure(
     its_needle = choose(needle, errors)
     steering = {p.field: values[p.field] for p in STEERING if p.field in values}
     try:
-        usual = its_needle.usual(Settings(), scene)
+        default = Settings()
+        usual = its_needle.usual(default, scene)
         for p in STEERING:
-            if p.field not in origins and value_of(usual, p.field) != value_of(Settings(), p.field):
+            if p.field not in origins and value_of(usual, p.field) != value_of(default, p.field):
                 origins[p.field] = _AS_NEEDLE
         settings = with_values(usual, steering)
         settings = _fitting(settings, its_needle, scene, known, origins)

@@ -31,7 +31,6 @@ point the run ended.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Final
 
@@ -42,7 +41,7 @@ from ntagen.drive.following import Course
 from ntagen.drive.guide import Guide
 from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
-from ntagen.drive.pieces import moves_of, pieces
+from ntagen.drive.pieces import Moves, pieces
 from ntagen.drive.planning import Lack, Planner
 from ntagen.drive.records import Ended, Journal, Predicted, Record, Relied
 from ntagen.drive.reliance import relies_on
@@ -110,7 +109,7 @@ class Controller:
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
         self._guide = Guide(course, scene, settings, self._needle, journal)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
-        self._moves: deque[tuple[Action, Pose]] = deque()
+        self._moves = Moves(scene)
         self._reviewed_mm = 0.0
         self._rest: Plan | None = None
         self._pace = Pace(scene)
@@ -237,10 +236,10 @@ class Controller:
         """Makes the first moves of the plan, or the free push if there is none."""
         goal_mm = self._settings.initial_push_mm
         while self._moves and not self._is_short:
-            action, self._predicted = self._moves[0]
+            action, self._predicted = self._moves.first()
             if not self._keep_pace(action):
                 break
-            self._moves.popleft()
+            self._moves.drop_first()
             self._planner.require_time()
             self._act(action)
             if not isinstance(action, Push):
@@ -258,10 +257,10 @@ class Controller:
             return self._follow_branch()
         if not self._moves:
             return Event.PLAN_DONE
-        action, self._predicted = self._moves[0]
+        action, self._predicted = self._moves.first()
         if not self._keep_pace(action):
             return Event.OUT_OF_STEP
-        self._moves.popleft()
+        self._moves.drop_first()
         self._act(action)
         return Event.ACTED
 
@@ -362,11 +361,11 @@ class Controller:
         """The known scene for an estimate, and the rest of the plan."""
         depth_mm = self._needle.depth_mm
         scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
-        return scene, Plan.of(action for action, _ in self._moves)
+        return scene, Plan.of(self._moves.actions)
 
     def _follow(self, scene: Scene, plan: Plan) -> None:
         """Makes this the plan to follow, from the pose in the scene."""
-        self._moves = deque(moves_of(scene, plan.actions, self._settings.spacing_mm))
+        self._moves = Moves(scene, plan.actions, self._settings.spacing_mm)
         self._pace = Pace(scene)
         self._deviation.begin()
 

@@ -3,37 +3,83 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from ntagen.needle.kinematics import push, roll
-from ntagen.plan.actions import Action, Push, Roll, Wait
+from ntagen.plan.actions import Action, Push, Roll
 from ntagen.scene import Pose, Scene
 
 _SMALL_MM: Final = 1e-9
 
 
-def moves_of(
-    scene: Scene, actions: tuple[Action, ...], spacing_mm: float
-) -> Iterator[tuple[Action, Pose]]:
-    """A plan in short pieces, each with the pose that is expected after it."""
-    # The circle of the pushes since the last roll, and how far on it the tip is.
-    start, radius_mm, done_mm, rolled_rad = scene.needle.tip, scene.needle.radius_mm, 0.0, 0.0
-    end = tip = start
-    for action in actions:
+class Moves:
+    """A plan in short pieces, each with the pose that is expected after it.
+
+    A pose is computed when its move comes: most plans are replaced before they end.
+
+    Args:
+        scene: The scene whose needle makes the plan.
+        actions: The plan.
+        spacing_mm: No push is longer.
+    """
+
+    def __init__(
+        self, scene: Scene, actions: Iterable[Action] = (), spacing_mm: float = math.inf
+    ) -> None:
+        self._left = deque(_in_pieces(actions, spacing_mm))
+        self._tip = self._start = scene.needle.tip
+        self._radius_mm = scene.needle.radius_mm
+        # How far the tip is on the circle of the pushes since the last roll, and the rolls since.
+        self._done_mm = self._rolled_rad = 0.0
+        self._end = self._start
+        self._next: tuple[Action, Pose] | None = None
+
+    def __bool__(self) -> bool:
+        """Whether a move is left."""
+        return bool(self._left)
+
+    @property
+    def actions(self) -> Iterable[Action]:
+        """The moves that are left."""
+        return self._left
+
+    def first(self) -> tuple[Action, Pose]:
+        """The next move and the pose after it.
+
+        Raises:
+            IndexError: None is left.
+        """
+        if self._next is None:
+            action = self._left[0]
+            self._next = action, self._after(action)
+        return self._next
+
+    def drop_first(self) -> None:
+        """Goes on to the move after it."""
+        self.first()
+        self._left.popleft()
+        self._next = None
+
+    def _after(self, action: Action) -> Pose:
         if isinstance(action, Roll):
-            rolled_rad += action.angle_rad
-            tip = roll(end, rolled_rad)
-            yield action, tip
-        elif isinstance(action, Wait):
-            yield action, tip
+            self._rolled_rad += action.angle_rad
+            self._tip = roll(self._end, self._rolled_rad)
+        elif isinstance(action, Push):
+            if self._rolled_rad != 0.0:
+                self._start, self._done_mm, self._rolled_rad = self._tip, 0.0, 0.0
+            self._done_mm += action.length_mm
+            self._end = self._tip = push(self._start, self._radius_mm, self._done_mm)
+        return self._tip
+
+
+def _in_pieces(actions: Iterable[Action], spacing_mm: float) -> Iterator[Action]:
+    for action in actions:
+        if isinstance(action, Push):
+            yield from map(Push, pieces(action.length_mm, spacing_mm))
         else:
-            for piece_mm in pieces(action.length_mm, spacing_mm):
-                if rolled_rad != 0.0:
-                    start, done_mm, rolled_rad = tip, 0.0, 0.0
-                done_mm += piece_mm
-                end = tip = push(start, radius_mm, done_mm)
-                yield Push(piece_mm), tip
+            yield action
 
 
 def pieces(length_mm: float, spacing_mm: float) -> list[float]:

@@ -43,7 +43,7 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
         known: Samples that are elsewhere, as `samples_in` gives them; they are left out.
     """
     samples: dict[str, str] = {}
-    entries = dataclasses.asdict(scene)
+    entries = _entries(scene)
     for kind in _KINDS:
         regions: tuple[Region, ...] = getattr(scene, kind)
         entries[kind] = [_from_region(region, samples) for region in regions]
@@ -59,7 +59,12 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
     missing = {digest: text for digest, text in samples.items() if digest not in (known or {})}
     if missing:
         document["samples"] = missing
-    return json.dumps(document, indent=1)
+    return json.dumps(document, indent=1, default=_entries)
+
+
+def _entries(value: Any) -> dict[str, Any]:  # noqa: ANN401  any dataclass
+    """The fields by name; the JSON writer asks for those of a field that has fields itself."""
+    return {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
 
 
 def samples_in(text: str | bytes) -> dict[str, str]:
@@ -126,7 +131,7 @@ def _from_region(region: Region, samples: dict[str, str]) -> dict[str, object]:
     """A region's entry; only that of one that moves has a motion."""
     entry = _from_shape(region, samples)
     if region.motion is not None:
-        entry["motion"] = dataclasses.asdict(region.motion)
+        entry["motion"] = _entries(region.motion)
     return entry
 
 
@@ -134,17 +139,15 @@ def _from_shape(region: Region, samples: dict[str, str]) -> dict[str, object]:
     shape, around = region.shape, region.around
     if isinstance(shape, Sphere):
         ball = _Ball(region.name, region.kind, shape.middle_mm, shape.radius_mm, around)
-        return dataclasses.asdict(ball)
+        return _entries(ball)
     if isinstance(shape, Field):
         values = to_entry(shape)
         digest = digest_of(shape.samples)
         samples[digest] = values["samples"]
         values["samples"] = digest
-        entry = dataclasses.asdict(_Solid(region.name, region.kind, "field", values, around))
-        return entry
+        return _entries(_Solid(region.name, region.kind, "field", values, around))
     form = next(form for form, kind in _SHAPES.items() if type(shape) is kind)
-    measures = dataclasses.asdict(cast("Any", shape))
-    return dataclasses.asdict(_Solid(region.name, region.kind, form, measures, around))
+    return _entries(_Solid(region.name, region.kind, form, _entries(shape), around))
 
 
 def _to_region(entry: dict[str, object], samples: Mapping[str, str]) -> Region:

@@ -83,8 +83,9 @@ class Path:
             return self
         last = self.stretches[-1] if self.stretches else None
         if last and last.arc.radius_mm == radius_mm and self.pending_roll_rad == 0.0:
-            longer = replace(last.arc, length_mm=last.arc.length_mm + length_mm)
-            return replace(self, stretches=(*self.stretches[:-1], replace(last, arc=longer)))
+            longer = Arc(last.arc.start, radius_mm, last.arc.length_mm + length_mm)
+            whole = Stretch(longer, last.roll_before_rad)
+            return Path(self.entry, (*self.stretches[:-1], whole))
         added = Stretch(Arc(self.tip, radius_mm, length_mm), self.pending_roll_rad)
         return Path(self.entry, (*self.stretches, added))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from typing import TypeVar
 
@@ -24,20 +25,11 @@ def escaped(value: object) -> str:
     if isinstance(value, Safe):
         return value
     text = str(value)
-    if text.isalnum():
-        return text
-    for character, entity in _ENTITIES:
-        text = text.replace(character, entity)
-    return text
+    return text.translate(_ENTITIES) if _SPECIAL.search(text) else text
 
 
-_ENTITIES = (
-    ("&", "&amp;"),
-    (">", "&gt;"),
-    ("<", "&lt;"),
-    ("'", "&#39;"),
-    ('"', "&#34;"),
-)
+_SPECIAL = re.compile("""[&<>'"]""")
+_ENTITIES = str.maketrans({"&": "&amp;", ">": "&gt;", "<": "&lt;", "'": "&#39;", '"': "&#34;"})
 
 
 def escaped_text(text: str) -> Safe:
