@@ -23,8 +23,6 @@ from ntagen.scene import Pose, Vector
 from ntagen.values import dataclass
 
 _TURN_RAD = 2.0 * math.pi
-_BISECTIONS = 60
-"""After this many halvings, an arc length is as exact as floating-point numbers allow."""
 
 
 def circle_center(pose: Pose, radius_mm: float) -> Vector:
@@ -153,20 +151,21 @@ class Arc:
         nearest = self.nearest_to(center_mm)
         if nearest.distance_mm > radius_mm:
             return None
-        # The distance falls all the way from the start, which is outside, to the nearest place,
-        # unless the far side of the circle comes first: there is its only maximum, and the arc
-        # enters nothing before it.
-        low_mm, high_mm = self._farthest_before(nearest.at_mm), nearest.at_mm
-        for _ in range(_BISECTIONS):
-            middle_mm = 0.5 * (low_mm + high_mm)
-            inside = distance(self.position_at(middle_mm), center_mm) <= radius_mm
-            low_mm, high_mm = (low_mm, middle_mm) if inside else (middle_mm, high_mm)
-        return high_mm
-
-    def _farthest_before(self, at_mm: float) -> float:
-        """The arc length at the far side of the circle before `at_mm`; 0 if it is not passed."""
-        opposite_mm = at_mm - math.pi * self.radius_mm
-        return opposite_mm if opposite_mm > 0.0 else 0.0
+        foot_mm = self._foot_mm(center_mm)
+        least_mm = distance(self.position_at(foot_mm), center_mm)
+        # Half of the chord on which a straight needle would be in the ball.
+        half_mm = math.sqrt(max(0.0, (radius_mm - least_mm) * (radius_mm + least_mm)))
+        if not math.isinf(self.radius_mm):
+            # On the circle, `distance^2 = least^2 + 4 r a sin^2(t / 2)` at an angle `t` from the
+            # foot, with `a` from the circle's centre to where the ball's centre is in its plane.
+            from_center = subtract(center_mm, circle_center(self.start, self.radius_mm))
+            away_mm = math.hypot(
+                dot(from_center, self.start.heading), dot(from_center, self.start.bevel)
+            )
+            most_mm = 2.0 * math.sqrt(self.radius_mm * away_mm)
+            sine = half_mm / most_mm if half_mm < most_mm else 1.0
+            half_mm = 2.0 * self.radius_mm * math.asin(sine)
+        return min(max(0.0, foot_mm - half_mm), nearest.at_mm)
 
     def _foot_mm(self, point_mm: Vector) -> float:
         """The arc length, forward from the start, at which the circle is nearest to the point."""
