@@ -158,10 +158,7 @@ class Arc:
         if not math.isinf(self.radius_mm):
             # On the circle, `distance^2 = least^2 + 4 r a sin^2(t / 2)` at an angle `t` from the
             # foot, with `a` from the circle's centre to where the ball's centre is in its plane.
-            from_center = subtract(center_mm, circle_center(self.start, self.radius_mm))
-            away_mm = math.hypot(
-                dot(from_center, self.start.heading), dot(from_center, self.start.bevel)
-            )
+            away_mm = math.hypot(*self._in_plane_mm(center_mm))
             most_mm = 2.0 * math.sqrt(self.radius_mm * away_mm)
             sine = half_mm / most_mm if half_mm < most_mm else 1.0
             half_mm = 2.0 * self.radius_mm * math.asin(sine)
@@ -172,6 +169,9 @@ class Arc:
         if math.isinf(self.radius_mm):
             ahead = dot(subtract(point_mm, self.start.position_mm), self.start.heading)
             return ahead if ahead >= 0.0 else math.inf
+        return (math.atan2(*self._in_plane_mm(point_mm)) % _TURN_RAD) * self.radius_mm
+
+    def _in_plane_mm(self, point_mm: Vector) -> tuple[float, float]:
+        """A point seen from the circle's centre, in its plane: along heading and bevel."""
         from_center = subtract(point_mm, circle_center(self.start, self.radius_mm))
-        sine, cosine = dot(from_center, self.start.heading), dot(from_center, self.start.bevel)
-        return (math.atan2(sine, cosine) % _TURN_RAD) * self.radius_mm
+        return dot(from_center, self.start.heading), dot(from_center, self.start.bevel)
