@@ -28,13 +28,10 @@ class Moves:
     def __init__(
         self, scene: Scene, actions: Iterable[Action] = (), spacing_mm: float = math.inf
     ) -> None:
-        self._left = deque(_in_pieces(actions, spacing_mm))
-        self._tip = self._start = scene.needle.tip
-        self._radius_mm = scene.needle.radius_mm
-        # How far the tip is on the circle of the pushes since the last roll, and the rolls since.
-        self._done_mm = self._rolled_rad = 0.0
-        self._end = self._start
-        self._next: tuple[Action, Pose] | None = None
+        moves = tuple(_in_pieces(actions, spacing_mm))
+        self._left = deque(moves)
+        self._poses = _poses(scene, moves)
+        self._next: Pose | None = None
 
     def __bool__(self) -> bool:
         """Whether a move is left."""
@@ -51,10 +48,10 @@ class Moves:
         Raises:
             IndexError: None is left.
         """
+        action = self._left[0]
         if self._next is None:
-            action = self._left[0]
-            self._next = action, self._after(action)
-        return self._next
+            self._next = next(self._poses)
+        return action, self._next
 
     def drop_first(self) -> None:
         """Goes on to the move after it."""
@@ -62,16 +59,22 @@ class Moves:
         self._left.popleft()
         self._next = None
 
-    def _after(self, action: Action) -> Pose:
-        if isinstance(action, Roll):
-            self._rolled_rad += action.angle_rad
-            self._tip = roll(self._end, self._rolled_rad)
-        elif isinstance(action, Push):
-            if self._rolled_rad != 0.0:
-                self._start, self._done_mm, self._rolled_rad = self._tip, 0.0, 0.0
-            self._done_mm += action.length_mm
-            self._end = self._tip = push(self._start, self._radius_mm, self._done_mm)
-        return self._tip
+
+def _poses(scene: Scene, moves: tuple[Action, ...]) -> Iterator[Pose]:
+    """The pose after each move."""
+    # The circle of the pushes since the last roll, and how far on it the tip is.
+    start, radius_mm, done_mm, rolled_rad = scene.needle.tip, scene.needle.radius_mm, 0.0, 0.0
+    end = tip = start
+    for move in moves:
+        if isinstance(move, Roll):
+            rolled_rad += move.angle_rad
+            tip = roll(end, rolled_rad)
+        elif isinstance(move, Push):
+            if rolled_rad != 0.0:
+                start, done_mm, rolled_rad = tip, 0.0, 0.0
+            done_mm += move.length_mm
+            end = tip = push(start, radius_mm, done_mm)
+        yield tip
 
 
 def _in_pieces(actions: Iterable[Action], spacing_mm: float) -> Iterator[Action]:

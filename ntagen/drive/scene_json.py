@@ -131,7 +131,7 @@ def _from_region(region: Region, samples: dict[str, str]) -> dict[str, object]:
     """A region's entry; only that of one that moves has a motion."""
     entry = _from_shape(region, samples)
     if region.motion is not None:
-        entry["motion"] = _entries(region.motion)
+        entry["motion"] = region.motion
     return entry
 
 
