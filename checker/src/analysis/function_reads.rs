@@ -23,7 +23,7 @@ pub(crate) fn read_words(
             let mut is_known = true;
             instruction.each_operand(&mut |operand| {
                 is_known &= match operand {
-                    Operand::Memory(&address, Access::Read(count)) => {
+                    Operand::Memory(&address, Access::Read(count) | Access::Update(count)) => {
                         let touched = state_words(code, address, count, most);
                         let is_known = touched.is_some();
                         words.extend(touched.into_iter().flatten());

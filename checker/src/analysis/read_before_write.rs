@@ -188,7 +188,7 @@ impl<'n> Exposures<'n> {
 
     fn add_reads(&self, code: &Function, instruction: &Instruction, reads: &mut WordSet) {
         instruction.each_operand(&mut |operand| match operand {
-            Operand::Memory(&address, Access::Read(count)) => {
+            Operand::Memory(&address, Access::Read(count) | Access::Update(count)) => {
                 match state_words(code, address, count, self.numbers.len()) {
                     Some(words) => self.numbered(words).for_each(|number| reads.insert(number)),
                     None => *reads = WordSet::full(self.count),
@@ -209,7 +209,7 @@ impl<'n> Exposures<'n> {
 
     fn add_writes(&self, instruction: &Instruction, written: &mut WordSet) {
         instruction.each_operand(&mut |operand| {
-            if let Operand::Memory(address, Access::Write(count)) = operand
+            if let Operand::Memory(address, Access::Write(count) | Access::Update(count)) = operand
                 && address.base == Base::State
                 && address.index.is_none()
             {

@@ -4,13 +4,16 @@
 //! interpreter, the optimiser and compiled code all read this table. A new function is one row in
 //! the table of [`MathFunction`], and its code in `library.rs`. The kind of its code gives its
 //! types, and what may go wrong: only a code that gives an [`IntegerResult`] can wrap round or have
-//! no result.
+//! no result. The random functions are the table of [`Distribution`].
 
 mod integer_result;
 mod library;
+mod random;
 
 pub(crate) use integer_result::IntegerResult;
 pub(crate) use library::canonical;
+pub(crate) use random::MOST_PARAMETERS;
+pub use random::{Distribution, STREAM_WORDS, Stream};
 
 use library::c;
 
@@ -139,10 +142,9 @@ pub(crate) enum Builtin {
 pub(crate) fn named(name: &str) -> Option<Builtin> {
     Some(match name {
         "fint" => Builtin::Truncation,
-        "random" | "random_arcsine" | "random_beta" | "random_gamma" | "random_normal"
-        | "random_poisson" | "random_tri" | "random_weibull" => Builtin::Random,
         "normal" => Builtin::OldRandom,
         "fpclassify" => Builtin::Missing,
+        _ if Distribution::named(name).is_some() => Builtin::Random,
         _ => Builtin::Math(MathFunction::named(name)?),
     })
 }

@@ -17,6 +17,7 @@
 
 use std::fmt;
 
+use crate::builtins::MOST_PARAMETERS;
 use crate::ir::{
     Access, Address, Base, Block, BlockId, ClockOperand, Function, FunctionId, Instruction,
     Operand, Register, RegisterType, Terminator,
@@ -204,6 +205,18 @@ impl FunctionCheck<'_> {
                 self.wants(target, function.result())?;
                 self.arguments(arguments, function.parameters())
             }
+            I::Random {
+                distribution,
+                target,
+                ref arguments,
+                ..
+            } => {
+                self.wants(target, Double)?;
+                self.arguments(
+                    arguments,
+                    &[Double; MOST_PARAMETERS][..distribution.arity()],
+                )
+            }
             I::Call {
                 target,
                 function,
@@ -274,7 +287,7 @@ impl FunctionCheck<'_> {
     fn access(&mut self, address: Address, access: Access) -> Verdict {
         let (words, writes) = match access {
             Access::Read(words) => (words, false),
-            Access::Write(words) => (words, true),
+            Access::Write(words) | Access::Update(words) => (words, true),
             Access::Take => (0, false),
         };
         let mut end = u64::from(address.offset) + u64::from(words);

@@ -15,7 +15,7 @@
 
 use super::ids::{ClockId, FunctionId, SiteId};
 use crate::builtins::Code;
-pub use crate::builtins::MathFunction;
+pub use crate::builtins::{Distribution, MathFunction, STREAM_WORDS, Stream};
 
 /// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is
 /// a [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds
@@ -196,6 +196,16 @@ pub enum Instruction {
         function: MathFunction,
         target: Register,
         arguments: Vec<Register>,
+        site: SiteId,
+    },
+    /// Draws a random number from the stream whose [`STREAM_WORDS`] words begin at an address, and
+    /// moves the stream on. `target` and `arguments`, as many as the distribution has parameters,
+    /// are doubles. A [`RunTimeErrorKind::Parameter`] if an argument is out of its domain.
+    Random {
+        distribution: Distribution,
+        target: Register,
+        arguments: Vec<Register>,
+        stream: Address,
         site: SiteId,
     },
     /// Reads an integer.
@@ -385,6 +395,8 @@ pub enum RunTimeErrorKind {
     IndexOutOfBounds,
     /// A double that is not a number or does not fit into an integer.
     NotAnInteger,
+    /// A parameter of a random function out of its domain.
+    Parameter(Distribution),
     /// A clock set to a negative value, or a clock bound beyond the limits of the engine.
     ClockValue,
     /// An `assert` that does not hold.

@@ -4,7 +4,7 @@
 //! A new kind of instruction has one row here.
 
 use super::code::{
-    Address, Base, BlockId, ClockOperand, Function, Instruction, Register, Terminator,
+    Address, Base, BlockId, ClockOperand, Function, Instruction, Register, STREAM_WORDS, Terminator,
 };
 use super::ids::{FunctionId, SiteId};
 
@@ -15,6 +15,8 @@ pub(crate) enum Access {
     Read(u32),
     /// It writes this number of words.
     Write(u32),
+    /// It reads this number of words and then writes them.
+    Update(u32),
     /// It takes the address.
     Take,
 }
@@ -44,7 +46,7 @@ macro_rules! operand_walk {
                 >,
             ),
         ) {
-            use Access::{Read, Take, Write};
+            use Access::{Read, Take, Update, Write};
             use Operand::{Clock, Memory, Source, Target};
             match self {
                 Instruction::CountRound { .. } => {}
@@ -72,6 +74,13 @@ macro_rules! operand_walk {
                     for argument in arguments {
                         visit(Source(argument));
                     }
+                    visit(Target(target));
+                }
+                Instruction::Random { target, arguments, stream, .. } => {
+                    for argument in arguments {
+                        visit(Source(argument));
+                    }
+                    visit(Memory(stream, Update(STREAM_WORDS as u32)));
                     visit(Target(target));
                 }
                 Instruction::Call { target, arguments, .. } => {
@@ -189,6 +198,7 @@ impl Instruction {
             Instruction::Arithmetic { site, .. }
             | Instruction::DoubleToInteger { site, .. }
             | Instruction::Math { site, .. }
+            | Instruction::Random { site, .. }
             | Instruction::CheckRange { site, .. }
             | Instruction::ScaleIndex { site, .. }
             | Instruction::CountRound { site }

@@ -217,6 +217,16 @@ impl Display for Instruction {
                 let name = format!("{function:?}").to_lowercase();
                 write!(f, "{target} = {name}({})  {site}", RegisterList(arguments))
             }
+            Instruction::Random {
+                distribution,
+                target,
+                arguments,
+                stream,
+                site,
+            } => {
+                let (name, arguments) = (distribution.name(), RegisterList(arguments));
+                write!(f, "{target} = {name}({arguments}) from {stream}  {site}")
+            }
             Instruction::AddIndices { .. }
             | Instruction::ScaleIndex { .. }
             | Instruction::CheckRange { .. }

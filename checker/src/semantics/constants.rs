@@ -164,6 +164,7 @@ pub(super) fn reason(kind: RunTimeErrorKind) -> &'static str {
         RunTimeErrorKind::OutOfRange => "a value outside its range",
         RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
         RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
+        RunTimeErrorKind::Parameter(_) => "a parameter of a random function out of its domain",
         RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
         RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
         RunTimeErrorKind::StepLimit | RunTimeErrorKind::Interrupted => {

@@ -4,6 +4,7 @@
 #[path = "../common/corpus.rs"]
 #[allow(dead_code, reason = "this program reads some of the files only")]
 mod corpus;
+mod distributions;
 mod models;
 mod operators;
 mod random;

@@ -2,8 +2,8 @@
 
 use checker::exec::{Interpreter, validate};
 use checker::ir::{
-    Address, Base, Block, BlockId, Function, FunctionId, Instruction, IntegerOperator, Register,
-    RegisterType, SiteId, Terminator,
+    Address, Base, Block, BlockId, Distribution, Function, FunctionId, Instruction,
+    IntegerOperator, Register, RegisterType, STREAM_WORDS, SiteId, Terminator,
 };
 
 use crate::support::{state_word, straight_line};
@@ -42,6 +42,46 @@ fn scaled(length: u32, stride: u32) -> Instruction {
         stride,
         site: SITE,
     }
+}
+
+#[test]
+fn wrong_draws_are_found() {
+    let draw = |arguments: &[Register], stream| Instruction::Random {
+        distribution: Distribution::Normal,
+        target: R0,
+        arguments: arguments.to_vec(),
+        stream,
+        site: SITE,
+    };
+    let cases = [
+        (draw(&[R0], state_word(0)), "another number of arguments"),
+        (draw(&[R0, R1], state_word(0)), "another type"),
+        (
+            draw(
+                &[R0, R0],
+                Address {
+                    base: Base::Constants,
+                    ..state_word(0)
+                },
+            ),
+            "a constant that is written",
+        ),
+        (
+            draw(
+                &[R0, R0],
+                Address {
+                    base: Base::Frame,
+                    ..state_word(0)
+                },
+            ),
+            "behind the frame",
+        ),
+    ];
+    for (instruction, expected) in cases {
+        check_flaw(&[one(&[Double, Integer], vec![instruction])], expected);
+    }
+    let fine = one(&[Double], vec![draw(&[R0, R0], state_word(3))]);
+    assert_eq!(validate(&[fine], 0, 0), Ok(3 + STREAM_WORDS));
 }
 
 #[test]

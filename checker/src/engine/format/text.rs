@@ -492,6 +492,7 @@ fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
         RunTimeErrorKind::OutOfRange => "value out of range",
         RunTimeErrorKind::IndexOutOfBounds => "array index out of bounds",
         RunTimeErrorKind::NotAnInteger => "the number does not fit into an integer",
+        RunTimeErrorKind::Parameter(distribution) => distribution.failure(),
         RunTimeErrorKind::ClockValue => {
             "negative value of a clock, or clock bound beyond the limits"
         }

@@ -1,13 +1,13 @@
 //! What each instruction does.
 
-use crate::builtins::Number;
+use crate::builtins::{MOST_PARAMETERS, Number};
 use crate::cancellation;
 use crate::exec::arithmetic::Wrapping;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::{EmittedAssignment, EmittedConstraint, RunTimeError, arithmetic};
 use crate::ir::{
-    ClockId, ClockOperand, Instruction, MathFunction, Overflow, Register, RegisterType,
-    RunTimeErrorKind, SiteId,
+    Address, ClockId, ClockOperand, Distribution, Instruction, MathFunction, Overflow, Register,
+    RegisterType, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream,
 };
 
 use super::machine::Activation;
@@ -39,6 +39,7 @@ impl Execution<'_, '_> {
             Instruction::Arithmetic { site, .. }
             | Instruction::DoubleToInteger { site, .. }
             | Instruction::Math { site, .. }
+            | Instruction::Random { site, .. }
             | Instruction::CheckRange { site, .. }
             | Instruction::ScaleIndex { site, .. }
             | Instruction::CountRound { site }
@@ -148,6 +149,13 @@ impl Execution<'_, '_> {
                 arguments,
                 site,
             } => self.apply(active, *function, *target, arguments, *site)?,
+            Instruction::Random {
+                distribution,
+                target,
+                arguments,
+                stream,
+                ..
+            } => self.draw(active, *distribution, *target, arguments, *stream)?,
             &Instruction::CheckRange {
                 value, low, high, ..
             } => {
@@ -231,6 +239,28 @@ impl Execution<'_, '_> {
             }
             Some((Number::Double(value), _)) => self.set_double(active, target, value),
         }
+        Ok(())
+    }
+
+    /// A random number.
+    fn draw(
+        &mut self,
+        active: Activation,
+        distribution: Distribution,
+        target: Register,
+        arguments: &[Register],
+        stream: Address,
+    ) -> Result<(), RunTimeErrorKind> {
+        let mut doubles = [0.0; MOST_PARAMETERS];
+        for (double, &argument) in doubles.iter_mut().zip(arguments) {
+            *double = self.double(active, argument);
+        }
+        let place = self.place(active, stream);
+        let mut stream = Stream::of(self.words_mut(place, STREAM_WORDS));
+        let value = distribution
+            .sample(&mut stream, &doubles[..arguments.len()])
+            .ok_or(RunTimeErrorKind::Parameter(distribution))?;
+        self.set_double(active, target, value);
         Ok(())
     }
 

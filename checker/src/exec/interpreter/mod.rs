@@ -298,9 +298,15 @@ impl<'run> Execution<'run, '_> {
     }
 
     fn set_word(&mut self, place: WordPlace, value: i32) {
+        self.words_mut(place, 1)[0] = value;
+    }
+
+    /// The words from a place on, to change them.
+    fn words_mut(&mut self, place: WordPlace, count: usize) -> &mut [i32] {
+        let words = place.offset..place.offset + count;
         match place.space {
-            Space::State => self.context.state[place.offset] = value,
-            Space::Frames => self.machine.frames[place.offset] = value,
+            Space::State => &mut self.context.state[words],
+            Space::Frames => &mut self.machine.frames[words],
             Space::Constants => unreachable!("constants are never written"),
         }
     }

@@ -5,13 +5,13 @@
 //! bits), else the integer that the function returned, or 0. A double or an address is returned as
 //! a second value.
 
-use crate::builtins::IntegerResult;
+use crate::builtins::{IntegerResult, MOST_PARAMETERS};
 use crate::cancellation;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::{
     Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, Wraps, arithmetic,
 };
-use crate::ir::{ClockId, RunTimeErrorKind, SiteId};
+use crate::ir::{ClockId, Distribution, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream};
 
 /// The first argument of every compiled function. Compiled code reads and writes `rounds_left` and
 /// reads `constants`.
@@ -50,6 +50,7 @@ impl<'call> NativeContext<'call> {
     }
 }
 
+/// The kinds of errors but for [`RunTimeErrorKind::Parameter`].
 const KINDS: [RunTimeErrorKind; 11] = [
     RunTimeErrorKind::Overflow,
     RunTimeErrorKind::DivisionByZero,
@@ -64,9 +65,17 @@ const KINDS: [RunTimeErrorKind; 11] = [
     RunTimeErrorKind::Interrupted,
 ];
 
+/// All kinds of errors, in the order of their numbers in a status.
+fn kinds() -> impl Iterator<Item = RunTimeErrorKind> {
+    let parameters = Distribution::ALL.iter().copied();
+    KINDS
+        .into_iter()
+        .chain(parameters.map(RunTimeErrorKind::Parameter))
+}
+
 /// The status of a failed call.
 pub(super) fn failure_status(kind: RunTimeErrorKind, SiteId(site): SiteId) -> i64 {
-    let index = KINDS.iter().position(|&known| known == kind);
+    let index = kinds().position(|known| known == kind);
     let index = index.expect("the table lists every kind") as i64;
     i64::MIN | index << 32 | i64::from(site)
 }
@@ -76,8 +85,9 @@ pub(super) fn result_of_status(status: i64) -> Result<i32, RunTimeError> {
     if status >= 0 {
         return Ok(status as i32);
     }
+    let kind = kinds().nth((status >> 32 & 0xff) as usize);
     Err(RunTimeError {
-        kind: KINDS[(status >> 32 & 0xff) as usize],
+        kind: kind.expect("a status has the number of a kind"),
         site: SiteId(status as u32),
     })
 }
@@ -100,6 +110,25 @@ pub(super) extern "C" fn power(base: i32, exponent: i32) -> IntegerResult {
     arithmetic::power(base, exponent).map_or(IntegerResult::NONE, |(power, has_wrapped)| {
         IntegerResult::new(power, has_wrapped)
     })
+}
+
+/// Draws a random number; a NaN if an argument is out of its domain. The arguments are as many as
+/// the distribution takes, and further ones of no meaning.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn draw(
+    stream: *mut i32,
+    distribution: u32,
+    first: f64,
+    second: f64,
+    third: f64,
+) -> f64 {
+    // SAFETY: compiled code passes the place of the words of a stream, whose index was checked, and
+    // nothing else uses them during the call.
+    let words = unsafe { std::slice::from_raw_parts_mut(stream, STREAM_WORDS) };
+    let distribution = Distribution::ALL[distribution as usize];
+    let arguments: [f64; MOST_PARAMETERS] = [first, second, third];
+    let value = distribution.sample(&mut Stream::of(words), &arguments[..distribution.arity()]);
+    value.unwrap_or(f64::NAN)
 }
 
 /// Emits a clock constraint.

@@ -4,11 +4,11 @@ use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I32, I64};
 use cranelift_codegen::ir::{InstBuilder, InstructionData, Opcode, Value};
 
-use crate::builtins::{Code, IntegerResult};
+use crate::builtins::{Code, IntegerResult, MOST_PARAMETERS};
 use crate::exec::jit::runtime;
 use crate::ir::{
-    DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
-    RunTimeErrorKind, SiteId,
+    Address, Distribution, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register,
+    Relation, RunTimeErrorKind, SiteId,
 };
 
 use super::Translator;
@@ -106,6 +106,13 @@ impl Translator<'_> {
                 arguments,
                 site,
             } => (*target, self.math(*function, arguments, *site)),
+            Instruction::Random {
+                distribution,
+                target,
+                arguments,
+                stream,
+                site,
+            } => (*target, self.draw(*distribution, arguments, *stream, *site)),
             &Instruction::ScaleIndex {
                 target,
                 index,
@@ -315,6 +322,31 @@ impl Translator<'_> {
             .icmp_imm_s(IntCC::SignedLessThan, result, 0);
         self.fail_if(is_none, RunTimeErrorKind::NotAnInteger, site);
         self.unwrapped(result, site)
+    }
+
+    fn draw(
+        &mut self,
+        distribution: Distribution,
+        arguments: &[Register],
+        stream: Address,
+        site: SiteId,
+    ) -> Value {
+        let number = Distribution::ALL
+            .iter()
+            .position(|&one| one == distribution);
+        let number = number.expect("the list has every distribution");
+        let mut values = vec![self.pointer(stream), self.integer(number as i32)];
+        for index in 0..MOST_PARAMETERS {
+            values.push(match arguments.get(index) {
+                Some(&argument) => self.get(argument),
+                None => self.builder.ins().f64const(0.0),
+            });
+        }
+        let code = runtime::draw as *const () as usize;
+        let value = self.call_back(code, Some(F64), &values);
+        let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
+        self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
+        value
     }
 
     /// A condition as 0 or 1.

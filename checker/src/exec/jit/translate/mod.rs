@@ -212,6 +212,7 @@ impl Translator<'_> {
             Instruction::Arithmetic { .. }
             | Instruction::DoubleToInteger { .. }
             | Instruction::Math { .. }
+            | Instruction::Random { .. }
             | Instruction::ScaleIndex { .. } => self.compute_checked(instruction),
             Instruction::CheckRange { .. }
             | Instruction::CountRound { .. }

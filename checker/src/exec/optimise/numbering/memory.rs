@@ -5,7 +5,7 @@
 
 use crate::builtins::Number;
 use crate::exec::arithmetic;
-use crate::ir::{Address, Base, Instruction, Register, RegisterType};
+use crate::ir::{Address, Base, Instruction, Register, RegisterType, STREAM_WORDS};
 
 use super::{Numbering, Simplified};
 
@@ -94,6 +94,10 @@ impl Numbering<'_, '_> {
             }
             Instruction::CopyWords { target, words, .. } => {
                 self.forget(target, words);
+                Simplified::Instruction(instruction)
+            }
+            Instruction::Random { stream, .. } => {
+                self.forget(stream, STREAM_WORDS as u32);
                 Simplified::Instruction(instruction)
             }
             _ => {

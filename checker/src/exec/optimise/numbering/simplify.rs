@@ -74,6 +74,7 @@ impl Numbering<'_, '_> {
             | Instruction::StoreInteger { .. }
             | Instruction::StoreDouble { .. }
             | Instruction::CopyWords { .. }
+            | Instruction::Random { .. }
             | Instruction::Call { .. } => self.simplify_access(instruction),
             other => match self.fold(&other) {
                 Some(literal) => Simplified::Literal(literal),
