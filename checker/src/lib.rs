@@ -26,6 +26,8 @@ pub mod search;
 
 pub mod game;
 
+pub mod stochastic;
+
 pub mod verify;
 
 pub mod engine;

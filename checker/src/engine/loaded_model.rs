@@ -14,7 +14,7 @@ use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
 use crate::exec::Executor;
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
-use crate::semantics::{self, Model};
+use crate::semantics::{self, Model, Reading};
 use crate::syntax::{
     self,
     ast::{QueryText, Template},
@@ -43,6 +43,8 @@ pub struct LoadedModel {
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
     code: Option<PreparedCode>,
+    /// The model in the stochastic reading, once a statistical query was asked.
+    pub(super) stochastic: Option<StochasticModel>,
 }
 
 impl LoadedModel {
@@ -56,7 +58,8 @@ impl LoadedModel {
         if diagnostics.iter().any(Diagnostic::is_error) {
             return Err(Rejection::new(diagnostics, &sources));
         }
-        let (model, more) = semantics::analyse(&parsed.document, &prelude, &sources);
+        let (model, more) =
+            semantics::analyse(&parsed.document, &prelude, &sources, Reading::Symbolic);
         diagnostics.extend(more);
         let Some(model) = model else {
             return Err(Rejection::new(diagnostics, &sources));
@@ -80,6 +83,7 @@ impl LoadedModel {
             warnings,
             load_seconds,
             code: None,
+            stochastic: None,
         })
     }
 
@@ -183,6 +187,28 @@ impl LoadedModel {
         Err(Rejection::new(diagnostics, &self.sources))
     }
 
+    /// The model in the stochastic reading: the text is analysed again when the first statistical
+    /// query comes.
+    pub(super) fn stochastic(&mut self) -> Result<&mut StochasticModel, Rejection> {
+        if self.stochastic.is_none() {
+            let prelude = syntax::prelude(&mut self.sources);
+            let text = self.text.as_bytes().to_vec();
+            let parsed = syntax::read_model(&self.path, text, &mut self.sources);
+            let (model, found) = semantics::analyse(
+                &parsed.document,
+                &prelude,
+                &self.sources,
+                Reading::Stochastic,
+            );
+            let Some(model) = model else {
+                let errors = found.into_iter().filter(Diagnostic::is_error).collect();
+                return Err(Rejection::new(errors, &self.sources));
+            };
+            self.stochastic = Some(StochasticModel { model, code: None });
+        }
+        Ok(self.stochastic.as_mut().expect("it was just made"))
+    }
+
     /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has
     /// an option of its own.
     pub fn set_overflow(&mut self, overflow: Overflow) {
@@ -205,6 +231,12 @@ impl LoadedModel {
         self.strategies.retain(|one| one.name != named.name);
         self.strategies.push(named);
     }
+}
+
+/// A model in the stochastic reading.
+pub(super) struct StochasticModel {
+    pub(super) model: Model,
+    pub(super) code: Option<PreparedCode>,
 }
 
 /// A strategy with the query that it answers.

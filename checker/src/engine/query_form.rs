@@ -2,7 +2,7 @@
 
 use crate::diagnostics::SourceMap;
 use crate::syntax;
-use crate::syntax::ast::{Extremum, Name, Query, QueryKind};
+use crate::syntax::ast::{Extremum, Name, Query, QueryKind, Statistical};
 
 /// What a query asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,6 +71,8 @@ pub fn query_form(text: &str) -> Option<QueryForm> {
         QueryKind::Control(_) => "control",
         QueryKind::SaveStrategy { .. } => "saveStrategy",
         QueryKind::LoadStrategy { .. } => "loadStrategy",
+        QueryKind::Statistical(Statistical::Expectation { .. }) => "E",
+        QueryKind::Statistical(_) => "Pr",
         QueryKind::Unsupported(_) => "unsupported",
     };
     let saved = match &query.kind {

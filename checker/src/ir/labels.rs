@@ -17,6 +17,9 @@ pub struct Guard {
     pub atoms: Vec<ClockAtom>,
     /// Whether it is known to fail in every state, if it does not end in a run-time error.
     pub never_holds: bool,
+    /// In the stochastic reading, where `function` returns a mask (see [`super::Chances`]): whether
+    /// it leaves the time for which the mask stands.
+    pub is_timed: bool,
 }
 
 impl Guard {

@@ -19,16 +19,19 @@
 
 mod ids;
 
+mod chances;
 mod code;
 mod constants;
 mod labels;
 mod network;
 mod operands;
 mod queries;
+mod statistical;
 
 mod accesses;
 mod print;
 
+pub use chances::*;
 pub use code::*;
 pub use constants::Constants;
 pub use ids::*;
@@ -36,3 +39,4 @@ pub use labels::*;
 pub use network::*;
 pub(crate) use operands::{Access, Operand};
 pub use queries::*;
+pub use statistical::*;

@@ -1,5 +1,6 @@
 //! The network: processes with locations and edges, clocks, channels, variables.
 
+use super::chances::{Chances, LocationChances};
 use super::code::{Function, Overflow};
 use super::constants::Constants;
 use super::ids::{ChannelId, ClockId, EdgeId, FunctionId, LocationId, ProcessId, SiteId};
@@ -39,6 +40,8 @@ pub struct Network {
     pub features: Features,
     /// The scalar sets, by the number that shapes and coordinates give.
     pub scalar_sets: Vec<ScalarSet>,
+    /// What there is in the stochastic reading only.
+    pub chances: Chances,
 }
 
 impl Network {
@@ -122,6 +125,8 @@ pub struct Location {
     /// Clocks whose rate the invariant sets (`x' == e`; quantifiers unrolled), with the function
     /// that gives the rate (0 or 1).
     pub rates: Vec<(ClockId, FunctionId)>,
+    /// What it says of chances.
+    pub chances: LocationChances,
     /// The edges that leave it.
     pub edges: Vec<EdgeId>,
     /// Where it is drawn, for pictures.
@@ -177,6 +182,8 @@ pub struct Branch {
     pub target: LocationId,
     /// The update of the leg.
     pub update: Update,
+    /// In the stochastic reading: leaves the weight as a double; `None` is 1.
+    pub weight: Option<FunctionId>,
 }
 
 /// The labels of an edge as text, blanks collapsed; empty where there is none.

@@ -1,7 +1,9 @@
 //! Assignments, and the conversion of values to the type of what takes them.
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
+use super::expressions::read;
 use super::operators::{as_truth, integer_operator, to_double};
 use super::typed::{Expr, Kind};
 use super::types::Type;
@@ -111,10 +113,10 @@ impl Checker<'_> {
         if value.is_error() || ty.is_error() {
             return None;
         }
-        let value = if *ty == Type::Double {
-            self.clock_value(value)
-        } else {
-            value
+        let value = match ty {
+            Type::Double => read(self.clock_value(value)),
+            Type::RealClock => read(value),
+            _ => value,
         };
         if !ty.accepts(&value.ty) {
             let help = if ty.is_integral() && value.ty == Type::Double {
@@ -136,7 +138,7 @@ impl Checker<'_> {
         }
         let span = value.span;
         Some(match ty {
-            Type::Double => to_double(value),
+            Type::Double | Type::RealClock => to_double(value),
             Type::Bool => as_truth(value, span),
             _ => value,
         })
@@ -151,6 +153,15 @@ impl Checker<'_> {
     ) -> Expr {
         if !self.expect_mutable(&target) || value.is_error() {
             return Expr::error(span);
+        }
+        if target.ty.is_real()
+            && self.reading == Reading::Stochastic
+            && value.ty.is_number()
+            && !target.has_effect()
+        {
+            let old = read(target.clone());
+            let new = self.binary(operator, old, value, span);
+            return self.assignment(target, new, 0..0, span);
         }
         if !(target.ty.is_integral() && value.ty.is_integral()) {
             return self.operands_refused(&target, &value, span);

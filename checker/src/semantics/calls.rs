@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
+use super::expressions::read;
 use super::operators::folded_math;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Parameter, Signature};
@@ -11,6 +13,7 @@ use super::types::Type;
 use crate::builtins::{self, Builtin};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
+use crate::ir::Distribution;
 use crate::ir::{FunctionId, RegisterType};
 use crate::syntax::ast::{self, ExprKind};
 
@@ -80,7 +83,7 @@ impl Checker<'_> {
         let mut converted = Vec::with_capacity(arguments.len());
         for (argument, parameter) in arguments.iter().zip(&signature.parameters) {
             let before = self.unknowns.len();
-            let argument = self.expression(argument);
+            let argument = self.place(argument);
             let argument = if parameter.reference {
                 self.reference_left_out(argument, parameter)
             } else {
@@ -168,7 +171,7 @@ impl Checker<'_> {
             return None;
         }
         if !parameter.reference {
-            return self.converted(argument, &parameter.ty);
+            return self.converted(read(argument), &parameter.ty);
         }
         let is_place = argument.is_place();
         let is_readable = is_place && parameter.ty.holds(&argument.ty);
@@ -216,6 +219,9 @@ impl Checker<'_> {
         let function = match builtins::named(name) {
             Some(Builtin::Math(function)) => function,
             Some(Builtin::Truncation) => return self.truncation(arguments, span),
+            Some(Builtin::Random | Builtin::OldRandom) if self.reading == Reading::Stochastic => {
+                return self.drawn(name, arguments, span);
+            }
             Some(Builtin::Random | Builtin::OldRandom) => {
                 return self.random(name, name_span, arguments);
             }
@@ -242,6 +248,27 @@ impl Checker<'_> {
             return Expr::error(span);
         }
         folded_math(function, converted, span)
+    }
+
+    /// A random number.
+    fn drawn(&mut self, name: &str, arguments: Vec<Expr>, span: Span) -> Expr {
+        let Some(distribution) = Distribution::named(name) else {
+            self.unknown_name(name, span);
+            return Expr::error(span);
+        };
+        if arguments.len() != distribution.arity() {
+            self.wrong_count(name, distribution.arity(), arguments.len(), span);
+            return Expr::error(span);
+        }
+        let wanted = arguments.len();
+        let converted: Vec<Expr> = arguments
+            .into_iter()
+            .filter_map(|argument| self.converted(argument, &Type::Double))
+            .collect();
+        if converted.len() < wanted {
+            return Expr::error(span);
+        }
+        Expr::new(Kind::Random(distribution, converted), Type::Double, span)
     }
 
     /// A random number, which nothing may depend on.

@@ -4,7 +4,9 @@ use std::collections::HashSet;
 
 use rustc_hash::FxHashMap;
 
+use super::Reading;
 use super::codes;
+use super::layout::Relocation;
 use super::left_out::causes::{LeftOut, declared_at};
 use super::lower::{Builder, Images};
 use super::scope::{Entity, Scope};
@@ -31,6 +33,10 @@ const CONSTANT_ROUND_LIMIT: u64 = 10_000_000;
 pub(super) struct Checker<'a> {
     /// The texts, for labels and messages.
     pub(super) sources: &'a SourceMap,
+    /// What clocks are.
+    pub(super) reading: Reading,
+    /// From provisional offsets to those of the layout, while a query is checked.
+    pub(super) relocation: Relocation,
     /// What lasts.
     pub(super) world: World,
     /// The open scopes, outermost first.
@@ -93,9 +99,11 @@ pub(super) struct Reports {
 }
 
 impl<'a> Checker<'a> {
-    pub(super) fn new(sources: &'a SourceMap, world: World) -> Checker<'a> {
+    pub(super) fn new(sources: &'a SourceMap, reading: Reading, world: World) -> Checker<'a> {
         Checker {
             sources,
+            reading,
+            relocation: Relocation::default(),
             world,
             scopes: vec![Scope::default()],
             diagnostics: Vec::new(),
@@ -312,6 +320,8 @@ impl<'a> Checker<'a> {
             });
         }
         self.add_parts(&full_name, ty, owner, &mut Vec::new());
+        let clocks = &mut self.world.network.chances.clocks;
+        super::layout::real_clocks(ty, base.words, clocks);
         Place {
             root: Root::State,
             base,

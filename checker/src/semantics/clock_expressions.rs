@@ -10,7 +10,7 @@
 use super::checker::Checker;
 use super::codes;
 use super::offsets::known_offset;
-use super::operators::{integer_operation, is_clock_term};
+use super::operators::{integer_operation, is_clock_term, to_double};
 use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
 use super::types::{Class, Memory, Type};
 use crate::diagnostics::{Diagnostic, Span};
@@ -176,6 +176,13 @@ impl Checker<'_> {
     pub(super) fn rate(&mut self, clock: Expr, rate: Expr, before: usize, span: Span) -> Expr {
         if clock.is_error() || rate.is_error() {
             return Expr::error(span);
+        }
+        if clock.ty == Type::RealClock && rate.ty.is_number() {
+            let kind = Kind::Rate {
+                clock: Box::new(clock),
+                rate: Box::new(to_double(rate)),
+            };
+            return Expr::new(kind, Type::Constraint(Class::InvariantWithRate), span);
         }
         let Type::Clock { hybrid } = clock.ty else {
             self.error(

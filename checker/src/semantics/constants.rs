@@ -57,6 +57,11 @@ impl Checker<'_> {
             );
             return None;
         }
+        if *ty == Type::RealClock {
+            let words = self.known_words(expr, &Type::Double, what)?;
+            let value = arithmetic::double_of_words(words[0], words[1]);
+            return Some(Type::clock_words(value).to_vec());
+        }
         let words = match expr.kind {
             Kind::Int(value) => vec![value],
             Kind::Double(value) => arithmetic::double_words(value).to_vec(),

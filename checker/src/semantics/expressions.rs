@@ -12,8 +12,13 @@ use crate::exec::arithmetic;
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, UnaryOp};
 
 impl Checker<'_> {
-    /// Checks an expression.
+    /// Checks an expression that stands for a value.
     pub(super) fn expression(&mut self, expr: &ast::Expr) -> Expr {
+        read(self.place(expr))
+    }
+
+    /// Checks an expression that may stand for a place: a real clock is not read.
+    pub(super) fn place(&mut self, expr: &ast::Expr) -> Expr {
         let span = expr.span;
         match &expr.kind {
             ExprKind::Int(value) => self.integer_literal(*value, span),
@@ -36,7 +41,7 @@ impl Checker<'_> {
             }
             ExprKind::Assign(operator, target, value) => {
                 let before = self.unknowns.len();
-                let target = self.expression(target);
+                let target = self.place(target);
                 let behind = self.unknowns.len();
                 let value = self.expression(value);
                 match operator {
@@ -49,7 +54,7 @@ impl Checker<'_> {
                 delta,
                 postfix,
             } => {
-                let target = self.expression(target);
+                let target = self.place(target);
                 self.step(target, *delta, *postfix, span)
             }
             ExprKind::Rate(inner) => {
@@ -295,7 +300,7 @@ impl Checker<'_> {
             for (rate, value) in [(left, right), (right, left)] {
                 if let ExprKind::Rate(clock) = &rate.kind {
                     let before = self.unknowns.len();
-                    let clock = self.expression(clock);
+                    let clock = self.place(clock);
                     let value = self.expression(value);
                     return self.rate(clock, value, before, span);
                 }
@@ -371,6 +376,15 @@ impl Checker<'_> {
             self.report(Diagnostic::new(codes::SIDE_EFFECT, expr.span, message).help(help));
         }
     }
+}
+
+/// The value of a real clock where one is given; anything else as it is.
+pub(super) fn read(expr: Expr) -> Expr {
+    if expr.ty != Type::RealClock || expr.is_error() {
+        return expr;
+    }
+    let span = expr.span;
+    Expr::new(Kind::ClockReading(Box::new(expr)), Type::Double, span)
 }
 
 /// The integer type of a choice between two.

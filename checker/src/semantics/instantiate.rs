@@ -9,6 +9,7 @@ use crate::cancellation;
 use super::assigned::assigned_names;
 use super::checker::Checker;
 use super::codes;
+use super::expressions::read;
 use super::offsets::known_offset;
 use super::processes::{Group, parameter_count};
 use super::scope::{Entity, Scope};
@@ -128,7 +129,7 @@ impl Checker<'_> {
             self.declare(&parameter.name, entity);
         }
         for argument in arguments {
-            let argument = self.expression(argument);
+            let argument = self.place(argument);
             let argument = self.place_left_out(argument);
             self.expect_pure(&argument, "an argument of a template");
         }
@@ -386,7 +387,7 @@ impl Checker<'_> {
             let ty = self.formal_type(formal, next, &mut bound);
             self.scopes.push(scope.clone());
             self.free_parameter_seen = false;
-            let argument = self.expression(argument);
+            let argument = self.place(argument);
             let argument = self.place_left_out(argument);
             let entity = self.bind_argument(formal, &ty, argument);
             self.scopes.pop();
@@ -404,7 +405,7 @@ impl Checker<'_> {
         if !formal.reference || (constant && !is_fixed_place(&argument)) {
             let free = self.free_parameter_seen;
             let span = argument.span;
-            let argument = self.converted(argument, ty)?;
+            let argument = self.converted(read(argument), ty)?;
             let words = self.known_words(&argument, ty, "an argument of a template")?;
             return Some(self.constant_entity(words, ty, free, span));
         }
@@ -538,6 +539,7 @@ impl Checker<'_> {
             network.layout.variables.len(),
             self.world.initial.len(),
             self.world.initial_meta.len(),
+            network.chances.clocks.len(),
         );
         self.is_generic = true;
         self.hides_system = true;
@@ -563,6 +565,7 @@ impl Checker<'_> {
         network.initial_clocks.truncate(lengths.0);
         network.channels.truncate(lengths.1);
         network.layout.variables.truncate(lengths.2);
+        network.chances.clocks.truncate(lengths.5);
         self.world.initial.truncate(lengths.3);
         self.world.initial_meta.truncate(lengths.4);
     }

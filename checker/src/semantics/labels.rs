@@ -1,12 +1,16 @@
 //! Guards, invariants, synchronisations and updates: checking, and lowering to what the network
 //! runs.
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::merge_ranges;
 use super::lower::clocks::{bound_range, comparisons};
-use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, conjuncts};
-use super::types::{Class, Type};
+use super::lower::horizons::curved;
+use super::offsets::known_offset;
+use super::operators::to_double;
+use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, Root, conjuncts};
+use super::types::{Class, Memory, Type};
 use crate::ir::{
     self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
     FixedConstraint, FunctionId, Guard, Update,
@@ -50,6 +54,9 @@ impl Checker<'_> {
         for part in parts {
             self.depends_on_clocks(part);
         }
+        if self.reading == Reading::Stochastic {
+            return self.make_mask(parts, locals, place);
+        }
         let mut guard = Guard {
             never_holds: parts.iter().any(|part| part.interval == (0, 0)),
             ..Guard::default()
@@ -83,6 +90,98 @@ impl Checker<'_> {
         }
         guard.emits = emits;
         guard
+    }
+
+    /// Lowers a conjunction of conditions on real clocks.
+    fn make_mask(&mut self, parts: &[Expr], locals: &[LocalId], place: &str) -> Guard {
+        for span in parts.iter().filter_map(curved) {
+            self.error(
+                codes::CONDITION_CURVED,
+                span,
+                "this does not change at a constant rate as time passes",
+                "compare sums of clocks that run at constant rates; multiply them by variables only",
+            );
+        }
+        if !self.can_lower() || parts.is_empty() {
+            return Guard::default();
+        }
+        let known = self.locals.clone();
+        let mut builder = self.builder(&known);
+        builder.select_parameters(locals);
+        let parts_by_reference: Vec<&Expr> = parts.iter().collect();
+        let (function, is_timed) = builder.mask(place.to_owned(), &parts_by_reference);
+        Guard {
+            function: Some(function),
+            is_timed,
+            never_holds: parts.iter().any(|part| part.interval == (0, 0)),
+            ..Guard::default()
+        }
+    }
+
+    /// A function that leaves the value of a number as a double.
+    pub(super) fn make_real(
+        &mut self,
+        expr: Expr,
+        locals: &[LocalId],
+        place: String,
+    ) -> Option<FunctionId> {
+        if expr.is_error() || !expr.ty.is_number() || !self.can_lower() {
+            return None;
+        }
+        let expr = to_double(expr);
+        let known = self.locals.clone();
+        let mut builder = self.builder(&known);
+        builder.select_parameters(locals);
+        Some(builder.real_result(place, &expr))
+    }
+
+    /// What an invariant says of the rates of real clocks.
+    pub(super) fn make_rates(&mut self, rates: Vec<Expr>, place: &str) -> ir::LocationChances {
+        let mut chances = ir::LocationChances::default();
+        let mut pairs = Vec::new();
+        for rate in rates {
+            let span = rate.span;
+            let Kind::Rate { clock, rate } = rate.kind else {
+                continue;
+            };
+            let offset = known_offset(&clock, Memory::Words);
+            let is_state = clock
+                .variable()
+                .is_some_and(|place| place.root == Root::State);
+            let Some(offset) = offset.filter(|_| is_state) else {
+                self.error(
+                    codes::RATE_OF_NO_CLOCK,
+                    span,
+                    "the rate of a clock that is chosen when the model runs cannot be set",
+                    "use a constant index",
+                );
+                continue;
+            };
+            if chances.rated_clocks.contains(&offset) {
+                self.error(
+                    codes::RATE_TWICE,
+                    span,
+                    "this invariant gives a clock two rates",
+                    "leave one of them out",
+                );
+            }
+            if rate.is_timed() {
+                self.error(
+                    codes::RATE_VARIES,
+                    rate.span,
+                    "statistical queries need rates that stay the same until the next move; this one depends on a clock",
+                    "approximate it by locations with constant rates",
+                );
+            }
+            chances.rated_clocks.push(offset);
+            pairs.push((*clock, *rate));
+        }
+        if !pairs.is_empty() && self.can_lower() {
+            let known = self.locals.clone();
+            let function = self.builder(&known).rates(place.to_owned(), &pairs);
+            chances.rates = Some(function);
+        }
+        chances
     }
 
     /// The clock and the function of `clock' == rate`.

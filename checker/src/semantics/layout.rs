@@ -9,6 +9,20 @@ use super::typed::{LOCATION_WORDS, META_WORDS};
 use super::types::Type;
 use crate::ir::{Address, Base, Function, Instruction, Network, Shape, Update};
 
+/// Provisional offsets of the words that the stochastic reading puts before all variables.
+pub(super) mod chance_words {
+    use crate::ir::STREAM_WORDS;
+
+    /// The state of the random numbers.
+    pub(in crate::semantics) const STREAM: u32 = 0;
+    /// Where functions leave a double: a time or a rate.
+    pub(in crate::semantics) const RESULT: u32 = STREAM + STREAM_WORDS as u32;
+    /// How far ahead of the state conditions are asked.
+    pub(in crate::semantics) const AHEAD: u32 = RESULT + 2;
+    /// All of them.
+    pub(in crate::semantics) const COUNT: u32 = AHEAD + 2;
+}
+
 /// From provisional offsets to those of the final layout.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Relocation {
@@ -46,6 +60,7 @@ impl Relocation {
                 | Instruction::StoreInteger { address, .. }
                 | Instruction::StoreDouble { address, .. }
                 | Instruction::AddressOf { address, .. } => self.address(address),
+                Instruction::Random { stream, .. } => self.address(stream),
                 Instruction::CopyWords { target, source, .. } => {
                     self.address(target);
                     self.address(source);
@@ -62,6 +77,13 @@ impl Relocation {
     /// Relocates what the network says about words.
     pub(super) fn network(self, network: &mut Network) {
         self.functions(&mut network.functions);
+        let chances = &mut network.chances;
+        let words = [&mut chances.stream, &mut chances.result, &mut chances.ahead];
+        let locations = network.processes.iter_mut().flat_map(|p| &mut p.locations);
+        let rated = locations.flat_map(|location| &mut location.chances.rated_clocks);
+        for offset in words.into_iter().chain(&mut chances.clocks).chain(rated) {
+            *offset = self.offset(*offset);
+        }
         for variable in &mut network.layout.variables {
             variable.offset = self.offset(variable.offset);
         }
@@ -88,6 +110,27 @@ impl Relocation {
     }
 }
 
+/// Appends the first words of the real clocks of a variable that lies at `offset`.
+pub(super) fn real_clocks(ty: &Type, offset: u32, clocks: &mut Vec<u32>) {
+    match ty {
+        Type::RealClock => clocks.push(offset),
+        Type::Array(array) if ty.any(&|part| *part == Type::RealClock) => {
+            let stride = array.part.size().words;
+            for i in 0..array.index.length {
+                real_clocks(&array.part, offset + i * stride, clocks);
+            }
+        }
+        Type::Struct(record) => {
+            let mut offset = offset;
+            for (_, ty) in &record.fields {
+                real_clocks(ty, offset, clocks);
+                offset += ty.size().words;
+            }
+        }
+        _ => {}
+    }
+}
+
 /// Ascending disjoint ranges that cover the same words.
 pub(super) fn merge_ranges(mut ranges: Vec<(u32, u32)>) -> Vec<(u32, u32)> {
     ranges.sort_unstable();
@@ -108,6 +151,10 @@ pub(super) fn shape(ty: &Type) -> Shape {
     match ty {
         Type::Bool => Shape::Bool,
         Type::Double => Shape::Double,
+        Type::RealClock => Shape::Struct(vec![
+            (String::from("value"), Shape::Double),
+            (String::from("rate"), Shape::Double),
+        ]),
         Type::Scalar { set, size } => Shape::Scalar {
             size: *size,
             set: *set,

@@ -82,6 +82,8 @@ mod members;
 
 mod queries;
 
+mod statistical;
+
 use self::left_out::LeftOut;
 use crate::diagnostics::{Diagnostic, SourceMap};
 use crate::ir;
@@ -92,10 +94,21 @@ use crate::syntax::ast;
 pub struct Model {
     /// The network.
     pub network: ir::Network,
+    reading: Reading,
     world: checker::World,
     relocation: layout::Relocation,
     /// The variables whose values queries cannot know.
     left_out: left_out::Causes,
+}
+
+/// What clocks are to a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reading {
+    /// Dimensions of zones: what symbolic and game queries need.
+    #[default]
+    Symbolic,
+    /// Words of the state with a value and a rate: what statistical queries need.
+    Stochastic,
 }
 
 /// Checks and lowers a model; `None` if there are mistakes. The diagnostics are sorted by place.
@@ -103,12 +116,13 @@ pub fn analyse(
     document: &ast::Document,
     prelude: &[ast::Declaration],
     sources: &SourceMap,
+    reading: Reading,
 ) -> (Option<Model>, Vec<Diagnostic>) {
     let mut causes = left_out::Causes::default();
     let mut rounds = 1;
     let (checker, relocation) = loop {
         let world = checker::World::default();
-        let mut checker = checker::Checker::new(sources, world);
+        let mut checker = checker::Checker::new(sources, reading, world);
         checker.left_out = LeftOut::of(causes);
         let relocation = checker.document(document, prelude);
         if !checker.has_errors() || rounds == left_out::MOST_ROUNDS {
@@ -125,6 +139,7 @@ pub fn analyse(
     let network = std::mem::take(&mut world.network);
     let model = Model {
         network,
+        reading,
         world,
         relocation,
         left_out: checker.left_out.into_fixed(),
@@ -141,15 +156,34 @@ impl Model {
         sources: &SourceMap,
         strategies: &[String],
     ) -> (Option<ir::Query>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| checker.query(query, strategies))
+    }
+
+    /// The same for a statistical query; the model is in the stochastic reading.
+    pub fn compile_statistical(
+        &mut self,
+        query: &ast::Query,
+        sources: &SourceMap,
+    ) -> (Option<ir::StatisticalQuery>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| checker.statistical(query))
+    }
+
+    /// Adds what a query brings to the network.
+    fn compile<T>(
+        &mut self,
+        sources: &SourceMap,
+        check: impl FnOnce(&mut checker::Checker<'_>) -> Option<T>,
+    ) -> (Option<T>, Vec<Diagnostic>) {
         let mut world = std::mem::take(&mut self.world);
         world.network = std::mem::take(&mut self.network);
         let known = world.network.functions.len();
         let scopes = std::mem::take(&mut world.query_scopes);
-        let mut checker = checker::Checker::new(sources, world);
+        let mut checker = checker::Checker::new(sources, self.reading, world);
         checker.scopes = scopes;
         checker.left_out = LeftOut::of(std::mem::take(&mut self.left_out));
         checker.is_query = true;
-        let compiled = checker.query(query, strategies);
+        checker.relocation = self.relocation;
+        let compiled = check(&mut checker);
         let has_errors = !checker.can_lower();
         let diagnostics = sorted(checker.diagnostics);
         self.left_out = checker.left_out.into_fixed();

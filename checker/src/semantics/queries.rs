@@ -18,12 +18,21 @@ use crate::syntax::ast;
 impl Checker<'_> {
     /// Checks and lowers a query.
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
+        if let ast::QueryKind::Statistical(_) = &query.kind {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                query.formula,
+                "a statistical query has an estimate only, and none is wanted here",
+                "ask it on its own, with `check`",
+            );
+            return None;
+        }
         if let ast::QueryKind::Unsupported(name) = &query.kind {
             self.error(
                 codes::QUERY_UNSUPPORTED,
                 name.span,
                 format!("{} queries are not supported", name.text),
-                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds and control:",
+                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, Pr[<=10](<> p) and E[<=10; 1000](max: e)",
             );
             return None;
         }
@@ -113,7 +122,7 @@ impl Checker<'_> {
                 }
                 Some(QueryKind::LoadStrategy { file: file.clone() })
             }
-            ast::QueryKind::Unsupported(_) => None,
+            ast::QueryKind::Statistical(_) | ast::QueryKind::Unsupported(_) => None,
         }
     }
 
@@ -312,7 +321,7 @@ impl Checker<'_> {
     }
 
     /// Reports a member of a process set that is chosen outside a quantifier and cannot be indexed.
-    fn report_members(&mut self, expr: &Expr, span: Span) {
+    pub(super) fn report_members(&mut self, expr: &Expr, span: Span) {
         if std::mem::take(&mut self.needs_unrolling) && expr.is_error() {
             self.error(
                 codes::MEMBER_NOT_CONSTANT,

@@ -1,15 +1,16 @@
 //! A whole model: the order in which its parts are checked, what concerns all processes, and the
 //! finished network.
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
-use super::layout::Relocation;
+use super::layout::{Relocation, chance_words};
 use super::offsets::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Root};
 use super::types::Memory;
 use crate::diagnostics::{Diagnostic, Span};
-use crate::ir::{AssignedValue, Clock, ClockAtom, Features, Location, Network};
+use crate::ir::{AssignedValue, Chances, Clock, ClockAtom, Features, Location, Network};
 use crate::syntax::ast::{Declaration, Document, SystemItem, UnsupportedPart};
 
 impl Checker<'_> {
@@ -22,6 +23,15 @@ impl Checker<'_> {
             coordinates: Vec::new(),
         });
         self.world.network.initial_clocks.push(0);
+        if self.reading == Reading::Stochastic {
+            self.world.initial = vec![0; chance_words::COUNT as usize];
+            self.world.network.chances = Chances {
+                stream: chance_words::STREAM,
+                result: chance_words::RESULT,
+                ahead: chance_words::AHEAD,
+                clocks: Vec::new(),
+            };
+        }
         self.declarations(prelude);
         self.scopes.push(Scope::default());
         self.declarations(&document.declarations);

@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::labels::Select;
@@ -9,7 +10,7 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
 use super::types::{Class, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
-use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationId, Urgency};
+use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationChances, LocationId, Urgency};
 use crate::syntax::ast;
 
 /// The most branches that the select bindings of one leg may stand for.
@@ -17,6 +18,10 @@ const BRANCH_LIMIT: u64 = 1 << 16;
 
 /// The most edges that the select bindings of one may stand for.
 const SELECT_LIMIT: u64 = 1 << 20;
+
+/// The rates of clocks that an invariant sets: in the symbolic reading by clock, and in the
+/// stochastic one.
+type Rates = (Vec<(ClockId, FunctionId)>, LocationChances);
 
 /// What an edge can lead to.
 #[derive(Clone, Copy, Debug)]
@@ -140,9 +145,11 @@ impl Checker<'_> {
         let place = format!("template {}, location {name}", template.name.text);
         let (invariant, rates) = match &location.invariant {
             Some(invariant) => self.invariant(invariant, &place),
-            None => (Guard::default(), Vec::new()),
+            None => (Guard::default(), Rates::default()),
         };
+        let (rates, mut chances) = rates;
         if let Some(rate) = &location.exponential_rate {
+            self.locals.clear();
             let before = self.unknowns.len();
             let rate = self.expression(rate);
             self.expect_number(&rate, "an exponential rate");
@@ -155,12 +162,17 @@ impl Checker<'_> {
                 );
             }
             self.unknowns.truncate(before);
+            if self.reading == Reading::Stochastic {
+                chances.exponential_rate =
+                    self.make_real(rate, &[], format!("{place}, exponential rate"));
+            }
         }
         ir::Location {
             name,
             urgency,
             invariant,
             rates,
+            chances,
             edges: Vec::new(),
             position: location.position.map(|point| (point.x, point.y)),
             span: location.span,
@@ -185,14 +197,15 @@ impl Checker<'_> {
         }
     }
 
-    fn invariant(&mut self, expr: &ast::Expr, place: &str) -> (Guard, Vec<(ClockId, FunctionId)>) {
+    /// The invariant without what it says of rates, and the rates in both readings.
+    fn invariant(&mut self, expr: &ast::Expr, place: &str) -> (Guard, Rates) {
         self.locals.clear();
         let before = self.unknowns.len();
         let invariant = self.expression(expr);
         self.expect_pure(&invariant, "an invariant");
         if !self.expect_condition(&invariant) {
             self.unknowns.truncate(before);
-            return (Guard::default(), Vec::new());
+            return (Guard::default(), Rates::default());
         }
         if let Type::Constraint(class) = invariant.ty
             && class > Class::InvariantWithRate
@@ -203,7 +216,7 @@ impl Checker<'_> {
                 "this cannot be an invariant: equalities, negations and disjunctions of clock conditions are too strong",
                 "invariants are conjunctions of clock bounds and conditions on variables",
             );
-            return (Guard::default(), Vec::new());
+            return (Guard::default(), Rates::default());
         }
         let mut parts = Vec::new();
         conjuncts(invariant, &mut parts);
@@ -212,11 +225,15 @@ impl Checker<'_> {
             .partition(|part| matches!(part.kind, Kind::Rate { .. }));
         let guard = self.make_guard(&conditions, &[], &format!("{place}, invariant"));
         self.warn_of_strictness(&guard, expr.span);
+        let place = format!("{place}, rate");
+        if self.reading == Reading::Stochastic {
+            return (guard, (Vec::new(), self.make_rates(rates, &place)));
+        }
         let rates = rates
             .into_iter()
-            .filter_map(|rate| self.make_rate(rate, &format!("{place}, rate")))
+            .filter_map(|rate| self.make_rate(rate, &place))
             .collect();
-        (guard, rates)
+        (guard, (rates, LocationChances::default()))
     }
 
     fn warn_of_strictness(&mut self, invariant: &Guard, span: Span) {
@@ -337,6 +354,7 @@ impl Checker<'_> {
                 return vec![ir::Branch {
                     target: LocationId(target),
                     update: ir::Update::default(),
+                    weight: None,
                 }];
             }
             Some(Endpoint::Branchpoint(i)) => &template.branchpoints[i],
@@ -355,9 +373,10 @@ impl Checker<'_> {
                 continue;
             };
             let updates = self.leg(leg, parameters, place);
-            branches.extend(updates.into_iter().map(|update| ir::Branch {
+            branches.extend(updates.into_iter().map(|(update, weight)| ir::Branch {
                 target: LocationId(target),
                 update,
+                weight,
             }));
         }
         if branches.is_empty() {
@@ -375,8 +394,14 @@ impl Checker<'_> {
         );
     }
 
-    /// The updates of a leg: one for each combination of the values of its `select` bindings.
-    fn leg(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> Vec<ir::Update> {
+    /// The updates and weights of a leg: one for each combination of the values of its `select`
+    /// bindings.
+    fn leg(
+        &mut self,
+        leg: &ast::Edge,
+        parameters: usize,
+        place: &str,
+    ) -> Vec<(ir::Update, Option<FunctionId>)> {
         if let Some(guard) = &leg.guard {
             let message = "guards on the legs of branch points are not supported";
             self.leg_refused(guard.span, message);
@@ -422,13 +447,19 @@ impl Checker<'_> {
         updates
     }
 
-    fn leg_update(&mut self, leg: &ast::Edge, parameters: usize, place: &str) -> ir::Update {
+    fn leg_update(
+        &mut self,
+        leg: &ast::Edge,
+        parameters: usize,
+        place: &str,
+    ) -> (ir::Update, Option<FunctionId>) {
         // The functions of a leg take the values of the entry's select bindings too, but its
         // expressions do not see them.
         self.locals.clear();
         let unseen: Vec<LocalId> = (0..parameters)
             .map(|_| self.new_local(Type::ANY_INT))
             .collect();
+        let mut given = None;
         if let Some(weight) = &leg.probability {
             let before = self.unknowns.len();
             let weight = self.expression(weight);
@@ -442,12 +473,13 @@ impl Checker<'_> {
                 );
             }
             self.unknowns.truncate(before);
+            if self.reading == Reading::Stochastic {
+                let place = format!("{place}, weight of a branch");
+                given = self.make_real(weight, &unseen, place);
+            }
         }
-        self.update(
-            &leg.update,
-            &unseen,
-            &format!("{place}, update of a branch"),
-        )
+        let place = format!("{place}, update of a branch");
+        (self.update(&leg.update, &unseen, &place), given)
     }
 }
 

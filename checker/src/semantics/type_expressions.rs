@@ -1,5 +1,6 @@
 //! Types as they are written: names, ranges, prefixes, dimensions.
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::scope::{Carried, Entity};
@@ -214,6 +215,7 @@ impl Checker<'_> {
             TypeKind::Bool => Type::Bool,
             TypeKind::Double => Type::Double,
             TypeKind::String => Type::String,
+            TypeKind::Clock if self.reading == Reading::Stochastic => Type::RealClock,
             TypeKind::Clock => Type::Clock {
                 hybrid: prefixes.hybrid,
             },
@@ -234,13 +236,14 @@ impl Checker<'_> {
         if (prefixes.urgent || prefixes.broadcast) && !is_channel {
             self.misplaced_prefix(ty.span, "urgent and broadcast belong to channels");
         }
-        if prefixes.hybrid && !(resolved.is_clock() || resolved.is_error()) {
+        let is_clock = resolved.is_clock() || resolved == Type::RealClock;
+        if prefixes.hybrid && !(is_clock || resolved.is_error()) {
             self.misplaced_prefix(ty.span, "hybrid belongs to clocks");
         }
         if (prefixes.constant || prefixes.meta)
             && matches!(
                 resolved,
-                Type::Clock { .. } | Type::Channel { .. } | Type::Void
+                Type::Clock { .. } | Type::RealClock | Type::Channel { .. } | Type::Void
             )
         {
             self.misplaced_prefix(

@@ -10,6 +10,7 @@
 
 use super::types::{Interval, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
+use crate::ir::Distribution;
 use crate::ir::{
     ClockAtom, ClockRange, DoubleOperator, FunctionId, IntegerOperator, MathFunction, Relation,
 };
@@ -90,6 +91,10 @@ pub(super) enum Kind {
     /// A value that only statistical queries know, and what it comes from; it stands only where
     /// nothing depends on it, and is never lowered.
     Unknown(Box<Expr>),
+    /// The value of a real clock as a double.
+    ClockReading(Box<Expr>),
+    /// A random number; its arguments are doubles.
+    Random(Distribution, Vec<Expr>),
     /// A double truncated to an integer.
     ToInteger(Box<Expr>),
     /// Arithmetic on integers.
@@ -419,6 +424,7 @@ impl Expr {
             Kind::Field { record: inner, .. }
             | Kind::ToDouble(inner)
             | Kind::Unknown(inner)
+            | Kind::ClockReading(inner)
             | Kind::ToInteger(inner)
             | Kind::Not(inner)
             | Kind::Step { target: inner, .. }
@@ -449,7 +455,9 @@ impl Expr {
                 visit(then);
                 visit(otherwise);
             }
-            Kind::Math(_, arguments) | Kind::Call { arguments, .. } => {
+            Kind::Math(_, arguments)
+            | Kind::Random(_, arguments)
+            | Kind::Call { arguments, .. } => {
                 arguments.iter().for_each(visit);
             }
             Kind::AssignClock {
@@ -477,7 +485,10 @@ impl Expr {
     pub(super) fn has_effect(&self) -> bool {
         self.any(&|e| match &e.kind {
             Kind::Assign(target, _) => !target.is_left_out(),
-            Kind::Compound(..) | Kind::Step { .. } | Kind::AssignClock { .. } => true,
+            Kind::Compound(..)
+            | Kind::Step { .. }
+            | Kind::AssignClock { .. }
+            | Kind::Random(..) => true,
             Kind::Call { signature, .. } => signature.may_write(),
             _ => false,
         })
@@ -519,6 +530,24 @@ impl Expr {
                 e.kind,
                 Kind::ClockCompare { .. } | Kind::ClockSum(_) | Kind::Rate { .. } | Kind::Deadlock
             )
+        })
+    }
+
+    /// Whether its value can change as time passes, in the stochastic reading.
+    pub(super) fn is_timed(&self) -> bool {
+        self.any(&|e| match &e.kind {
+            Kind::ClockReading(_) => true,
+            Kind::Call {
+                signature,
+                arguments,
+                ..
+            } => {
+                signature.effects.mentions_clocks
+                    || arguments
+                        .iter()
+                        .any(|a| a.ty.any(&|ty| *ty == Type::RealClock))
+            }
+            _ => false,
         })
     }
 }

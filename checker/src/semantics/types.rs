@@ -14,6 +14,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::exec::arithmetic;
+
 /// The least and the greatest of some integers; empty if the first is the greater one.
 pub(super) type Interval = (i32, i32);
 
@@ -47,6 +49,8 @@ pub(super) enum Type {
     String,
     /// A clock.
     Clock { hybrid: bool },
+    /// A clock in the stochastic reading: words of the state that hold its value and its rate.
+    RealClock,
     /// A channel.
     Channel { urgent: bool, broadcast: bool },
     /// A member of a scalar set.
@@ -164,6 +168,15 @@ impl Type {
         high: i32::MAX,
     };
 
+    /// The words of a real clock with this value, which runs at rate 1.
+    pub(super) fn clock_words(value: f64) -> [i32; 4] {
+        let ([a, b], [c, d]) = (
+            arithmetic::double_words(value),
+            arithmetic::double_words(1.0),
+        );
+        [a, b, c, d]
+    }
+
     /// An array of `length` parts of this type.
     pub(super) fn array(part: Type, index: Index) -> Type {
         Type::Array(Arc::new(ArrayType { part, index }))
@@ -209,6 +222,11 @@ impl Type {
         matches!(self, Type::Clock { .. })
     }
 
+    /// Whether registers of doubles hold its values, and two words a value.
+    pub(super) fn is_real(&self) -> bool {
+        matches!(self, Type::Double | Type::RealClock)
+    }
+
     /// Whether it is an integral type or a condition on clocks: what may stand as a condition.
     pub(super) fn is_condition(&self) -> bool {
         self.is_integral() || matches!(self, Type::Constraint(_))
@@ -216,7 +234,7 @@ impl Type {
 
     /// Whether values lie in one register.
     pub(super) fn is_register(&self) -> bool {
-        self.is_number() || matches!(self, Type::Scalar { .. })
+        self.is_number() || matches!(self, Type::Scalar { .. } | Type::RealClock)
     }
 
     /// Whether it is an array or a struct.
@@ -284,6 +302,7 @@ impl Type {
         match self {
             Type::Int { .. } | Type::Bool | Type::Scalar { .. } => one(1, 0, 0),
             Type::Double => one(2, 0, 0),
+            Type::RealClock => one(4, 0, 0),
             Type::Clock { .. } => one(0, 1, 0),
             Type::Channel { .. } => one(0, 0, 1),
             Type::Array(array) => array.part.size().times(array.index.length),
@@ -336,6 +355,7 @@ impl Type {
                 .iter()
                 .for_each(|(_, ty)| ty.default_words(words)),
             Type::Double => words.extend([0, 0]),
+            Type::RealClock => words.extend(Type::clock_words(0.0)),
             Type::Int { .. } | Type::Bool | Type::Scalar { .. } => {
                 words.push(self.default_value());
             }
@@ -440,7 +460,7 @@ impl Type {
     pub(super) fn accepts(&self, value: &Type) -> bool {
         match (self, value) {
             (Type::Error, _) | (_, Type::Error) => true,
-            (Type::Double, _) => value.is_number(),
+            (Type::Double | Type::RealClock, _) => value.is_number(),
             (Type::Clock { .. }, _) => {
                 value.is_number() || value.is_clock() || *value == Type::ClockTerm
             }
@@ -486,7 +506,7 @@ impl fmt::Display for Type {
             Type::Bool => f.write_str("bool"),
             Type::Double => f.write_str("double"),
             Type::String => f.write_str("string"),
-            Type::Clock { hybrid: false } => f.write_str("clock"),
+            Type::Clock { hybrid: false } | Type::RealClock => f.write_str("clock"),
             Type::Clock { hybrid: true } => f.write_str("hybrid clock"),
             Type::Channel { urgent, broadcast } => {
                 if *urgent {

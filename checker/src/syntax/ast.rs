@@ -615,9 +615,80 @@ pub enum QueryKind {
         /// The file.
         file: String,
     },
+    /// `Pr[…](…)` or `E[…](…)`
+    Statistical(Statistical),
     /// A query that was recognised and is not supported; the name says which kind (statistical,
     /// learning, cost, …).
     Unsupported(Name),
+}
+
+/// A statistical query.
+#[derive(Clone, Debug)]
+pub enum Statistical {
+    /// `Pr[bound](path)`
+    Probability(Estimated),
+    /// `Pr[bound](path) >= threshold`, or `<=`.
+    Hypothesis {
+        /// Whose probability.
+        estimated: Estimated,
+        /// Whether it is `>=`.
+        at_least: bool,
+        /// What it is compared with.
+        threshold: Expr,
+    },
+    /// `E[bound; runs](max: value)`, or `min`.
+    Expectation {
+        /// How long a run is.
+        bound: RunBound,
+        /// Whether the greatest value of a run counts, or the least.
+        maximum: bool,
+        /// What is measured.
+        value: Expr,
+    },
+}
+
+/// What a probability is asked of.
+#[derive(Clone, Debug)]
+pub struct Estimated {
+    /// How long a run is.
+    pub bound: RunBound,
+    /// What is asked of a run.
+    pub path: Path,
+}
+
+/// `[<=10; 100]`
+#[derive(Clone, Debug)]
+pub struct RunBound {
+    /// What is limited.
+    pub limit: RunLimit,
+    /// To which value.
+    pub value: Expr,
+    /// The number of runs.
+    pub runs: Option<Expr>,
+    /// Where it stands.
+    pub span: Span,
+}
+
+/// What limits a run.
+#[derive(Clone, Debug)]
+pub enum RunLimit {
+    /// `<=`: time.
+    Time,
+    /// `x<=`: a clock.
+    Clock(Expr),
+    /// `#<=`: the number of moves.
+    Moves,
+}
+
+/// What is asked of a run.
+#[derive(Clone, Debug)]
+pub enum Path {
+    /// `<> p`
+    Eventually(Expr),
+    /// `[] p`
+    Always(Expr),
+    /// `p U q`
+    Until(Expr, Expr),
 }
 
 /// `sup`, `inf`, `bounds`

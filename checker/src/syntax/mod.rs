@@ -32,6 +32,7 @@ mod types;
 mod declarations;
 
 mod statements;
+mod statistical;
 
 mod processes;
 

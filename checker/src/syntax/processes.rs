@@ -360,9 +360,18 @@ impl Parser<'_> {
             return rate;
         }
         let divisor = self.expression();
-        let kind = ExprKind::Binary(BinaryOp::Divide, Box::new(rate), Box::new(divisor));
         let span = self.since(start);
-        Expr { kind, span }
+        let joined = |operator, left, right| Expr {
+            kind: ExprKind::Binary(operator, Box::new(left), Box::new(right)),
+            span,
+        };
+        // A quotient of doubles, also of integers.
+        let one = Expr {
+            kind: ExprKind::Double(1.0),
+            span,
+        };
+        let rate = joined(BinaryOp::Multiply, one, rate);
+        joined(BinaryOp::Divide, rate, divisor)
     }
 
     /// A guard or invariant; the old syntax has a list, all of which must hold.

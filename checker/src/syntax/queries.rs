@@ -141,7 +141,8 @@ impl Parser<'_> {
             "loadStrategy" => self.load_strategy(),
             "acontrol" if is_prefix => self.unsupported_query("acontrol (approximate control)"),
             "minE" | "maxE" | "minPr" | "maxPr" => self.unsupported_query("learning"),
-            "Pr" | "Pmax" | "simulate" => self.unsupported_query("statistical model checking"),
+            "Pr" => self.statistical(),
+            "Pmax" | "simulate" => self.unsupported_query("statistical model checking"),
             "refinement" | "consistency" | "specification" | "implementation" | "determinism"
             | "prune" | "reachability"
                 if next == TokenKind::Colon =>
@@ -152,9 +153,7 @@ impl Parser<'_> {
                 self.unsupported_query("Ecdar's")
             }
             "sat" => self.unsupported_query("live sequence chart scenario"),
-            "E" if next == TokenKind::LeftBracket && self.at_expected_value() => {
-                self.unsupported_query("statistical model checking")
-            }
+            "E" if next == TokenKind::LeftBracket && self.at_expected_value() => self.statistical(),
             "A" if next == TokenKind::LeftBracket => self.until_or_leads_to(),
             _ => self.leads_to(),
         }
@@ -166,7 +165,7 @@ impl Parser<'_> {
     }
 
     /// The rest up to `under` is not read.
-    fn unsupported_query(&mut self, kind: &str) -> QueryKind {
+    pub(super) fn unsupported_query(&mut self, kind: &str) -> QueryKind {
         let start = self.here();
         while !self.at_end() && !self.at_word("under") {
             self.bump();

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms in reading order: each may use those before it.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "cancellation",
     "diagnostics",
     "tuning",
@@ -20,6 +20,7 @@ const ROOMS: [&str; 16] = [
     "network",
     "search",
     "game",
+    "stochastic",
     "verify",
     "engine",
     "python",

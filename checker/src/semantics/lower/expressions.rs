@@ -1,9 +1,10 @@
 //! Values and conditions.
 
+use super::super::layout::chance_words;
 use super::super::typed::{Expr, Kind};
 use super::super::types::Type;
-use super::{Builder, register_type};
-use crate::ir::{Address, BlockId, Instruction, Register, RegisterType, Terminator};
+use super::{Builder, at, register_type};
+use crate::ir::{Address, Base, BlockId, Instruction, Register, RegisterType, Terminator};
 
 impl Builder<'_> {
     /// The value of a scalar expression.
@@ -58,6 +59,23 @@ impl Builder<'_> {
                 let source = self.value(inner);
                 let target = self.register(RegisterType::Double);
                 self.emit(Instruction::IntegerToDouble { target, source });
+                target
+            }
+            Kind::ClockReading(inner) => {
+                self.effects.mentions_clocks = true;
+                self.value(inner)
+            }
+            Kind::Random(distribution, arguments) => {
+                let arguments = self.stable_values(arguments);
+                let site = self.site(expr.span);
+                let target = self.register(RegisterType::Double);
+                self.emit(Instruction::Random {
+                    distribution: *distribution,
+                    target,
+                    arguments,
+                    stream: at(Base::State, chance_words::STREAM),
+                    site,
+                });
                 target
             }
             Kind::ToInteger(inner) => {

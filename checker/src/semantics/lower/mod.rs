@@ -16,6 +16,7 @@ mod assignments;
 mod calls;
 pub(super) mod clocks;
 mod expressions;
+pub(super) mod horizons;
 mod places;
 mod quantifiers;
 mod statements;
@@ -370,7 +371,7 @@ impl<'n> Builder<'n> {
 const UNITS_FOR_FUNCTION: usize = 1 << 13;
 
 fn register_type(ty: &Type) -> RegisterType {
-    if *ty == Type::Double {
+    if ty.is_real() {
         RegisterType::Double
     } else {
         RegisterType::Integer

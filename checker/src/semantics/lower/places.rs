@@ -269,7 +269,7 @@ impl Builder<'_> {
     pub(super) fn store(&mut self, target: Destination, source: Register, ty: &Type) {
         match target {
             Destination::Register(register) => self.copy(register, source),
-            Destination::Memory(address) => self.emit(if *ty == Type::Double {
+            Destination::Memory(address) => self.emit(if ty.is_real() {
                 Instruction::StoreDouble { address, source }
             } else {
                 Instruction::StoreInteger { address, source }
@@ -283,7 +283,7 @@ impl Builder<'_> {
             Destination::Register(register) => register,
             Destination::Memory(address) => {
                 let target = self.register(register_type(ty));
-                self.emit(if *ty == Type::Double {
+                self.emit(if ty.is_real() {
                     Instruction::LoadDouble { target, address }
                 } else {
                     Instruction::LoadInteger { target, address }

@@ -93,7 +93,10 @@ fn locations_keep_their_marks() {
     assert_eq!(first.name.as_ref().map(|n| n.text.as_str()), Some("L"));
     assert_eq!(first.position, Some(Point { x: 3, y: 5 }));
     assert_eq!(shape_of(first.invariant.as_ref()), "(Equal (' x) 0)");
-    assert_eq!(shape_of(first.exponential_rate.as_ref()), "(Divide 1 2)");
+    assert_eq!(
+        shape_of(first.exponential_rate.as_ref()),
+        "(Divide (Multiply 1.0 1) 2)"
+    );
     assert!(first.urgent && !first.committed && second.committed && second.name.is_none());
     assert_eq!(template.branchpoints[0].id, "c");
     assert_eq!(
@@ -292,7 +295,7 @@ fn a_textual_process() {
     );
     assert_eq!(
         shape_of(template.locations[2].exponential_rate.as_ref()),
-        "(Divide 1 2)"
+        "(Divide (Multiply 1.0 1) 2)"
     );
 }
 

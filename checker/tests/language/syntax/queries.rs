@@ -101,25 +101,29 @@ fn strategies() {
 }
 
 #[test]
+fn statistical_queries_are_read() {
+    check("Pr[<=10](<> P.a)", "Pr[<=10](<> (. P a))");
+    check("Pr [c<=N] ([] x < 3)", "Pr[c<=N]([] (Less x 3))");
+    check(
+        "Pr[#<=10; 100](p U q) >= 0.5",
+        "Pr[#<=10; 100](p U q) >= 0.5",
+    );
+    check(
+        "Pr[<=1+1](<> p) <= 0.1 under S",
+        "Pr[<=(Add 1 1)](<> p) <= 0.1 under S",
+    );
+    check("E[<=10; 100](max: x)", "E[<=10; 100](max: x)");
+    check("E[x<=10; N](min: a[1])", "E[x<=10; N](min: ([] a 1))");
+}
+
+#[test]
 fn unsupported_queries_are_named() {
-    check(
-        "Pr[<=10](<> P.a)",
-        "unsupported: statistical model checking",
-    );
-    check(
-        "Pr[#<=10; 100]([] P.a) >= 0.5",
-        "unsupported: statistical model checking",
-    );
     check(
         "Pr (<>[0,3] p \\/ q)",
         "unsupported: statistical model checking",
     );
     check(
         "simulate [<=10; 5] {x, y}",
-        "unsupported: statistical model checking",
-    );
-    check(
-        "E[<=10; 100](max: x)",
         "unsupported: statistical model checking",
     );
     check(

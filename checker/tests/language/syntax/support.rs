@@ -2,7 +2,8 @@
 
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
-    Control, Document, Expr, ExprKind, Objective, Query, QueryKind, TypeExpr, TypeKind,
+    Control, Document, Estimated, Expr, ExprKind, Objective, Path, Query, QueryKind, RunBound,
+    RunLimit, Statistical, TypeExpr, TypeKind,
 };
 use checker::syntax::{Parsed, parse_query, print_type, read_model};
 
@@ -173,8 +174,55 @@ fn kind_shape(kind: &QueryKind) -> String {
         QueryKind::Control(control) => control_shape(control),
         QueryKind::SaveStrategy { file, strategy } => format!("save {file:?} {}", strategy.text),
         QueryKind::LoadStrategy { file } => format!("load {file:?}"),
+        QueryKind::Statistical(query) => statistical_shape(query),
         QueryKind::Unsupported(name) => format!("unsupported: {}", name.text),
     }
+}
+
+fn statistical_shape(query: &Statistical) -> String {
+    match query {
+        Statistical::Probability(estimated) => estimated_shape(estimated),
+        Statistical::Hypothesis {
+            estimated,
+            at_least,
+            threshold,
+        } => {
+            let relation = if *at_least { ">=" } else { "<=" };
+            format!(
+                "{} {relation} {}",
+                estimated_shape(estimated),
+                shape(threshold)
+            )
+        }
+        Statistical::Expectation {
+            bound,
+            maximum,
+            value,
+        } => {
+            let which = if *maximum { "max" } else { "min" };
+            format!("E{}({which}: {})", bound_shape(bound), shape(value))
+        }
+    }
+}
+
+fn estimated_shape(estimated: &Estimated) -> String {
+    let path = match &estimated.path {
+        Path::Eventually(p) => format!("<> {}", shape(p)),
+        Path::Always(p) => format!("[] {}", shape(p)),
+        Path::Until(p, q) => format!("{} U {}", shape(p), shape(q)),
+    };
+    format!("Pr{}({path})", bound_shape(&estimated.bound))
+}
+
+fn bound_shape(bound: &RunBound) -> String {
+    let limit = match &bound.limit {
+        RunLimit::Time => String::new(),
+        RunLimit::Clock(clock) => shape(clock),
+        RunLimit::Moves => String::from("#"),
+    };
+    let runs = bound.runs.as_ref();
+    let runs = runs.map_or(String::new(), |runs| format!("; {}", shape(runs)));
+    format!("[{limit}<={}{runs}]", shape(&bound.value))
 }
 
 fn control_shape(control: &Control) -> String {

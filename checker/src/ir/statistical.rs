@@ -1,0 +1,76 @@
+//! Compiled statistical queries.
+
+use super::ids::FunctionId;
+use super::labels::Guard;
+use crate::diagnostics::Span;
+
+/// A statistical query, compiled.
+#[derive(Clone, Debug)]
+pub struct StatisticalQuery {
+    /// The text, blanks collapsed.
+    pub text: String,
+    /// What is asked.
+    pub kind: Statistical,
+    /// The whole query.
+    pub span: Span,
+}
+
+/// The kinds of statistical queries.
+#[derive(Clone, Debug)]
+pub enum Statistical {
+    /// `Pr[bound](path)`
+    Probability(RunBound, Path),
+    /// `Pr[bound](path) >= threshold`, or `<=`.
+    Hypothesis {
+        /// How long a run is.
+        bound: RunBound,
+        /// What is asked of a run.
+        path: Path,
+        /// Whether it is `>=`.
+        at_least: bool,
+        /// The probability that is compared.
+        threshold: f64,
+    },
+    /// `E[bound; runs](max: value)`
+    Expectation {
+        /// How long a run is.
+        bound: RunBound,
+        /// Whether the greatest value of a run counts, or the least.
+        maximum: bool,
+        /// Leaves the value as a double.
+        value: FunctionId,
+    },
+}
+
+/// How long a run is.
+#[derive(Clone, Debug)]
+pub struct RunBound {
+    /// What is limited.
+    pub limit: RunLimit,
+    /// To which value.
+    pub value: f64,
+    /// How many runs, if the query says it.
+    pub runs: Option<u64>,
+}
+
+/// What limits a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunLimit {
+    /// Time.
+    Time,
+    /// The clock with this first word.
+    Clock(u32),
+    /// The number of moves.
+    Moves,
+}
+
+/// What is asked of a run. Conditions are masks (see [`super::Chances`]).
+#[derive(Clone, Debug)]
+pub enum Path {
+    /// `<> p`
+    Eventually(Guard),
+    /// `[] p`
+    Always(Guard),
+    /// `p U q`
+    Until(Guard, Guard),
+}

@@ -1,0 +1,199 @@
+//! Statistical queries: their static rules, and lowering to masks and functions of doubles.
+
+use super::checker::Checker;
+use super::codes;
+use super::labels::collapse;
+use super::offsets::known_offset;
+use super::typed::{Expr, Kind, Root, conjuncts};
+use super::types::{Memory, Type};
+use crate::exec::arithmetic;
+use crate::ir::{self, Guard, Path, RunBound, RunLimit, Statistical};
+use crate::syntax::ast;
+
+impl Checker<'_> {
+    /// Checks and lowers a statistical query.
+    pub(super) fn statistical(&mut self, query: &ast::Query) -> Option<ir::StatisticalQuery> {
+        let ast::QueryKind::Statistical(asked) = &query.kind else {
+            return None;
+        };
+        if let Some(under) = &query.under {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                under.span,
+                "statistical queries under a strategy are not supported",
+                "ask without `under`",
+            );
+            return None;
+        }
+        if self.world.network.features.priorities {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                query.span,
+                "statistical queries are not supported on models with priorities",
+                "remove the priorities of channels and processes",
+            );
+            return None;
+        }
+        let kind = match asked {
+            ast::Statistical::Probability(estimated) => {
+                let (bound, path) = self.estimated(estimated)?;
+                Statistical::Probability(bound, path)
+            }
+            ast::Statistical::Hypothesis {
+                estimated,
+                at_least,
+                threshold,
+            } => {
+                let (bound, path) = self.estimated(estimated)?;
+                Statistical::Hypothesis {
+                    bound,
+                    path,
+                    at_least: *at_least,
+                    threshold: self.known_real(threshold, "a probability", (0.0, 1.0))?,
+                }
+            }
+            ast::Statistical::Expectation {
+                bound,
+                maximum,
+                value,
+            } => {
+                let span = bound.span;
+                let bound = self.run_bound(bound)?;
+                if bound.runs.is_none() {
+                    self.error(
+                        codes::VALUE_NOT_CONSTANT,
+                        span,
+                        "an expected value needs a number of runs",
+                        "write it behind the bound: E[<=10; 1000](max: x)",
+                    );
+                    return None;
+                }
+                let value = self.expression(value);
+                self.expect_pure(&value, "a query");
+                if !value.is_error() && !value.ty.is_number() {
+                    self.error(
+                        codes::NUMBER_EXPECTED,
+                        value.span,
+                        format!(
+                            "an expected value is that of a number, but this is {}",
+                            value.ty.described()
+                        ),
+                        "name a clock, or an expression of integers, doubles and clocks",
+                    );
+                    return None;
+                }
+                Statistical::Expectation {
+                    bound,
+                    maximum: *maximum,
+                    value: self.make_real(value, &[], String::from("query"))?,
+                }
+            }
+        };
+        Some(ir::StatisticalQuery {
+            text: collapse(self.sources.text(query.span)),
+            kind,
+            span: query.span,
+        })
+    }
+
+    fn estimated(&mut self, estimated: &ast::Estimated) -> Option<(RunBound, Path)> {
+        let bound = self.run_bound(&estimated.bound);
+        let path = match &estimated.path {
+            ast::Path::Eventually(goal) => Path::Eventually(self.state_condition(goal)?),
+            ast::Path::Always(keep) => Path::Always(self.state_condition(keep)?),
+            ast::Path::Until(keep, goal) => {
+                let (keep, goal) = (self.state_condition(keep), self.state_condition(goal));
+                Path::Until(keep?, goal?)
+            }
+        };
+        Some((bound?, path))
+    }
+
+    fn run_bound(&mut self, bound: &ast::RunBound) -> Option<RunBound> {
+        let limit = match &bound.limit {
+            ast::RunLimit::Time => RunLimit::Time,
+            ast::RunLimit::Moves => RunLimit::Moves,
+            ast::RunLimit::Clock(clock) => {
+                let place = self.place(clock);
+                let is_state = place
+                    .variable()
+                    .is_some_and(|place| place.root == Root::State);
+                let offset = known_offset(&place, Memory::Words).filter(|_| is_state);
+                let is_clock = place.ty == Type::RealClock;
+                let Some(offset) = offset.filter(|_| is_clock) else {
+                    if !place.is_error() {
+                        self.error(
+                            codes::MEASURE_EXPECTED,
+                            clock.span,
+                            "a run is bounded by time, by a clock, or by its moves",
+                            "write [<=10], [x<=10] for a clock x, or [#<=10]",
+                        );
+                    }
+                    return None;
+                };
+                RunLimit::Clock(self.relocation.offset(offset))
+            }
+        };
+        let value = self.known_real(&bound.value, "the bound of a run", (0.0, f64::INFINITY))?;
+        let runs = match &bound.runs {
+            None => None,
+            Some(runs) => Some(self.known_real(runs, "the number of runs", (1.0, 1e15))? as u64),
+        };
+        Some(RunBound { limit, value, runs })
+    }
+
+    /// A number that is known now and between these two.
+    fn known_real(&mut self, expr: &ast::Expr, what: &str, range: (f64, f64)) -> Option<f64> {
+        let value = self.expression(expr);
+        let value = self.converted(value, &Type::Double)?;
+        let span = value.span;
+        let words = self.known_words(&value, &Type::Double, what)?;
+        let value = arithmetic::double_of_words(words[0], words[1]);
+        if !(range.0 <= value && value <= range.1) {
+            let (low, high) = range;
+            let help = if high.is_finite() {
+                format!("write a number from {low} to {high}")
+            } else {
+                format!("write a number that is at least {low}")
+            };
+            self.error(
+                codes::CONSTANT_OUT_OF_RANGE,
+                span,
+                format!("{what} cannot be {value}"),
+                &help,
+            );
+            return None;
+        }
+        Some(value)
+    }
+
+    /// The mask of a condition on states.
+    fn state_condition(&mut self, expr: &ast::Expr) -> Option<Guard> {
+        let span = expr.span;
+        let expr = self.expression(expr);
+        self.report_members(&expr, span);
+        if !self.expect_condition(&expr) {
+            return None;
+        }
+        self.expect_pure(&expr, "a query");
+        let is_strange = |e: &Expr| matches!(e.kind, Kind::Deadlock | Kind::Rate { .. });
+        if expr.any(&is_strange) {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                span,
+                "statistical queries cannot ask for deadlocks and rates",
+                "ask for locations, variables and clocks",
+            );
+            return None;
+        }
+        let never = expr.constant() == Some(0);
+        let mut parts = Vec::new();
+        conjuncts(expr, &mut parts);
+        let guard = self.make_guard(&parts, &[], "query");
+        let never_holds = guard.never_holds || never;
+        self.can_lower().then_some(Guard {
+            never_holds,
+            ..guard
+        })
+    }
+}

@@ -1,0 +1,100 @@
+//! Results of runs in the order of their numbers, made by one thread or several.
+//!
+//! Which results are consumed does not depend on the number of threads: run k is the same wherever
+//! it is made, and a failure counts only if its run is reached.
+
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::failure::Failure;
+use super::run::Runner;
+use crate::cancellation::{self, Cut};
+use crate::exec::Executor;
+use crate::ir::Network;
+
+/// How long a block of runs should take.
+const BLOCK_TIME: Duration = Duration::from_millis(10);
+
+/// The most runs of one thread in a block, whose results are kept.
+const MOST_RUNS: u64 = 4096;
+
+/// Makes runs 0, 1, … and consumes their results in this order until `consume` returns true or
+/// `ends`, asked now and then, does. Returns whether `consume` ended it.
+pub(super) fn in_order<T: Send>(
+    (network, executor): (&Network, &dyn Executor),
+    threads: usize,
+    run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
+    mut consume: impl FnMut(T) -> bool,
+    mut ends: impl FnMut(u64) -> bool,
+) -> Result<bool, Failure> {
+    let mut runners: Vec<Runner<'_>> = (0..threads.max(1))
+        .map(|_| Runner::new(network, executor))
+        .collect();
+    let (mut first, mut share, mut consumed) = (0_u64, 1_u64, 0_u64);
+    loop {
+        let start = Instant::now();
+        let block = |runner: &mut Runner<'_>, number: usize| -> Vec<Result<T, Failure>> {
+            let from = first + number as u64 * share;
+            let mut results = Vec::with_capacity(share as usize);
+            for one in from..from + share {
+                let result = run(runner, one);
+                let failed = result.is_err();
+                results.push(result);
+                if failed {
+                    break;
+                }
+            }
+            results
+        };
+        let results: Vec<Result<Vec<Result<T, Failure>>, Cut>> = if let [runner] = &mut runners[..]
+        {
+            vec![cancellation::unless_cut(|| block(runner, 0))]
+        } else {
+            let look = cancellation::current();
+            thread::scope(|scope| {
+                let block = &block;
+                let started: Vec<_> = runners
+                    .iter_mut()
+                    .enumerate()
+                    .map(|(number, runner)| {
+                        let look = look.clone();
+                        scope.spawn(move || {
+                            cancellation::looking_at(look, || {
+                                cancellation::unless_cut(|| block(runner, number))
+                            })
+                        })
+                    })
+                    .collect();
+                started
+                    .into_iter()
+                    .map(|one| match one.join() {
+                        Ok(results) => results,
+                        Err(panic) => std::panic::resume_unwind(panic),
+                    })
+                    .collect()
+            })
+        };
+        for results in results {
+            let Ok(results) = results else {
+                // What was consumed before stands; without it there is no result.
+                if consumed == 0 {
+                    cancellation::cut();
+                }
+                return Ok(false);
+            };
+            for result in results {
+                consumed += 1;
+                if consume(result?) {
+                    return Ok(true);
+                }
+            }
+        }
+        first += share * runners.len() as u64;
+        if ends(first) {
+            return Ok(false);
+        }
+        if start.elapsed() < BLOCK_TIME {
+            share = (share * 2).min(MOST_RUNS);
+        }
+    }
+}

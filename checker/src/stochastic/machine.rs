@@ -1,0 +1,181 @@
+//! A state of a network whose clocks are words, and calls of the code that reads and changes it.
+//!
+//! Invariant: the words `ahead` say how far ahead of the state the last mask was asked; nothing
+//! else reads them.
+
+use super::failure::Failure;
+use crate::exec::arithmetic::{double_of_words, double_words};
+use crate::exec::{Context, Executor};
+use crate::ir::{
+    EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, STREAM_WORDS, Stream, Update,
+};
+
+/// Whether a condition holds at a moment and in the interval behind it, and how long that interval
+/// is at least.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mask {
+    pub(super) now: bool,
+    pub(super) behind: bool,
+    pub(super) horizon: f64,
+}
+
+impl Mask {
+    /// What always holds, or never.
+    pub(super) fn constant(holds: bool) -> Mask {
+        Mask {
+            now: holds,
+            behind: holds,
+            horizon: f64::INFINITY,
+        }
+    }
+
+    pub(super) fn and(self, other: Mask) -> Mask {
+        Mask {
+            now: self.now && other.now,
+            behind: self.behind && other.behind,
+            horizon: self.horizon.min(other.horizon),
+        }
+    }
+
+    pub(super) fn or(self, other: Mask) -> Mask {
+        Mask {
+            now: self.now || other.now,
+            behind: self.behind || other.behind,
+            horizon: self.horizon.min(other.horizon),
+        }
+    }
+}
+
+/// A state, and what runs code on it.
+pub(super) struct Machine<'a> {
+    pub(super) network: &'a Network,
+    executor: &'a dyn Executor,
+    words: Vec<i32>,
+}
+
+impl<'a> Machine<'a> {
+    pub(super) fn new(network: &'a Network, executor: &'a dyn Executor) -> Machine<'a> {
+        Machine {
+            network,
+            executor,
+            words: network.initial.clone(),
+        }
+    }
+
+    /// The initial state, with the random numbers of a run.
+    pub(super) fn start(&mut self, seed: u64, run: u64) {
+        self.words.copy_from_slice(&self.network.initial);
+        let start = self.network.chances.stream as usize;
+        Stream::start(&mut self.words[start..start + STREAM_WORDS], seed, run);
+    }
+
+    /// The random numbers of the run.
+    pub(super) fn stream(&mut self) -> Stream<'_> {
+        let start = self.network.chances.stream as usize;
+        Stream::of(&mut self.words[start..start + STREAM_WORDS])
+    }
+
+    pub(super) fn clone_words(&self) -> Vec<i32> {
+        self.words.clone()
+    }
+
+    pub(super) fn restore(&mut self, words: &[i32]) {
+        self.words.copy_from_slice(words);
+    }
+
+    pub(super) fn location(&self, process: usize) -> LocationId {
+        LocationId(self.words[process] as u32)
+    }
+
+    pub(super) fn enter(&mut self, ProcessId(process): ProcessId, location: LocationId) {
+        self.words[process as usize] = location.0 as i32;
+    }
+
+    /// The edges that leave the current location of a process.
+    pub(super) fn edges(&self, process: usize) -> &'a [EdgeId] {
+        let LocationId(location) = self.location(process);
+        &self.network.processes[process].locations[location as usize].edges
+    }
+
+    pub(super) fn double(&self, offset: u32) -> f64 {
+        let offset = offset as usize;
+        double_of_words(self.words[offset], self.words[offset + 1])
+    }
+
+    pub(super) fn set_double(&mut self, offset: u32, value: f64) {
+        let offset = offset as usize;
+        self.words[offset..offset + 2].copy_from_slice(&double_words(value));
+    }
+
+    /// The value of the clock at these words, and its rate.
+    pub(super) fn clock(&self, offset: u32) -> (f64, f64) {
+        (self.double(offset), self.double(offset + 2))
+    }
+
+    pub(super) fn set_rate(&mut self, clock: u32, rate: f64) {
+        self.set_double(clock + 2, rate);
+    }
+
+    /// Lets time pass.
+    pub(super) fn advance(&mut self, time: f64) {
+        if time == 0.0 {
+            return;
+        }
+        let network = self.network;
+        for &offset in &network.chances.clocks {
+            let (value, rate) = self.clock(offset);
+            self.set_double(offset, value + rate * time);
+        }
+    }
+
+    /// Calls a function of the model.
+    pub(super) fn call(&mut self, function: FunctionId, arguments: &[i32]) -> Result<i32, Failure> {
+        let mut context = Context {
+            state: &mut self.words,
+            constraints: &mut Vec::new(),
+            assignments: &mut Vec::new(),
+        };
+        Ok(self.executor.call(function, arguments, &mut context)?)
+    }
+
+    /// A condition after this time, if nothing happens until then.
+    pub(super) fn mask(
+        &mut self,
+        condition: &Guard,
+        arguments: &[i32],
+        ahead: f64,
+    ) -> Result<Mask, Failure> {
+        if condition.never_holds {
+            return Ok(Mask::constant(false));
+        }
+        let Some(function) = condition.function else {
+            return Ok(Mask::constant(true));
+        };
+        if condition.is_timed {
+            self.set_double(self.network.chances.ahead, ahead);
+        }
+        let bits = self.call(function, arguments)?;
+        Ok(Mask {
+            now: bits & 1 != 0,
+            behind: bits & 2 != 0,
+            horizon: if condition.is_timed {
+                self.double(self.network.chances.result)
+            } else {
+                f64::INFINITY
+            },
+        })
+    }
+
+    /// The double that a function leaves.
+    pub(super) fn real(&mut self, function: FunctionId, arguments: &[i32]) -> Result<f64, Failure> {
+        self.call(function, arguments)?;
+        Ok(self.double(self.network.chances.result))
+    }
+
+    pub(super) fn update(&mut self, update: &Update, arguments: &[i32]) -> Result<(), Failure> {
+        if let Some(function) = update.function {
+            self.call(function, arguments)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,18 @@
+//! Statistical model checking: random runs of a network in the stochastic reading.
+//!
+//! Every run draws from a generator of its own, numbered by the run: run k of a seed is the same
+//! whatever the number of threads, and results count in the order of run numbers.
+
+mod estimate;
+mod failure;
+mod in_order;
+mod machine;
+mod race;
+mod run;
+pub mod statistics;
+mod windows;
+
+pub use estimate::{Estimate, Precision, estimate};
+pub use failure::{Failure, Stand};
+pub use race::{ZENO_MOVES, ZENO_TIME};
+pub use run::{Outcome, Runner};

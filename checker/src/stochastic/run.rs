@@ -1,0 +1,194 @@
+//! One run: from the initial state until its bound, or until what is asked of it is decided.
+//!
+//! What is asked is watched at all moments: after every move, and all through every delay.
+
+use super::failure::Failure;
+use super::machine::Mask;
+use super::race::Race;
+use crate::cancellation;
+use crate::exec::Executor;
+use crate::ir::{FunctionId, Network, Path, RunBound, RunLimit};
+
+/// The changes of a condition that are followed within one delay.
+const MOST_CHANGES: usize = 1_000_000;
+
+/// What a move takes: see [`cancellation::work`].
+const UNITS_FOR_MOVE: usize = 256;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Whether it has what was asked.
+    pub satisfied: bool,
+    /// When that was decided, in units of the model.
+    pub time: f64,
+    /// How many moves it took.
+    pub moves: u64,
+}
+
+/// Makes runs of a network, one after the other.
+pub struct Runner<'a> {
+    race: Race<'a>,
+}
+
+impl<'a> Runner<'a> {
+    /// What makes runs of a network in the stochastic reading.
+    pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Runner<'a> {
+        Runner {
+            race: Race::new(network, executor),
+        }
+    }
+
+    /// Run number `run` of a seed, until it has what `path` asks or not.
+    pub fn path(
+        &mut self,
+        (seed, run): (u64, u64),
+        bound: &RunBound,
+        path: &Path,
+    ) -> Result<Outcome, Failure> {
+        let mut decided = None;
+        self.until_bound((seed, run), bound, &mut |race, delay| {
+            decided = watched(race, path, delay)?;
+            Ok(decided.is_some())
+        })?;
+        let (satisfied, ahead) = decided.unwrap_or((matches!(path, Path::Always(_)), 0.0));
+        Ok(Outcome {
+            satisfied,
+            time: self.race.time + ahead,
+            moves: self.race.moves,
+        })
+    }
+
+    /// The least or greatest value of an expression in run number `run` of a seed. Between two
+    /// moves it is looked at where a delay begins and where it ends.
+    pub fn extreme(
+        &mut self,
+        (seed, run): (u64, u64),
+        bound: &RunBound,
+        value: FunctionId,
+        maximum: bool,
+    ) -> Result<(f64, u64), Failure> {
+        let mut extreme = if maximum {
+            f64::NEG_INFINITY
+        } else {
+            f64::INFINITY
+        };
+        let mut look = |race: &mut Race<'_>| -> Result<(), Failure> {
+            let value = race.machine.real(value, &[])?;
+            extreme = if maximum {
+                extreme.max(value)
+            } else {
+                extreme.min(value)
+            };
+            Ok(())
+        };
+        self.until_bound((seed, run), bound, &mut |race, delay| {
+            look(race)?;
+            if delay > 0.0 && delay.is_finite() {
+                let before = race.machine.clone_words();
+                race.machine.advance(delay);
+                look(race)?;
+                race.machine.restore(&before);
+            }
+            Ok(false)
+        })?;
+        look(&mut self.race)?;
+        Ok((extreme, self.race.moves))
+    }
+
+    /// Makes a run; `watch` sees every state with the delay that follows, and ends the run if it
+    /// returns true.
+    fn until_bound(
+        &mut self,
+        (seed, run): (u64, u64),
+        bound: &RunBound,
+        watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
+    ) -> Result<(), Failure> {
+        let race = &mut self.race;
+        race.start(seed, run)?;
+        loop {
+            if bound.limit == RunLimit::Moves {
+                race.forget_moves();
+                if race.moves as f64 >= bound.value {
+                    watch(race, 0.0)?;
+                    return Ok(());
+                }
+            }
+            let rest = rest(race, bound);
+            if rest <= 0.0 {
+                watch(race, 0.0)?;
+                return Ok(());
+            }
+            let next = race.next()?;
+            // At the very end of the run it does not matter any more that time cannot pass.
+            let is_over = rest < next.delay
+                || (next.winner.is_none() && rest <= next.delay && rest.is_finite());
+            let delay = next.delay.min(rest);
+            if watch(race, delay)? {
+                return Ok(());
+            }
+            if is_over {
+                race.wait(rest);
+                return Ok(());
+            }
+            let Some(winner) = next.winner else {
+                return match race.time_lock(next) {
+                    Some(failure) => Err(failure),
+                    // Nothing happens any more, for ever.
+                    None if bound.limit == RunLimit::Moves => Ok(()),
+                    None => Err(Failure::BoundNeverReached),
+                };
+            };
+            race.wait(delay);
+            race.take(winner)?;
+            cancellation::work(UNITS_FOR_MOVE);
+        }
+    }
+}
+
+/// How much time the bound leaves if nothing happens.
+fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
+    match bound.limit {
+        RunLimit::Time => bound.value - race.time,
+        RunLimit::Moves => f64::INFINITY,
+        RunLimit::Clock(clock) => {
+            let (value, rate) = race.machine.clock(clock);
+            if value >= bound.value {
+                0.0
+            } else if rate > 0.0 {
+                (bound.value - value) / rate
+            } else {
+                f64::INFINITY
+            }
+        }
+    }
+}
+
+/// Whether a path is decided by the state or within the delay behind it, and after which time.
+fn watched(race: &mut Race<'_>, path: &Path, delay: f64) -> Result<Option<(bool, f64)>, Failure> {
+    let mut ahead = 0.0;
+    for _ in 0..MOST_CHANGES {
+        let (keep, reach) = match path {
+            Path::Eventually(goal) => (Mask::constant(true), race.machine.mask(goal, &[], ahead)?),
+            Path::Always(keep) => (race.machine.mask(keep, &[], ahead)?, Mask::constant(false)),
+            Path::Until(keep, goal) => (
+                race.machine.mask(keep, &[], ahead)?,
+                race.machine.mask(goal, &[], ahead)?,
+            ),
+        };
+        if reach.now || !keep.now {
+            return Ok(Some((reach.now, ahead)));
+        }
+        let is_inside = ahead < delay;
+        if is_inside && (reach.behind || !keep.behind) {
+            return Ok(Some((reach.behind, ahead)));
+        }
+        let horizon = reach.horizon.min(keep.horizon);
+        let next = ahead + horizon;
+        if !is_inside || next.is_infinite() || next > delay || next <= ahead {
+            return Ok(None);
+        }
+        ahead = next;
+    }
+    Ok(None)
+}

@@ -1,0 +1,77 @@
+//! Means of values that may be any number.
+//!
+//! The interval is Student's: it is right in the limit of many runs, and can be far too narrow for
+//! few runs of values that are rarely great.
+//!
+//! Source: B. P. Welford, "Note on a method for calculating corrected sums of squares and
+//! products", Technometrics 4 (1962).
+
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::binomial::Interval;
+
+/// A mean in the making.
+#[derive(Clone, Debug, Default)]
+pub struct Expectation {
+    count: u64,
+    mean: f64,
+    squares: f64,
+}
+
+impl Expectation {
+    /// Adds a value.
+    pub fn push(&mut self, value: f64) {
+        self.count += 1;
+        let before = value - self.mean;
+        self.mean += before / self.count as f64;
+        self.squares += before * (value - self.mean);
+    }
+
+    /// How many values there are.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Their mean; 0 without values.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// Student's interval, at a risk of `alpha` in the limit; `None` for fewer than two values.
+    pub fn student(&self, alpha: f64) -> Option<Interval> {
+        if self.count < 2 {
+            return None;
+        }
+        let freedom = (self.count - 1) as f64;
+        let error = (self.squares / freedom / self.count as f64).sqrt();
+        let quantile = StudentsT::new(0.0, 1.0, freedom)
+            .ok()?
+            .inverse_cdf(1.0 - alpha / 2.0);
+        let half = quantile * error;
+        Some(Interval {
+            lower: self.mean - half,
+            upper: self.mean + half,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::float_cmp, reason = "these are exact")]
+
+    use super::Expectation;
+
+    #[test]
+    fn the_interval_is_that_of_tables() {
+        let mut mean = Expectation::default();
+        for value in [1.0, 2.0, 3.0, 4.0, 5.0] {
+            mean.push(value);
+        }
+        assert_eq!(mean.mean(), 3.0);
+        // t(4; 0.975) = 2.776445, deviation sqrt(2.5), five values.
+        let half = 2.776_445 * (2.5_f64 / 5.0).sqrt();
+        let interval = mean.student(0.05).expect("there are two values");
+        assert!((interval.upper - 3.0 - half).abs() < 1e-6, "{interval:?}");
+        assert!((3.0 - interval.lower - half).abs() < 1e-6, "{interval:?}");
+    }
+}

@@ -1,0 +1,107 @@
+//! Runs of the stochastic semantics against closed forms, and the interpreter against compiled
+//! code.
+//!
+//! Each model is small enough that its probability is known. 20,000 runs must come within what a
+//! risk of one in a million allows (Hoeffding's bound); the seed is fixed, so a test that passes
+//! passes always.
+
+use checker::diagnostics::{Diagnostic, SourceMap};
+use checker::exec::{Executor, Interpreter, Jit};
+use checker::ir::{Network, RunBound, Statistical, StatisticalQuery};
+use checker::semantics::{self, Reading};
+use checker::stochastic::{Failure, Runner};
+use checker::syntax;
+
+mod refusals;
+mod values;
+
+/// A model in the stochastic reading, with a compiled query.
+fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), String> {
+    let mut sources = SourceMap::default();
+    let prelude = syntax::prelude(&mut sources);
+    let parsed = syntax::read_model("model.xta", model.as_bytes(), &mut sources);
+    let mut found = parsed.diagnostics;
+    let text = |found: &[Diagnostic], sources: &SourceMap| -> Result<(), String> {
+        let errors: Vec<String> = found
+            .iter()
+            .filter(|one| one.is_error())
+            .map(|one| format!("{}: {}", one.code.code, one.render(sources)))
+            .collect();
+        if errors.is_empty() {
+            Ok(())
+        } else {
+            Err(errors.join("\n"))
+        }
+    };
+    let (model, more) =
+        semantics::analyse(&parsed.document, &prelude, &sources, Reading::Stochastic);
+    found.extend(more);
+    text(&found, &sources)?;
+    let mut model = model.ok_or("no model")?;
+    let span = syntax::add_query_text(query, &mut sources);
+    let (parsed, found) = syntax::parse_query(span, &sources);
+    text(&found, &sources)?;
+    let parsed = parsed.ok_or("no query")?;
+    let (query, found) = model.compile_statistical(&parsed, &sources);
+    text(&found, &sources)?;
+    Ok((model.network, query.ok_or("not statistical")?))
+}
+
+fn executors(network: &Network) -> [Box<dyn Executor>; 2] {
+    let interpreter = Interpreter::new(&network.functions, &network.constants);
+    let jit = Jit::new(&network.functions, &network.constants).expect("the code compiles");
+    [Box::new(interpreter), Box::new(jit)]
+}
+
+/// How many of `runs` runs satisfy a query for a probability, in compiled code.
+fn satisfied(network: &Network, query: &StatisticalQuery, runs: u64) -> Result<u64, Failure> {
+    let (Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. }) =
+        &query.kind
+    else {
+        panic!("{} asks for no probability", query.text);
+    };
+    let [interpreter, jit] = executors(network);
+    let count = |executor: &dyn Executor, runs: u64| -> Result<(u64, Vec<u64>), Failure> {
+        let mut runner = Runner::new(network, executor);
+        let mut moves = Vec::new();
+        let mut satisfied = 0;
+        for run in 0..runs {
+            let outcome = runner.path((1, run), bound, path)?;
+            satisfied += u64::from(outcome.satisfied);
+            moves.push(outcome.time.to_bits() ^ outcome.moves);
+        }
+        Ok((satisfied, moves))
+    };
+    let few = runs.min(300);
+    let (left, right) = (count(&*interpreter, few), count(&*jit, few));
+    assert_eq!(left, right, "the interpreter and compiled code differ");
+    Ok(count(&*jit, runs)?.0)
+}
+
+/// Checks the probability of a query.
+#[track_caller]
+fn expect(model: &str, query: &str, probability: f64) {
+    const RUNS: u64 = 20_000;
+    let (network, query) = match load(model, query) {
+        Ok(loaded) => loaded,
+        Err(message) => panic!("{message}"),
+    };
+    let satisfied = satisfied(&network, &query, RUNS).expect("no run fails");
+    let estimate = satisfied as f64 / RUNS as f64;
+    // Two-sided, at a risk of one in a million.
+    let margin = ((2e6_f64).ln() / (2.0 * RUNS as f64)).sqrt();
+    assert!(
+        (estimate - probability).abs() <= margin,
+        "{}: {estimate} instead of {probability}, more than {margin} apart",
+        query.text
+    );
+}
+
+/// The bound of a query.
+fn bound_of(query: &StatisticalQuery) -> &RunBound {
+    match &query.kind {
+        Statistical::Probability(bound, _)
+        | Statistical::Hypothesis { bound, .. }
+        | Statistical::Expectation { bound, .. } => bound,
+    }
+}

@@ -1,0 +1,304 @@
+//! Probabilities and expectations that have closed forms.
+
+use checker::ir::Statistical;
+use checker::stochastic::Runner;
+
+use super::{bound_of, executors, expect, load};
+
+#[test]
+fn the_faster_of_two_exponential_delays_wins_by_its_rate() {
+    let model = "
+        process P(const int r) {
+            state a { ; r }, won, late;
+            init a;
+            trans a -> won { guard first; assign first = false; }, a -> late { guard !first; };
+        }
+        bool first = true;
+        A = P(1); B = P(3);
+        system A, B;";
+    let model = model.replace("bool first = true;", "");
+    let model = format!("bool first = true;\n{model}");
+    expect(&model, "Pr[<=1000](<> A.won)", 0.25);
+}
+
+#[test]
+fn an_exponential_delay_has_its_distribution() {
+    let model = "
+        process P() { state a { ; 1:2 }, out; init a; trans a -> out { }; }
+        system P;";
+    expect(model, "Pr[<=2](<> P.out)", 1.0 - (-1.0_f64).exp());
+    expect(model, "Pr[<=2]([] not P.out)", (-1.0_f64).exp());
+    expect(model, "Pr[<=2](P.a U P.out)", 1.0 - (-1.0_f64).exp());
+}
+
+#[test]
+fn a_uniform_delay_lies_between_guard_and_invariant() {
+    let model = "
+        clock x;
+        process P() { state a { x <= 10 }, out; init a; trans a -> out { guard x >= 4; }; }
+        system P;";
+    expect(model, "Pr[<=7](<> P.out)", 0.5);
+    expect(model, "Pr[<=10](<> P.out)", 1.0);
+    expect(model, "Pr[<=4](<> x > 4)", 0.0);
+    expect(model, "Pr[<=4](<> x >= 4)", 1.0);
+}
+
+#[test]
+fn a_guard_shifts_an_exponential_delay() {
+    let model = "
+        clock x;
+        process P() { state a { ; 2 }, out; init a; trans a -> out { guard x >= 3; }; }
+        system P;";
+    expect(model, "Pr[<=4](<> P.out)", 1.0 - (-2.0_f64).exp());
+}
+
+#[test]
+fn uniform_delays_race() {
+    let model = "
+        clock x;
+        broadcast chan go;
+        process P(const int low, const int high) {
+            state a { x <= high }, won, lost;
+            init a;
+            trans a -> won { guard x >= low; sync go!; }, a -> lost { sync go?; };
+        }
+        A = P(0, 2); B = P(1, 3);
+        system A, B;";
+    expect(model, "Pr[<=9](<> A.won)", 0.875);
+}
+
+#[test]
+fn a_disjunction_leaves_two_windows() {
+    let model = "
+        clock x;
+        process P() {
+            state a { x <= 10 }, out;
+            init a;
+            trans a -> out { guard x <= 1 || x >= 7; };
+        }
+        system P;";
+    expect(model, "Pr[<=5](<> P.out)", 0.25);
+    expect(model, "Pr[<=8](<> P.out)", 0.5);
+}
+
+#[test]
+fn an_equality_is_a_moment() {
+    let model = "
+        clock x;
+        process P() {
+            state a { x <= 5 }, b { x <= 7 }, out;
+            init a;
+            trans a -> b { guard x == 5; }, b -> out { guard x == 6 || x == 7; };
+        }
+        system P;";
+    expect(model, "Pr[<=20](<> P.out && x == 6)", 0.5);
+    expect(model, "Pr[<=20](<> P.b && x < 5)", 0.0);
+}
+
+#[test]
+fn stages_add_up() {
+    let model = "
+        clock x; int n = 0;
+        process P() {
+            state a { x <= 1 }, done;
+            init a;
+            trans a -> a { guard n < 4; assign x = 0, n++; }, a -> done { guard n == 4; };
+        }
+        system P;";
+    expect(model, "Pr[<=2](<> P.done)", 0.225);
+    let model = "
+        int n = 0;
+        process P() { state a { ; 10 }; init a; trans a -> a { assign n++; }; }
+        system P;";
+    expect(model, "Pr[<=1](<> n >= 10)", 0.542_070_285_528_147_7);
+}
+
+#[test]
+fn weights_choose_branches() {
+    let model = "
+        int n = 3;
+        process P() {
+            state a { ; 1 };
+            branchpoint b;
+            init a;
+            trans a -> b { guard n > 0 && n < 10; },
+                  b -> a { assign n++; probability 4; },
+                  b -> a { assign n--; probability 6; };
+        }
+        system P;";
+    expect(model, "Pr[#<=100000](<> n == 10)", 0.041_912_968_548_039_64);
+}
+
+#[test]
+fn a_clock_with_a_rate_bounds_a_run() {
+    let model = "
+        clock cost;
+        process P() { state a { cost' == 3 ; 1 }, out; init a; trans a -> out { }; }
+        system P;";
+    expect(model, "Pr[cost<=6](<> P.out)", 1.0 - (-2.0_f64).exp());
+}
+
+#[test]
+fn a_stopwatch_stands_still() {
+    let model = "
+        clock x, y;
+        process P() {
+            state a { y <= 4 && x' == 0 }, b { y <= 8 }, out;
+            init a;
+            trans a -> b { guard y == 4; }, b -> out { guard x >= 2; };
+        }
+        system P;";
+    expect(model, "Pr[<=7](<> P.out)", 0.5);
+}
+
+#[test]
+fn a_queue_grows_as_uniformisation_says() {
+    let model = "
+        int[0,100] n = 0;
+        broadcast chan left;
+        process Arrival() { state a { ; 1 }; init a; trans a -> a { assign n++; }; }
+        process Server() {
+            state idle { ; 3:2 };
+            init idle;
+            trans idle -> idle { guard n > 0; assign n--; };
+        }
+        system Arrival, Server;";
+    expect(model, "Pr[<=10](<> n >= 5)", 0.247_074_521_311_354_82);
+}
+
+#[test]
+fn a_binary_channel_waits_for_its_receiver() {
+    let model = "
+        clock x;
+        chan c;
+        process S() { state a { ; 1 }, out; init a; trans a -> out { sync c!; }; }
+        process R() { state w, out; init w; trans w -> out { guard x >= 2; sync c?; }; }
+        system S, R;";
+    expect(model, "Pr[<=3](<> S.out && R.out)", 1.0 - (-1.0_f64).exp());
+}
+
+#[test]
+fn urgent_and_committed_locations_take_no_time() {
+    let model = "
+        clock x; int n = 0;
+        process P() {
+            state a { x <= 1 }, b, c, out;
+            commit c;
+            urgent b;
+            init a;
+            trans a -> b { assign x = 0; }, b -> c { }, c -> out { assign n = 1; };
+        }
+        process Q() { state a { ; 1000000 }, b; init a; trans a -> b { }; }
+        system P, Q;";
+    expect(model, "Pr[<=2](<> P.c && x > 0)", 0.0);
+    expect(model, "Pr[<=2](<> n == 1)", 1.0);
+}
+
+#[test]
+fn an_urgent_channel_is_used_at_once() {
+    let model = "
+        clock x;
+        urgent broadcast chan go;
+        process P() {
+            state a { ; 1 }, out;
+            init a;
+            trans a -> out { guard x >= 3; sync go!; };
+        }
+        system P;";
+    expect(model, "Pr[<=5](<> P.out && x == 3)", 1.0);
+    expect(model, "Pr[<=5](<> P.a && x > 3)", 0.0);
+}
+
+#[test]
+fn select_makes_an_edge_for_each_value() {
+    let model = "
+        int v = 0;
+        process P() {
+            state a { ; 1 }, out;
+            init a;
+            trans a -> out { select i : int[1, 4]; assign v = i; };
+        }
+        system P;";
+    expect(model, "Pr[<=100](<> v == 3)", 0.25);
+}
+
+#[test]
+fn doubles_take_clocks_and_random_numbers() {
+    let model = "
+        clock x; double v = 0.0; double when = 0.0;
+        process P() {
+            state a { x <= 4 }, out;
+            init a;
+            trans a -> out { assign v = random_normal(1, 2), when = x; };
+        }
+        system P;";
+    expect(model, "Pr[<=4](<> v > 3)", 0.158_655_253_931_457_07);
+    expect(model, "Pr[<=9](<> P.out && when <= 1)", 0.25);
+}
+
+#[test]
+fn clocks_are_taken_by_reference() {
+    let model = "
+        clock x[2];
+        void reset(clock &c, double v) { c = v; }
+        process P(clock &c) {
+            state a { c <= 4 }, out;
+            init a;
+            trans a -> out { guard c >= 2; assign reset(c, 0.5); };
+        }
+        A = P(x[1]);
+        system A;";
+    expect(model, "Pr[<=3](<> A.out)", 0.5);
+    expect(model, "Pr[<=9](<> A.out && x[1] < 0.75)", 1.0);
+}
+
+#[test]
+fn processes_of_a_set_are_asked_by_quantifiers() {
+    let model = "
+        const int N = 5;
+        process P(int[0, N - 1] id) { state a { ; 1 }, done; init a; trans a -> done { }; }
+        system P;";
+    let exact = (1.0 - (-2.0_f64).exp()).powi(5);
+    expect(
+        model,
+        "Pr[<=2](<> forall (i : int[0, N - 1]) P(i).done)",
+        exact,
+    );
+}
+
+#[test]
+fn expectations_are_means() {
+    let model = "
+        double v = 0.0; clock x;
+        process P() {
+            state a { x <= 4 }, out { x' == 0 };
+            init a;
+            trans a -> out { assign v = random(4); };
+        }
+        system P;";
+    for (query, mean) in [
+        ("E[<=10; 20000](max: v)", 2.0),
+        ("E[<=10; 20000](max: x)", 2.0),
+        ("E[<=10; 20000](min: x)", 0.0),
+    ] {
+        let (network, query) = load(model, query).expect("the query compiles");
+        let Statistical::Expectation { maximum, value, .. } = query.kind else {
+            panic!("it is an expectation");
+        };
+        let bound = bound_of(&query);
+        let [_, jit] = executors(&network);
+        let mut runner = Runner::new(&network, &*jit);
+        let runs = bound.runs.expect("the query says how many");
+        let mut sum = 0.0;
+        for run in 0..runs {
+            sum += runner
+                .extreme((7, run), bound, value, maximum)
+                .expect("no run fails")
+                .0;
+        }
+        let found = sum / runs as f64;
+        // Values between 0 and 4: Hoeffding's bound at a risk of one in a million.
+        let margin = 4.0 * ((2e6_f64).ln() / (2.0 * runs as f64)).sqrt();
+        assert!((found - mean).abs() <= margin, "{}: {found}", query.text);
+    }
+}
