@@ -25,9 +25,9 @@ Matrix = list[list[tuple[int, bool] | None]]
 Extreme = int | Literal["inf"] | None
 """A least or greatest value: ``"inf"`` if there is no greatest, ``None`` if no state counts."""
 
-Value = Extreme | list[Extreme] | list[list[Extreme] | None]
+Value = Extreme | float | list[Extreme] | list[list[Extreme] | None]
 """The value of ``sup`` or ``inf`` is an `Extreme`, that of ``bounds`` the pair of the least and the
-greatest. Several items have a list of these."""
+greatest. Several items have a list of these. The value of a statistical query is its estimate."""
 
 PAGE_PLANS: Final = 4096
 """So many plans are taken from the engine together."""
@@ -52,6 +52,28 @@ class Place:
         return f"{self.place}: {self.text}"
 
 
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What random runs say of a probability or of a mean.
+
+    Attributes:
+        value: The share of the runs that are satisfied, or the mean of their values.
+        lower: The lower end of the interval; ``None`` if too few runs give none.
+        upper: The upper end of the interval; ``None`` if too few runs give none.
+        confidence: The confidence of the interval: for probabilities that of Clopper and Pearson,
+            for means Student's, which is asymptotic.
+        runs: The number of runs.
+        satisfied_runs: How many of them are satisfied; ``None`` for means.
+    """
+
+    value: float
+    lower: float | None
+    upper: float | None
+    confidence: float
+    runs: int
+    satisfied_runs: int | None
+
+
 class Answer:
     """The answer to a query.
 
@@ -62,8 +84,10 @@ class Answer:
         verdict: ``satisfied``, ``not satisfied``, ``maybe`` (an over-approximation could not
             decide), ``unknown`` (a limit came first: see `stop`) or ``error`` (the model failed:
             see `message`).
-        value: The value of ``sup``, ``inf`` or ``bounds``; ``None`` for other queries, and if no
-            state counts. `message` says whether a clock reaches the value.
+        value: The value of ``sup``, ``inf`` or ``bounds``, or the estimate of a statistical query;
+            ``None`` for other queries, and if no state counts. `message` says whether a clock
+            reaches the value.
+        estimate: What the random runs of a statistical query say; ``None`` for other queries.
         message: A remark for the user, or what went wrong in the model.
         wrapped: The first place, in the order of the model, where a result of integer arithmetic
             did not fit into 32 bits and wrapped round. `Model.overflow` can make it an error.
@@ -98,6 +122,12 @@ class Answer:
         self.verdict: Verdict = raw.verdict
         value = raw.value_json()
         self.value: Value = None if value is None else json.loads(value)
+        estimate = raw.estimate_json()
+        self.estimate = (
+            None
+            if estimate is None
+            else Estimate(value=json.loads(value or "0"), **json.loads(estimate))
+        )
         self.message = raw.message
         self.wrapped = None if raw.wrapped is None else Place(*raw.wrapped)
         self.warnings = tuple(raw.warnings)
@@ -122,6 +152,9 @@ class Answer:
             facts.append(f"stopped by the {self.limit_text}")
         if self.message:
             facts.append(self.message.partition("\n")[0])
+        if self.estimate is not None:
+            states = f"{self.estimate.runs} runs"
+            return f"<Answer: {', '.join(facts)}; {states} in {1000 * self.seconds:.1f} ms>"
         return f"<Answer: {', '.join(facts)}; {states} explored in {1000 * self.seconds:.1f} ms>"
 
     def __bool__(self) -> bool:

@@ -40,7 +40,8 @@ class Options:
     """How a query is to be answered.
 
     Raises:
-        ValueError: `threads` is negative, or `max_plans` less than 1.
+        ValueError: `threads` is negative, `max_plans` or `runs` less than 1, or a risk or `epsilon`
+            not between 0 and 1.
     """
 
     search: SearchOrder = "bfs"
@@ -49,15 +50,32 @@ class Options:
     threads: int | Literal["all"] = 1
     """The number of threads; ``"all"`` (or 0) is one for each core.
 
-    They share the breadth-first search for a reachable state (``E<>``, ``A[]``) or for values, and
-    the computation of winning states in games; other searches use one thread. The same number gives
+    They share the breadth-first search for a reachable state (``E<>``, ``A[]``) or for values, the
+    computation of winning states in games, and random runs, whose results do not depend on the
+    number; other searches use one thread. The same number gives
     the same counts and traces. The verdict can depend on the number only if the model has a
     run-time error, because the search may or may not meet it before its goal. In games nothing
     depends on the number.
     """
 
     seed: int = 0
-    """For ``search="random"``: the same seed gives the same search."""
+    """For ``search="random"`` and for statistical queries: the same seed gives the same search and
+    the same runs. It is at least 0."""
+
+    runs: int | None = None
+    """How many random runs a statistical query makes, instead of the number that it says itself or
+    that `epsilon` needs."""
+
+    alpha: float = 0.05
+    """The risk that the interval of a statistical query misses, or that ``Pr[…](…) >= p`` is
+    rejected wrongly."""
+
+    beta: float = 0.05
+    """The risk that ``Pr[…](…) >= p`` is accepted wrongly."""
+
+    epsilon: float = 0.05
+    """A probability is estimated until both ends of its interval are so near to the estimate."""
+
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""
 
@@ -147,6 +165,12 @@ class Options:
     def __post_init__(self) -> None:
         if self.threads != "all" and self.threads < 0:
             raise ValueError(f"{self.threads} threads: there must be at least 1, or 'all'")
+        if self.runs is not None and self.runs < 1:
+            raise ValueError(f"{self.runs} runs: there must be at least 1")
+        for name in ("alpha", "beta", "epsilon"):
+            value = getattr(self, name)
+            if not 0 < value < 1:
+                raise ValueError(f"{name} is {value}, but must lie between 0 and 1")
         if self.max_plans < 1:
             raise ValueError(f"max_plans is {self.max_plans}, but must be at least 1")
 

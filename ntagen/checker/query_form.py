@@ -17,7 +17,7 @@ class QueryForm:
     Attributes:
         kind: How its kind is written: ``E<>``, ``A[]``, ``E[]``, ``A<>``, ``-->``, ``sup``,
             ``inf``, ``bounds``, ``control``, ``control_t*``, ``E<> control``, ``saveStrategy``,
-            ``loadStrategy``, or ``unsupported``.
+            ``loadStrategy``, ``Pr``, ``E`` (of statistical queries), or ``unsupported``.
         defines: The name of the strategy that it defines, or ``None``.
         uses: The name of the strategy that it is asked under, or that it saves, or ``None``.
         is_observed: Whether it is a game in which the controller sees observations only.
@@ -27,6 +27,11 @@ class QueryForm:
     defines: str | None
     uses: str | None
     is_observed: bool
+
+    @property
+    def is_statistical(self) -> bool:
+        """Whether random runs answer it."""
+        return self.kind in ("Pr", "E")
 
     @property
     def is_game(self) -> bool:

@@ -78,6 +78,8 @@ def _record(outcome: Outcome) -> dict[str, object]:
         "peak_bytes": 0 if answer is None else answer.peak_bytes,
         "plans": None if answer is None else answer.plan_count,
     }
+    if answer is not None and answer.estimate is not None:
+        record |= asdict(answer.estimate)
     if answer is None:
         place = f"{mistake.path}:{mistake.line}:{mistake.column}" if mistake else None
         record |= {"place": place, "code": mistake and mistake.code}

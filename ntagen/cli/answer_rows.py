@@ -12,7 +12,7 @@ from ntagen.cli.outcomes import Outcome, summary
 from ntagen.cli.terminal import Styled, echo, echo_message
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Model
+    from ntagen.checker import Answer, Estimate, Model
 
 _MARK: Final = {
     "satisfied": ("yes", "green"),
@@ -68,6 +68,8 @@ class Human:
             echo(pointer, err=True)
 
     def _facts(self, answer: Answer) -> list[str]:
+        if answer.estimate is not None:
+            return _estimated(answer, answer.estimate)
         explored = "1 state" if answer.explored == 1 else f"{answer.explored} states"
         facts = [f"{explored} explored", f"{answer.stored} stored"]
         facts.append(f"{1000 * answer.seconds:.1f} ms")
@@ -81,6 +83,23 @@ class Human:
             where = f"first at {answer.wrapped}"
             lines.append(f"a result does not fit into 32 bits and wraps round, {where}")
         return lines if self._trace_is_written else [*lines, *_way_to_failure(answer)]
+
+
+def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
+    """What random runs say: the estimate with its interval, and what it took."""
+    percent = f"{100 * estimate.confidence:g} %"
+    between = f"in [{_number(estimate.lower)}, {_number(estimate.upper)}] at {percent} confidence"
+    lines = [f"value: {_number(estimate.value)}, {between}"]
+    runs = f"{estimate.runs:,} run" + ("s" if estimate.runs != 1 else "")
+    if estimate.satisfied_runs is not None:
+        runs = f"{estimate.satisfied_runs:,} of {runs} satisfied"
+    stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
+    lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
+    return [*lines, answer.message] if answer.message else lines
+
+
+def _number(value: float | None) -> str:
+    return "?" if value is None else f"{value:.6g}"
 
 
 MOVES_SHOWN: Final = 12

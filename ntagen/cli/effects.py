@@ -75,8 +75,8 @@ def idle_options(
             "--reductions has no effect here: of the reductions games make live-variables only, "
             "and strategies and plans are about states with all their values"
         )
-    if "seed" in given and values["search"] != "random":
-        notes.append("--seed has no effect without --search random")
+    if not any(query.is_statistical for query in queries):
+        notes += _without_statistics(given, values)
     if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
         notes.append("--allow-write has no effect here: no query saves a strategy")
     if "max_plans" in given and not values["plans"]:
@@ -88,10 +88,24 @@ def idle_options(
     return notes
 
 
+def _without_statistics(given: Collection[str], values: Mapping[str, object]) -> list[str]:
+    """A note for each option of statistical queries, if no query is one."""
+    notes = [
+        f"--{name} has no effect here: no query is a statistical one"
+        for name in ("runs", "alpha", "beta", "epsilon")
+        if name in given
+    ]
+    if "seed" in given and values["search"] != "random":
+        notes.append("--seed has no effect without --search random or a statistical query")
+    return notes
+
+
 def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
     """Whether more than one thread can share the work of a query."""
     if query.is_game:
         return not query.is_observed
+    if query.is_statistical:
+        return True
     return values["search"] == "bfs" and query.kind not in ("E[]", "A<>", "-->")
 
 

@@ -128,7 +128,7 @@ def _progress(line: CommandLine, after: str) -> None:
 def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
-    from ntagen.verifyta.output import summary, values, verdict
+    from ntagen.verifyta.output import estimate, summary, values, verdict
 
     form = form_of(text)
     wants_trace = line.has("--diagnostic")
@@ -141,6 +141,9 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
         Options(
             search=_SEARCH.get(line.value("--search-order"), "bfs"),
             seed=int(line.value("--seed", "0")),
+            alpha=float(line.value("--alpha", "0.05")),
+            beta=float(line.value("--beta", "0.05")),
+            epsilon=float(line.value("--epsilon", "0.05")),
             trace=wants_trace,
             wanted_trace=wanted if wants_trace else "any",
             strategy=form is not None
@@ -152,7 +155,7 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
         raise ModelError(answer.message or "the model has a run-time error")
     shown = verdict(answer)
     _progress(line, f"{shown}\n")
-    for value in values(answer):
+    for value in [*values(answer), *estimate(answer)]:
         echo(value)
     if wants_trace:
         _write_trace(line, model, answer, number, inputs)

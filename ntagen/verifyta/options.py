@@ -45,7 +45,7 @@ class Option:
         return self.long or self.letter
 
 
-_STATISTICAL: Final = "it is for statistical queries, which ntagen does not answer"
+_STATISTICAL: Final = "ntagen solves clocks with constant rates exactly, without steps"
 _LEARNING: Final = "it is for learning, which ntagen does not do"
 
 
@@ -78,7 +78,7 @@ OPTIONS: Final = (
         "taken as 0.",
         ("0", "1", "2", "3", "4"),
     ),
-    Option("-r", "--seed", "N", "honoured", "The seed of the random order."),
+    Option("-r", "--seed", "N", "honoured", "The seed of the random order and of random runs."),
     Option("-s", "--silence-progress", "", "honoured", "Do not mark lines as progress."),
     Option("-q", "", "", "honoured", "Do not show the options."),
     Option("-u", "--summary", "", "honoured", "Show counts, time and memory of each query."),
@@ -126,9 +126,9 @@ OPTIONS: Final = (
         "refused",
         "ntagen does not under-approximate; without the option answers are exact",
     ),
-    Option("-E", "--epsilon", "N", "refused", _STATISTICAL),
-    Option("-a", "--alpha", "N", "refused", _STATISTICAL),
-    Option("-B", "--beta", "N", "refused", _STATISTICAL),
+    Option("-E", "--epsilon", "0..1", "honoured", "Half the width of intervals."),
+    Option("-a", "--alpha", "0..1", "honoured", "The risk that an interval misses."),
+    Option("-B", "--beta", "0..1", "honoured", "The risk that Pr >= p is accepted wrongly."),
     Option("-D", "--discretization", "N", "refused", _STATISTICAL),
     *_refused(
         (
@@ -247,9 +247,18 @@ def _take(option: Option, value: str | None, rest: list[str], given: dict[str, s
         raise InputError(f"{option.name} is {value!r}, but must be {_choices(option)}")
     if option.value == "N" and not value.lstrip("-").isdigit():
         raise InputError(f"{option.name} is {value!r}, but must be an integer")
+    if option.value == "0..1" and not _is_share(value):
+        raise InputError(f"{option.name} is {value!r}, but must be a number between 0 and 1")
     if option.value and not value:
         raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
     given[option.name] = value
+
+
+def _is_share(value: str) -> bool:
+    try:
+        return 0 < float(value) < 1
+    except ValueError:
+        return False
 
 
 def _choices(option: Option) -> str:

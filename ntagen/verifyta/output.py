@@ -103,6 +103,23 @@ def verdict(answer: Answer) -> str:
             raise LimitError(f"stopped by the {answer.limit_text}")
 
 
+def estimate(answer: Answer) -> list[str]:
+    """What a statistical query found out, in the form of UPPAAL 5; empty for other queries."""
+    found = answer.estimate
+    if found is None or found.lower is None or found.upper is None:
+        return []
+    share = f"{100 * found.confidence:g}% CI"
+    if found.satisfied_runs is None:
+        half = found.upper - found.value
+        kind = "min" if re.match(r"[^(]*\(\s*min\b", answer.query) else "max"
+        mean = f"≈ {found.value:g}" if half == 0 else f"{found.value:g} ± {half:g} ({share})"
+        return [f"({found.runs} runs) E({kind}) = {mean}"]
+    runs = f"({found.satisfied_runs}/{found.runs} runs)"
+    path = re.search(r"\(\s*(<>|\[\])", answer.query)
+    asked = f"{path[1]} …" if path else "… U …"
+    return [f"{runs} Pr({asked}) in [{found.lower:g},{found.upper:g}] ({share})"]
+
+
 def values(answer: Answer) -> list[str]:
     """The values of ``sup``, ``inf`` and ``bounds``, a line for each expression."""
     found = re.match(r"\s*(sup|inf|bounds)\b[^:]*?(?:\{.*\})?\s*:(.*)", answer.query, re.DOTALL)

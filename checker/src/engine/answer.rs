@@ -10,6 +10,7 @@ use crate::ir::SiteId;
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
+use crate::stochastic::Estimate;
 use crate::verify;
 use crate::verify::certificate::States;
 use crate::verify::strategy::Outcome as StrategyCheck;
@@ -107,6 +108,8 @@ pub struct Answer {
     pub verdict: Verdict,
     /// The values of a query for them.
     pub value: Option<Values>,
+    /// What a statistical query found out.
+    pub estimate: Option<Estimate>,
     /// A remark for the user.
     pub message: Option<String>,
     /// Warnings about the query, rendered.
@@ -132,6 +135,7 @@ impl Answer {
         Answer {
             verdict,
             value: None,
+            estimate: None,
             message: None,
             warnings: Vec::new(),
             evidence: Evidence::default(),

@@ -28,6 +28,9 @@ impl LoadedModel {
     }
 
     fn check_it(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
+        if let Some(query) = self.statistical_query(text.span) {
+            return self.check_statistical(&query, options);
+        }
         let start = Instant::now();
         let (mut query, warnings) = self.compile(text.span)?;
         query.guide = self.compile_guide(options)?;

@@ -11,4 +11,6 @@ crate::diagnostics::codes! {
     NO_STRATEGY = "E0804" "no-strategy";
     /// A file of a strategy that cannot be read or written, or does not fit the model.
     STRATEGY_FILE = "E0805" "strategy-file";
+    /// A random run that has no result.
+    RUN_FAILS = "E0806" "run-fails";
 }

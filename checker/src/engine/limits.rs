@@ -176,6 +176,11 @@ impl LimitWatch {
         self.last_stop().unwrap_or(StopReason::Interrupted)
     }
 
+    /// Whether a limit or the user called for an end.
+    pub(super) fn has_stopped(&self) -> bool {
+        self.last_stop().is_some()
+    }
+
     /// Whether the user called for an end.
     pub(super) fn is_interrupted(&self) -> bool {
         self.last_stop() == Some(StopReason::Interrupted)

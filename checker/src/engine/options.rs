@@ -6,6 +6,7 @@ use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
+use crate::stochastic::Precision;
 use crate::tuning::Tuning;
 
 /// What runs the code of the model.
@@ -144,6 +145,8 @@ pub struct Options {
     pub reductions: Reductions,
     /// Which heuristics are used.
     pub tuning: Tuning,
+    /// What statistical queries promise; [`Options::threads`] counts for them too.
+    pub precision: Precision,
 }
 
 impl Options {

@@ -71,10 +71,20 @@ impl Answer {
         }
     }
 
-    /// The values of a query for them as JSON; `None` for other queries.
+    /// The values of a query for them, or the estimate of a statistical one, as JSON; `None` for
+    /// other queries.
     fn value_json(&self) -> Option<String> {
+        if let Some(estimate) = &self.inner.estimate {
+            return Some(json::real(estimate.value).to_string());
+        }
         let values = self.inner.value.as_ref()?;
         Some(json::values(values).to_string())
+    }
+
+    /// What a statistical query found out, as JSON; `None` for other queries.
+    fn estimate_json(&self) -> Option<String> {
+        let estimate = self.inner.estimate.as_ref()?;
+        Some(json::estimate(estimate).to_string())
     }
 
     /// "states", "memory" or "time" if a limit stopped the search.

@@ -9,6 +9,7 @@ use super::convert::{
 };
 use crate::engine::{Limits, Options, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
+use crate::stochastic::Precision;
 use crate::tuning::Tuning;
 
 /// The options that a Python value holds.
@@ -38,7 +39,20 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         tuning: tuning(field(given, "without")?)?,
         folder: field(given, "folder")?,
         allow_write: field(given, "allow_write")?,
+        precision: precision(given)?,
         ..Options::default()
+    })
+}
+
+/// What statistical queries promise.
+fn precision(given: &Bound<'_, PyAny>) -> PyResult<Precision> {
+    Ok(Precision {
+        alpha: field(given, "alpha")?,
+        beta: field(given, "beta")?,
+        epsilon: field(given, "epsilon")?,
+        runs: field(given, "runs")?,
+        seed: field(given, "seed")?,
+        ..Precision::default()
     })
 }
 

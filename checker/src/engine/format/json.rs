@@ -9,6 +9,7 @@ use crate::ir::Network;
 use crate::network::Part;
 use crate::search::liveness::ending::RunEnding;
 use crate::search::optimum::extremum::{Extreme, Extremes};
+use crate::stochastic::Estimate;
 use crate::verify::State;
 use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
@@ -97,6 +98,27 @@ pub fn values(values: &Values) -> Json {
         [only] => item(only),
         items => Json::Array(items.iter().map(item).collect()),
     }
+}
+
+/// A number; one that is not finite is null.
+pub fn real(value: f64) -> Json {
+    if value.is_finite() {
+        json!(value)
+    } else {
+        Json::Null
+    }
+}
+
+/// What a statistical query found out: `lower` and `upper` bound the interval at this `confidence`;
+/// expectations have no `satisfied_runs`.
+pub fn estimate(estimate: &Estimate) -> Json {
+    json!({
+        "lower": real(estimate.lower),
+        "upper": real(estimate.upper),
+        "confidence": real(estimate.confidence),
+        "runs": estimate.runs,
+        "satisfied_runs": estimate.satisfied_runs,
+    })
 }
 
 /// The witnesses of an answer: one object, or, for values, one with a list of `traces`.

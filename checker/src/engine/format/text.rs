@@ -483,7 +483,7 @@ pub fn failure_text(model: &LoadedModel, failure: Failure) -> String {
     }
 }
 
-fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
+pub(crate) fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
     match kind {
         RunTimeErrorKind::Overflow => "the result of integer arithmetic does not fit into 32 bits",
         RunTimeErrorKind::DivisionByZero => "division by zero",

@@ -12,6 +12,7 @@ pub(super) mod optimal_trace;
 pub mod partial_observation;
 pub(super) mod plans;
 pub(super) mod reachable;
+mod statistical;
 pub(crate) mod subject;
 pub mod time_clock;
 pub(super) mod time_optimal;

@@ -1,0 +1,248 @@
+//! Statistical queries: random runs of the model in the stochastic reading, and what they say.
+
+use std::time::Instant;
+
+use crate::diagnostics::{Diagnostic, Span};
+use crate::engine::answer::{Answer, Verdict};
+use crate::engine::code::PreparedCode;
+use crate::engine::codes;
+use crate::engine::limits::LimitWatch;
+use crate::engine::loaded_model::LoadedModel;
+use crate::engine::options::Options;
+use crate::engine::rejection::Rejection;
+use crate::ir::{EdgeId, Network, Statistical};
+use crate::network;
+use crate::search::limits::{Counters, Watch as _};
+use crate::stochastic::statistics::Decision;
+use crate::stochastic::{Failure, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate};
+use crate::syntax;
+use crate::syntax::ast;
+
+impl LoadedModel {
+    /// The query at this span, if it is a statistical one.
+    pub(in crate::engine) fn statistical_query(&self, span: Span) -> Option<ast::Query> {
+        let (query, _) = syntax::parse_query(span, &self.sources);
+        query.filter(|query| matches!(query.kind, ast::QueryKind::Statistical(_)))
+    }
+
+    /// Answers a statistical query.
+    pub(in crate::engine) fn check_statistical(
+        &mut self,
+        query: &ast::Query,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
+        let start = Instant::now();
+        self.stochastic()?;
+        let mut stochastic = self.stochastic.take().expect("it was just made");
+        stochastic.model.network.overflow = options.overflow;
+        let (compiled, found) = stochastic.model.compile_statistical(query, &self.sources);
+        let prepared = if compiled.is_some() {
+            let network = &stochastic.model.network;
+            PreparedCode::prepare(&mut stochastic.code, network, options.code, options.tuning)
+        } else {
+            Ok(())
+        };
+        let warnings = Rejection::new(found, &self.sources);
+        let rejected = |kept: &mut LoadedModel, stochastic, rejection| {
+            kept.stochastic = Some(stochastic);
+            Err(rejection)
+        };
+        let Some(compiled) = compiled else {
+            return rejected(self, stochastic, warnings);
+        };
+        if let Err(message) = prepared {
+            let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, query.span, message)
+                .help("use the interpreter: --engine interpreter");
+            let rejection = Rejection::new(vec![diagnostic], &self.sources);
+            return rejected(self, stochastic, rejection);
+        }
+        self.load_seconds += start.elapsed().as_secs_f64();
+        let network = &stochastic.model.network;
+        let executor = stochastic.code.as_ref().map(PreparedCode::executor);
+        let executor = executor.expect("code was just prepared");
+        let precision = Precision {
+            threads: options.thread_count(),
+            ..options.precision
+        };
+        let start = Instant::now();
+        let mut watch = LimitWatch::new(options.limits.clone());
+        let result = watch.bound(|watch| {
+            let counters = |runs| Counters {
+                explored: runs,
+                ..Counters::default()
+            };
+            estimate(network, executor, &compiled.kind, &precision, |runs| {
+                watch.look(&counters(runs)).is_some()
+            })
+        });
+        let answer = match result {
+            Err((reason, counters)) => Ok(Answer::new(Verdict::Unknown(reason), counters)),
+            Ok(Err(Failure::RunTime(error))) => {
+                let failure = network::Failure::from(error);
+                match failure {
+                    network::Failure::Interrupted => {
+                        let verdict = Verdict::Unknown(watch.stop());
+                        Ok(Answer::new(verdict, Counters::default()))
+                    }
+                    _ => Err(self.run_time_error(network, error)),
+                }
+            }
+            Ok(Err(failure)) => Err(self.run_fails(network, &failure, query.span)),
+            Ok(Ok(estimate)) => {
+                let verdict = match estimate.decision {
+                    Some(Decision::Below) => Verdict::NotSatisfied,
+                    None if watch.has_stopped() => Verdict::Unknown(watch.stop()),
+                    None if is_test(&compiled.kind) => Verdict::Maybe,
+                    Some(Decision::AtLeast) | None => Verdict::Satisfied,
+                };
+                let mut answer = Answer::new(verdict, Counters::default());
+                if let Some(remark) = remark(&compiled.kind, verdict) {
+                    answer.remark(remark);
+                }
+                answer.estimate = Some(estimate);
+                Ok(answer)
+            }
+        };
+        self.stochastic = Some(stochastic);
+        let mut answer = answer?;
+        answer.seconds = start.elapsed().as_secs_f64();
+        answer.warnings = warnings.rendered;
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    fn run_time_error(&self, network: &Network, error: crate::exec::RunTimeError) -> Rejection {
+        let span = network.sites[error.site.0 as usize].span;
+        let what = crate::engine::format::text::run_time_error(error.kind);
+        let message = format!("a random run ends in an error: {what}");
+        self.failing(
+            span,
+            message,
+            "correct the model, or keep it out of this state",
+        )
+    }
+
+    /// Why a random run has no result, with the place in the model.
+    fn run_fails(&self, network: &Network, failure: &Failure, query: Span) -> Rejection {
+        let span = |stand: Stand| {
+            let process = &network.processes[stand.process.0 as usize];
+            process.locations[stand.location.0 as usize].span
+        };
+        let name = |stand: Stand| {
+            let process = &network.processes[stand.process.0 as usize];
+            let location = &process.locations[stand.location.0 as usize];
+            format!("{}.{}", process.name, location.name)
+        };
+        let edge = |stand: Stand, EdgeId(edge): EdgeId| {
+            network.processes[stand.process.0 as usize].edges[edge as usize].span
+        };
+        let (span, message, help) = match *failure {
+            Failure::RunTime(error) => return self.run_time_error(network, error),
+            Failure::NoRate(stand) => (
+                span(stand),
+                format!(
+                    "{} can be left at any time: nothing says how long a random run stays",
+                    name(stand)
+                ),
+                "give the location an exponential rate, or an invariant that bounds the time",
+            ),
+            Failure::Rate(stand, rate) => (
+                span(stand),
+                format!("the exponential rate of {} is {rate}", name(stand)),
+                "make it a positive number",
+            ),
+            Failure::ClockRate(stand) => (
+                span(stand),
+                format!(
+                    "{} gives a clock a rate that is no finite number",
+                    name(stand)
+                ),
+                "correct the rate",
+            ),
+            Failure::RatesConflict(first, second) => (
+                span(second),
+                format!(
+                    "{} and {} set the rate of one clock",
+                    name(first),
+                    name(second)
+                ),
+                "let one process set the rate of a clock",
+            ),
+            Failure::Weight(stand, one) => (
+                edge(stand, one),
+                format!("a weight behind {} is negative or no number", name(stand)),
+                "make all weights 0 or greater",
+            ),
+            Failure::NoWeight(stand, one) => (
+                edge(stand, one),
+                format!("all weights behind {} are 0", name(stand)),
+                "make one of them positive, or guard the edge",
+            ),
+            Failure::TimeLock(stand) => (
+                span(stand),
+                format!(
+                    "{} lets no more time pass, and nothing can happen",
+                    name(stand)
+                ),
+                "widen its invariant, or give it an edge that is enabled in time",
+            ),
+            Failure::InvariantBroken(stand) => (
+                span(stand),
+                format!(
+                    "{} is entered while its invariant does not hold",
+                    name(stand)
+                ),
+                "guard the edges that lead there",
+            ),
+            Failure::Zeno(stand) => (
+                span(stand),
+                format!(
+                    "{ZENO_MOVES} moves take less than {ZENO_TIME} units of time; the last is of {}",
+                    name(stand)
+                ),
+                "let time pass in every loop, or bound the run by its moves: [#<=1000]",
+            ),
+            Failure::BoundNeverReached => (
+                query,
+                "the clock that bounds the run stands still, and nothing happens any more"
+                    .to_owned(),
+                "bound the run by time: [<=100]",
+            ),
+            Failure::NoProgress(stand) => (
+                span(stand),
+                format!(
+                    "a condition in {} changes more often than can be followed",
+                    name(stand)
+                ),
+                "keep clocks and rates within a few orders of magnitude",
+            ),
+        };
+        self.failing(span, message, help)
+    }
+
+    fn failing(&self, span: Span, message: String, help: &str) -> Rejection {
+        let diagnostic = Diagnostic::new(codes::RUN_FAILS, span, message).help(help);
+        Rejection::new(vec![diagnostic], &self.sources)
+    }
+}
+
+fn is_test(query: &Statistical) -> bool {
+    matches!(query, Statistical::Hypothesis { .. })
+}
+
+/// What the numbers do not say themselves.
+fn remark(query: &Statistical, verdict: Verdict) -> Option<&'static str> {
+    match (query, verdict) {
+        (_, Verdict::Unknown(_)) => Some("the estimate is that of the runs until then"),
+        (Statistical::Hypothesis { .. }, Verdict::Maybe) => {
+            Some("these runs do not decide the test")
+        }
+        (Statistical::Hypothesis { .. }, _) => {
+            Some("decided by a sequential test; the interval is that of as many runs")
+        }
+        (Statistical::Expectation { .. }, _) => {
+            Some("the interval is Student's: asymptotic, for many runs")
+        }
+        _ => None,
+    }
+}

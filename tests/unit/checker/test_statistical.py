@@ -1,0 +1,138 @@
+"""Statistical queries: what their answers say, and the options that they take."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from ntagen.checker import Model, load_file
+from ntagen.cli import main
+from ntagen.errors import InputError
+
+MODEL = """
+clock x;
+process P() { state A { ; 1:2 }, B; init A; trans A -> B { }; }
+process Q() { state A { x <= 4 }, B; init A; trans A -> B { guard x >= 2; }; }
+system P, Q;
+"""
+HALF = "Pr[<=3](<> Q.B)"
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Model:
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    return load_file(path)
+
+
+def test_a_probability_has_an_interval(model: Model) -> None:
+    answer = model.check("Pr[<=2](<> P.B)", runs=20_000)
+    assert answer.satisfied
+    estimate = answer.estimate
+    assert estimate is not None
+    assert estimate.runs == 20_000
+    assert estimate.satisfied_runs is not None
+    assert answer.value == estimate.value == estimate.satisfied_runs / 20_000
+    assert estimate.lower is not None
+    assert estimate.upper is not None
+    assert estimate.lower < estimate.value < estimate.upper
+    assert estimate.value == pytest.approx(1 - math.exp(-1), abs=0.02)
+    assert estimate.confidence == 0.95
+    assert "20000 runs" in repr(answer)
+
+
+def test_the_interval_is_as_narrow_as_wanted(model: Model) -> None:
+    for epsilon in (0.05, 0.01):
+        estimate = model.check(HALF, epsilon=epsilon).estimate
+        assert estimate is not None
+        assert estimate.lower is not None
+        assert estimate.upper is not None
+        assert estimate.value - epsilon <= estimate.lower <= 0.5 <= estimate.upper
+        assert estimate.upper <= estimate.value + epsilon
+
+
+def test_runs_depend_on_the_seed_and_not_on_threads(model: Model) -> None:
+    counts = [
+        model.check(HALF, seed=seed, threads=threads, runs=1000).estimate
+        for seed, threads in ((1, 1), (1, 2), (1, 3), (2, 1))
+    ]
+    assert counts[0] == counts[1] == counts[2]
+    assert counts[0] != counts[3]
+
+
+def test_the_interpreter_makes_the_same_runs(model: Model) -> None:
+    compiled = model.check(HALF, runs=200).estimate
+    assert model.check(HALF, runs=200, engine="interpreter").estimate == compiled
+
+
+def test_a_comparison_is_decided(model: Model) -> None:
+    assert model.check(f"{HALF} >= 0.3").satisfied is True
+    assert model.check(f"{HALF} >= 0.7").satisfied is False
+    assert model.check(f"{HALF} <= 0.7").satisfied is True
+    assert model.check(f"{HALF} <= 0.3").satisfied is False
+    assert model.check(f"{HALF} >= 0.5", runs=3).verdict == "maybe"
+
+
+def test_a_mean_has_an_interval(model: Model) -> None:
+    answer = model.check("E[<=3; 100](max: x)")
+    estimate = answer.estimate
+    assert estimate is not None
+    assert (estimate.value, estimate.runs, estimate.satisfied_runs) == (3.0, 100, None)
+    assert (estimate.lower, estimate.upper) == (3.0, 3.0)
+
+
+def test_a_run_without_result_is_refused_with_its_place(tmp_path: Path) -> None:
+    path = tmp_path / "model.xta"
+    path.write_text("process P() { state A, B; init A; trans A -> B { }; } system P;", "utf-8")
+    with pytest.raises(InputError, match=r"model.xta:1:21: error\[E0806\]: P.A can be left at any"):
+        load_file(path).check("Pr[<=1](<> P.B)")
+
+
+@pytest.mark.parametrize("option", ["alpha", "beta", "epsilon"])
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0, math.nan])
+def test_risks_lie_between_0_and_1(option: str, value: float, model: Model) -> None:
+    with pytest.raises(ValueError, match=f"{option} is"):
+        model.check(HALF, **{option: value})
+
+
+def test_the_command_line_prints_the_interval(
+    model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["check", str(tmp_path / "model.xta"), "--query", HALF, "--runs", "50"]
+    assert main([*words, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["runs"] == 50
+    assert record["lower"] < record["value"] < record["upper"]
+    assert record["value"] == record["satisfied_runs"] / 50
+    assert main(words) == 0
+    assert "of 50 runs satisfied" in capsys.readouterr().out
+
+
+def test_options_without_effect_are_noted(
+    model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(tmp_path / "model.xta")
+    assert main(["check", path, "--query", "E<> P.B", "--runs", "5", "--alpha", "0.1"]) == 0
+    err = capsys.readouterr().err
+    assert "--runs has no effect here" in err
+    assert "--alpha has no effect here" in err
+    assert main(["check", path, "--query", HALF, "--epsilon", "2"]) == 2
+    assert "'2' is not a number between 0 and 1" in capsys.readouterr().err
+
+
+def test_verifyta_prints_the_lines_of_uppaal(
+    model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    queries = tmp_path / "model.q"
+    queries.write_text(f"{HALF}\n\nE[<=3; 10](max: x)\n", "utf-8")
+    path = str(tmp_path / "model.xta")
+    assert main(["verifyta", "-E", "0.1", "-a", "0.01", path, str(queries)]) == 0
+    out = capsys.readouterr().out
+    assert " runs) Pr(<> …) in [" in out
+    assert "] (99% CI)" in out
+    assert "(10 runs) E(max) = ≈ 3" in out
+    assert main(["verifyta", "-E", "2", path, str(queries)]) == 1
+    assert "must be a number between 0 and 1" in capsys.readouterr().err
