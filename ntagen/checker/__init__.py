@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ntagen.checker.answer import Answer, Estimate, Extreme, Place, Value, Verdict
+from ntagen.checker.answer import Answer, Estimate, Extreme, Place, Trajectory, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.expectation import Expected, expected_of, is_as_expected, remark_of
@@ -64,6 +64,7 @@ __all__ = [
     "StrategyWanted",
     "SymbolicState",
     "TraceWanted",
+    "Trajectory",
     "Value",
     "Verdict",
     "diagnostic_pages",

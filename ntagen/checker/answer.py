@@ -74,6 +74,21 @@ class Estimate:
     satisfied_runs: int | None
 
 
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A random run that ``simulate`` shows.
+
+    Attributes:
+        run: The number of the run, from 0.
+        points: For each expression, by its text, the moments in units of the model, with its
+            values. Between two moments the value is linear in time; two values at one moment are
+            those before and after a move.
+    """
+
+    run: int
+    points: dict[str, list[tuple[float, float]]]
+
+
 class Answer:
     """The answer to a query.
 
@@ -152,6 +167,9 @@ class Answer:
             facts.append(f"stopped by the {self.limit_text}")
         if self.message:
             facts.append(self.message.partition("\n")[0])
+        if self.trajectories:
+            states = f"{len(self.trajectories)} runs shown"
+            return f"<Answer: {', '.join(facts)}; {states}, {1000 * self.seconds:.1f} ms>"
         if self.estimate is not None:
             states = f"{self.estimate.runs} runs"
             return f"<Answer: {', '.join(facts)}; {states} in {1000 * self.seconds:.1f} ms>"
@@ -167,6 +185,14 @@ class Answer:
     def satisfied(self) -> bool | None:
         """Whether the query is satisfied; ``None`` without a verdict: see `verdict`."""
         return {"satisfied": True, "not satisfied": False}.get(self.verdict)
+
+    @property
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        """The runs that ``simulate`` shows; empty for other queries."""
+        items, runs = self._raw.trajectories() or ([], [])
+        return tuple(
+            Trajectory(number, dict(zip(items, points, strict=True))) for number, points in runs
+        )
 
     @property
     def limit_text(self) -> str:

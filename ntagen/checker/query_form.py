@@ -17,7 +17,7 @@ class QueryForm:
     Attributes:
         kind: How its kind is written: ``E<>``, ``A[]``, ``E[]``, ``A<>``, ``-->``, ``sup``,
             ``inf``, ``bounds``, ``control``, ``control_t*``, ``E<> control``, ``saveStrategy``,
-            ``loadStrategy``, ``Pr``, ``E`` (of statistical queries), or ``unsupported``.
+            ``loadStrategy``, ``Pr``, ``E``, ``simulate`` (statistical queries), or ``unsupported``.
         defines: The name of the strategy that it defines, or ``None``.
         uses: The name of the strategy that it is asked under, or that it saves, or ``None``.
         is_observed: Whether it is a game in which the controller sees observations only.
@@ -31,7 +31,7 @@ class QueryForm:
     @property
     def is_statistical(self) -> bool:
         """Whether random runs answer it."""
-        return self.kind in ("Pr", "E")
+        return self.kind in ("Pr", "E", "simulate")
 
     @property
     def is_game(self) -> bool:

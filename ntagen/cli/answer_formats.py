@@ -80,6 +80,8 @@ def _record(outcome: Outcome) -> dict[str, object]:
     }
     if answer is not None and answer.estimate is not None:
         record |= asdict(answer.estimate)
+    if answer is not None and outcome.shows_runs:
+        record["trajectories"] = [asdict(one) for one in answer.trajectories]
     if answer is None:
         place = f"{mistake.path}:{mistake.line}:{mistake.column}" if mistake else None
         record |= {"place": place, "code": mistake and mistake.code}

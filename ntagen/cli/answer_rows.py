@@ -55,6 +55,8 @@ class Human:
         echo(*parts)
         lines = [*query.remark[:REMARKS_SHOWN]]
         if outcome.answer is not None:
+            if outcome.shows_runs:
+                lines += _shown_runs(outcome.answer)
             lines += self._facts(outcome.answer)
         for line in [*lines, *outcome.notes]:
             echo(f"          {line}")
@@ -96,6 +98,25 @@ def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
     stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
     return [*lines, answer.message] if answer.message else lines
+
+
+RUNS_SHOWN: Final = 3
+"""So many runs of ``simulate`` are shown; ``--json`` has all."""
+
+
+def _shown_runs(answer: Answer) -> list[str]:
+    """The first runs of ``simulate``: between which values each expression was, and its last."""
+    lines = []
+    runs = answer.trajectories
+    for trajectory in runs[:RUNS_SHOWN]:
+        for text, points in trajectory.points.items():
+            values = [value for _, value in points]
+            least, greatest, last = (_number(one) for one in (min(values), max(values), values[-1]))
+            between = f"{text} from {least} to {greatest}, at the end {last}"
+            lines.append(f"run {trajectory.run}: {between}")
+    if len(runs) > RUNS_SHOWN:
+        lines.append(f"and {len(runs) - RUNS_SHOWN:,} runs more: --json has all points")
+    return lines
 
 
 def _number(value: float | None) -> str:

@@ -59,6 +59,11 @@ class Outcome:
     expected: Expected | None = None
 
     @property
+    def shows_runs(self) -> bool:
+        """Whether it is a query for random runs themselves."""
+        return self.query.form is not None and self.query.form.kind == "simulate"
+
+    @property
     def verdict(self) -> str:
         """The verdict of the answer, or ``refused``."""
         return "refused" if self.answer is None else self.answer.verdict

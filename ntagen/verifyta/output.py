@@ -13,7 +13,7 @@ from ntagen.errors import LimitError
 from ntagen.verifyta.options import OPTIONS, CommandLine, Option
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer
+    from ntagen.checker import Answer, Trajectory
 
 COMPATIBLE_VERSION: Final = "5.0.0"
 """The version of UPPAAL whose output this is; scripts choose names of files by it."""
@@ -105,6 +105,13 @@ def verdict(answer: Answer) -> str:
 
 def estimate(answer: Answer) -> list[str]:
     """What a statistical query found out, in the form of UPPAAL 5; empty for other queries."""
+    shown = answer.trajectories
+    if shown:
+        return [
+            line
+            for text in shown[0].points
+            for line in (f"{text}:", *(_trajectory(i, one, text) for i, one in enumerate(shown)))
+        ]
     found = answer.estimate
     if found is None or found.lower is None or found.upper is None:
         return []
@@ -118,6 +125,11 @@ def estimate(answer: Answer) -> list[str]:
     path = re.search(r"\(\s*(<>|\[\])", answer.query)
     asked = f"{path[1]} …" if path else "… U …"
     return [f"{runs} Pr({asked}) in [{found.lower:g},{found.upper:g}] ({share})"]
+
+
+def _trajectory(number: int, trajectory: Trajectory, text: str) -> str:
+    points = " ".join(f"({time:g},{value:g})" for time, value in trajectory.points[text])
+    return f"[{number}]: {points}"
 
 
 def values(answer: Answer) -> list[str]:

@@ -10,7 +10,7 @@ use crate::ir::SiteId;
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
-use crate::stochastic::Estimate;
+use crate::stochastic::{Estimate, Simulated};
 use crate::verify;
 use crate::verify::certificate::States;
 use crate::verify::strategy::Outcome as StrategyCheck;
@@ -110,6 +110,8 @@ pub struct Answer {
     pub value: Option<Values>,
     /// What a statistical query found out.
     pub estimate: Option<Estimate>,
+    /// The runs that `simulate` shows.
+    pub simulated: Option<Arc<Simulated>>,
     /// A remark for the user.
     pub message: Option<String>,
     /// Warnings about the query, rendered.
@@ -136,6 +138,7 @@ impl Answer {
             verdict,
             value: None,
             estimate: None,
+            simulated: None,
             message: None,
             warnings: Vec::new(),
             evidence: Evidence::default(),

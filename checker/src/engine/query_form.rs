@@ -72,6 +72,7 @@ pub fn query_form(text: &str) -> Option<QueryForm> {
         QueryKind::SaveStrategy { .. } => "saveStrategy",
         QueryKind::LoadStrategy { .. } => "loadStrategy",
         QueryKind::Statistical(Statistical::Expectation { .. }) => "E",
+        QueryKind::Statistical(Statistical::Simulation { .. }) => "simulate",
         QueryKind::Statistical(_) => "Pr",
         QueryKind::Unsupported(_) => "unsupported",
     };

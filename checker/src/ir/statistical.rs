@@ -40,6 +40,30 @@ pub enum Statistical {
         /// Leaves the value as a double.
         value: FunctionId,
     },
+    /// `simulate [bound; runs] {a, b} : k : p`
+    Simulation(Simulation),
+}
+
+/// What a run shows.
+#[derive(Clone, Debug)]
+pub struct ShownItem {
+    /// Leaves the value as a double.
+    pub value: FunctionId,
+    /// The text of the expression.
+    pub text: String,
+    /// Whether the value may change otherwise than linearly while time passes.
+    pub is_curved: bool,
+}
+
+/// A query for runs themselves.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    /// How long a run is, and how many there are.
+    pub bound: RunBound,
+    /// What is shown.
+    pub items: Vec<ShownItem>,
+    /// What a run must reach to be shown, and how many such runs there are at most.
+    pub filter: Option<(Guard, u64)>,
 }
 
 /// How long a run is.

@@ -81,6 +81,16 @@ impl Answer {
         Some(json::values(values).to_string())
     }
 
+    /// The runs that `simulate` shows: the texts of the items, and of each run its number and, of
+    /// each item, the moments with its values; `None` for other queries.
+    #[expect(clippy::type_complexity, reason = "it is what Python gets")]
+    fn trajectories(&self) -> Option<(Vec<String>, Vec<(u64, Vec<Vec<(f64, f64)>>)>)> {
+        let simulated = self.inner.simulated.as_ref()?;
+        let runs = simulated.runs.iter();
+        let runs = runs.map(|one| (one.run, one.points.clone()));
+        Some((simulated.items.clone(), runs.collect()))
+    }
+
     /// What a statistical query found out, as JSON; `None` for other queries.
     fn estimate_json(&self) -> Option<String> {
         let estimate = self.inner.estimate.as_ref()?;

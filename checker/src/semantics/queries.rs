@@ -32,7 +32,7 @@ impl Checker<'_> {
                 codes::QUERY_UNSUPPORTED,
                 name.span,
                 format!("{} queries are not supported", name.text),
-                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, Pr[<=10](<> p) and E[<=10; 1000](max: e)",
+                "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, Pr[<=10](<> p), E[<=10; 1000](max: e) and simulate[<=10; 3]{e}",
             );
             return None;
         }

@@ -3,11 +3,12 @@
 use super::checker::Checker;
 use super::codes;
 use super::labels::collapse;
+use super::lower::horizons::curved_number;
 use super::offsets::known_offset;
 use super::typed::{Expr, Kind, Root, conjuncts};
 use super::types::{Memory, Type};
 use crate::exec::arithmetic;
-use crate::ir::{self, Guard, Path, RunBound, RunLimit, Statistical};
+use crate::ir::{self, Guard, Path, RunBound, RunLimit, ShownItem, Simulation, Statistical};
 use crate::syntax::ast;
 
 impl Checker<'_> {
@@ -88,11 +89,65 @@ impl Checker<'_> {
                     value: self.make_real(value, &[], String::from("query"))?,
                 }
             }
+            ast::Statistical::Simulation {
+                bound,
+                items,
+                filter,
+            } => Statistical::Simulation(self.simulation(bound, items, filter.as_ref())?),
         };
         Some(ir::StatisticalQuery {
             text: collapse(self.sources.text(query.span)),
             kind,
             span: query.span,
+        })
+    }
+
+    fn simulation(
+        &mut self,
+        bound: &ast::RunBound,
+        items: &[ast::Expr],
+        filter: Option<&(Option<ast::Expr>, ast::Expr)>,
+    ) -> Option<Simulation> {
+        let bound = self.run_bound(bound)?;
+        let mut shown = Vec::new();
+        for item in items {
+            let value = self.expression(item);
+            self.report_members(&value, item.span);
+            self.expect_pure(&value, "a query");
+            if !value.is_error() && !value.ty.is_number() {
+                self.error(
+                    codes::NUMBER_EXPECTED,
+                    value.span,
+                    format!(
+                        "only numbers can be shown, but this is {}",
+                        value.ty.described()
+                    ),
+                    "name clocks, integers, doubles, or conditions",
+                );
+            }
+            shown.push(ShownItem {
+                is_curved: curved_number(&value).is_some(),
+                text: collapse(self.sources.text(item.span)),
+                value: self.make_real(value, &[], String::from("query"))?,
+            });
+        }
+        let filter = match filter {
+            None => None,
+            Some((runs, reached)) => {
+                let runs = match runs {
+                    Some(runs) => {
+                        self.known_real(runs, "the number of runs that are shown", (1.0, 1e15))?
+                            as u64
+                    }
+                    None => u64::MAX,
+                };
+                Some((self.state_condition(reached)?, runs))
+            }
+        };
+        Some(Simulation {
+            bound,
+            items: shown,
+            filter,
         })
     }
 

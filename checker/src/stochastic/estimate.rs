@@ -2,9 +2,10 @@
 
 use super::failure::Failure;
 use super::in_order::in_order;
+use super::run::Trajectory;
 use super::statistics::{Decision, Expectation, FixedWidth, SequentialTest, clopper_pearson};
 use crate::exec::Executor;
-use crate::ir::{Network, Path, RunBound, Statistical};
+use crate::ir::{Network, Path, RunBound, Simulation, Statistical};
 
 /// What an estimate is to promise, and how it is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -113,6 +114,7 @@ pub fn estimate(
                 ..estimate
             })
         }
+        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
         Statistical::Expectation {
             bound,
             maximum,
@@ -146,6 +148,58 @@ pub fn estimate(
             })
         }
     }
+}
+
+/// The runs that a query shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulated {
+    /// The texts of what is shown.
+    pub items: Vec<String>,
+    /// The runs, in the order of their numbers.
+    pub runs: Vec<Trajectory>,
+    /// How likely it is that a run reaches what it must, if it must.
+    pub estimate: Option<Estimate>,
+}
+
+/// All runs that are shown have at most so many points together: each takes 16 bytes.
+const MOST_POINTS: usize = 10_000_000;
+
+/// Answers `simulate`; `ends` is asked now and then, with the number of runs so far.
+///
+/// # Errors
+/// A run failed: the one with the least number.
+pub fn simulate(
+    network: &Network,
+    executor: &dyn Executor,
+    query: &Simulation,
+    precision: &Precision,
+    ends: impl FnMut(u64) -> bool,
+) -> Result<Simulated, Failure> {
+    let wanted = precision.runs.or(query.bound.runs).unwrap_or(1);
+    let most = query.filter.as_ref().map_or(u64::MAX, |(_, most)| *most);
+    let mut shown = Vec::new();
+    let (mut made, mut points) = (0, 0);
+    let is_complete = in_order(
+        (network, executor),
+        precision.threads,
+        |runner, run| runner.trajectory((precision.seed, run), query),
+        |trajectory| {
+            made += 1;
+            if trajectory.satisfied {
+                points += trajectory.points.iter().map(Vec::len).sum::<usize>();
+                shown.push(trajectory);
+            }
+            made >= wanted || shown.len() as u64 >= most || points >= MOST_POINTS
+        },
+        ends,
+    )?;
+    let counted = (made, shown.len() as u64);
+    let estimate = share(counted, precision.alpha, is_complete);
+    Ok(Simulated {
+        items: query.items.iter().map(|item| item.text.clone()).collect(),
+        runs: shown,
+        estimate: query.filter.is_some().then_some(estimate),
+    })
 }
 
 fn probability(

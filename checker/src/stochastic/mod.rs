@@ -12,7 +12,7 @@ mod run;
 pub mod statistics;
 mod windows;
 
-pub use estimate::{Estimate, Precision, estimate};
+pub use estimate::{Estimate, Precision, Simulated, estimate, simulate};
 pub use failure::{Failure, Stand};
 pub use race::{ZENO_MOVES, ZENO_TIME};
-pub use run::{Outcome, Runner};
+pub use run::{Outcome, Runner, Trajectory};

@@ -7,7 +7,7 @@ use super::machine::Mask;
 use super::race::Race;
 use crate::cancellation;
 use crate::exec::Executor;
-use crate::ir::{FunctionId, Network, Path, RunBound, RunLimit};
+use crate::ir::{FunctionId, Network, Path, RunBound, RunLimit, Simulation};
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
@@ -24,6 +24,63 @@ pub struct Outcome {
     pub time: f64,
     /// How many moves it took.
     pub moves: u64,
+}
+
+/// The values of expressions during a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    /// The number of the run.
+    pub run: u64,
+    /// Whether it has reached what it must; true if that is nothing.
+    pub satisfied: bool,
+    /// Of each expression the moments, in units of the model, with its values. Between two moments
+    /// it is linear; two values at one moment are those before and after a move.
+    pub points: Vec<Vec<(f64, f64)>>,
+}
+
+/// Values that are not linear are shown so many times over a run.
+const SAMPLES: f64 = 300.0;
+
+/// From so many moments of an expression on, every second one is left out.
+const MOST_POINTS: usize = 100_000;
+
+impl Trajectory {
+    /// Records the values of a state that comes after the time of the race by `ahead`; within a
+    /// delay only those that are not linear.
+    fn record(
+        &mut self,
+        race: &mut Race<'_>,
+        asked: &Simulation,
+        ahead: f64,
+        is_end: bool,
+    ) -> Result<(), Failure> {
+        let time = race.time + ahead;
+        for (item, points) in asked.items.iter().zip(&mut self.points) {
+            if !(is_end || item.is_curved) {
+                continue;
+            }
+            let value = race.machine.real(item.value, &[])?;
+            if let [.., before, last] = &mut points[..]
+                && before.1.to_bits() == value.to_bits()
+                && last.1.to_bits() == value.to_bits()
+            {
+                // It goes on as it was.
+                last.0 = time;
+                continue;
+            }
+            if points.last() != Some(&(time, value)) {
+                points.push((time, value));
+            }
+            if points.len() > MOST_POINTS {
+                let mut is_kept = false;
+                points.retain(|_| {
+                    is_kept = !is_kept;
+                    is_kept
+                });
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Makes runs of a network, one after the other.
@@ -94,6 +151,55 @@ impl<'a> Runner<'a> {
         })?;
         look(&mut self.race)?;
         Ok((extreme, self.race.moves))
+    }
+
+    /// Run number `run` of a seed, as the values of expressions over time; until what it must
+    /// reach, if that is given.
+    pub fn trajectory(
+        &mut self,
+        (seed, run): (u64, u64),
+        asked: &Simulation,
+    ) -> Result<Trajectory, Failure> {
+        let mut trajectory = Trajectory {
+            run,
+            satisfied: asked.filter.is_none(),
+            points: vec![Vec::new(); asked.items.len()],
+        };
+        let reached = asked
+            .filter
+            .as_ref()
+            .map(|(reached, _)| Path::Eventually(reached.clone()));
+        let step = asked.bound.value / SAMPLES;
+        let is_sampled = asked.bound.limit == RunLimit::Time
+            && step > 0.0
+            && asked.items.iter().any(|item| item.is_curved);
+        self.until_bound((seed, run), &asked.bound, &mut |race, delay| {
+            trajectory.record(race, asked, 0.0, true)?;
+            let mut shown = delay;
+            if let Some(path) = &reached
+                && let Some((true, ahead)) = watched(race, path, delay)?
+            {
+                trajectory.satisfied = true;
+                shown = ahead;
+            }
+            if shown > 0.0 && shown.is_finite() {
+                let before = race.machine.clone_words();
+                let mut ahead = 0.0;
+                while ahead < shown {
+                    let next = if is_sampled {
+                        shown.min(ahead + step)
+                    } else {
+                        shown
+                    };
+                    race.machine.advance(next - ahead);
+                    ahead = next;
+                    trajectory.record(race, asked, ahead, ahead >= shown)?;
+                }
+                race.machine.restore(&before);
+            }
+            Ok(reached.is_some() && trajectory.satisfied)
+        })?;
+        Ok(trajectory)
     }
 
     /// Makes a run; `watch` sees every state with the delay that follows, and ends the run if it

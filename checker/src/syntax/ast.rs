@@ -645,6 +645,15 @@ pub enum Statistical {
         /// What is measured.
         value: Expr,
     },
+    /// `simulate [bound; runs] {a, b} : k : p`
+    Simulation {
+        /// How long a run is, and how many there are.
+        bound: RunBound,
+        /// What is shown.
+        items: Vec<Expr>,
+        /// The number of runs that are shown, and what they must reach.
+        filter: Option<(Option<Expr>, Expr)>,
+    },
 }
 
 /// What a probability is asked of.

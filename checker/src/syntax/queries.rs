@@ -141,8 +141,8 @@ impl Parser<'_> {
             "loadStrategy" => self.load_strategy(),
             "acontrol" if is_prefix => self.unsupported_query("acontrol (approximate control)"),
             "minE" | "maxE" | "minPr" | "maxPr" => self.unsupported_query("learning"),
-            "Pr" => self.statistical(),
-            "Pmax" | "simulate" => self.unsupported_query("statistical model checking"),
+            "Pr" | "simulate" => self.statistical(),
+            "Pmax" => self.unsupported_query("statistical model checking"),
             "refinement" | "consistency" | "specification" | "implementation" | "determinism"
             | "prune" | "reachability"
                 if next == TokenKind::Colon =>

@@ -1,5 +1,5 @@
-//! Statistical queries: `Pr[bound](path)`, alone or compared with a number, and
-//! `E[bound; runs](max: e)`.
+//! Statistical queries: `Pr[bound](path)`, alone or compared with a number,
+//! `E[bound; runs](max: e)`, and `simulate [bound; runs] {a, b}`.
 //!
 //! Source: UPPAAL's language reference, "Statistical Queries".
 
@@ -27,6 +27,9 @@ impl Parser<'_> {
     }
 
     fn statistical_query(&mut self) -> Option<Statistical> {
+        if self.eat_word("simulate") {
+            return self.simulation();
+        }
         let is_expectation = self.at_word("E");
         if !(is_expectation || self.at_word("Pr")) {
             return None;
@@ -69,6 +72,55 @@ impl Parser<'_> {
             at_least,
             threshold: self.expression(),
         })
+    }
+
+    /// `simulate [<=10; 5] {a, b} : 2 : p`, and the old form, `simulate 5 [<=10] {a, b} : 2 : p`.
+    fn simulation(&mut self) -> Option<Statistical> {
+        let old_runs = match self.kind() {
+            TokenKind::LeftBracket => None,
+            TokenKind::LeftParenthesis => Some(self.expression()),
+            _ => Some(self.lone_operand()?),
+        };
+        let mut bound = self.run_bound()?;
+        if let Some(runs) = old_runs {
+            if bound.runs.is_some() {
+                return None;
+            }
+            bound.runs = Some(runs);
+        }
+        if !self.eat(TokenKind::LeftBrace) {
+            return None;
+        }
+        let items = self.expression_list();
+        if !self.eat(TokenKind::RightBrace) {
+            return None;
+        }
+        let mut filter = None;
+        if self.eat(TokenKind::Colon) {
+            let first = self.expression();
+            filter = Some(if self.eat(TokenKind::Colon) {
+                (Some(first), self.expression())
+            } else {
+                (None, first)
+            });
+        }
+        Some(Statistical::Simulation {
+            bound,
+            items,
+            filter,
+        })
+    }
+
+    /// A number or a name, without the bracket behind it.
+    fn lone_operand(&mut self) -> Option<Expr> {
+        let token = self.bump();
+        let span = self.span_of(token);
+        let text = self.text_of(token);
+        let kind = match token.kind {
+            TokenKind::Word => ExprKind::Name(text.to_owned()),
+            _ => ExprKind::Int(text.parse().ok()?),
+        };
+        Some(Expr { kind, span })
     }
 
     /// `[<=10]`, `[x<=10]` or `[#<=10]`, each with a number of runs behind `;` or not.

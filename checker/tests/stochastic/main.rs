@@ -7,7 +7,7 @@
 
 use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::exec::{Executor, Interpreter, Jit};
-use checker::ir::{Network, RunBound, Statistical, StatisticalQuery};
+use checker::ir::{Network, RunBound, Simulation, Statistical, StatisticalQuery};
 use checker::semantics::{self, Reading};
 use checker::stochastic::{Failure, Runner};
 use checker::syntax;
@@ -102,6 +102,7 @@ fn bound_of(query: &StatisticalQuery) -> &RunBound {
     match &query.kind {
         Statistical::Probability(bound, _)
         | Statistical::Hypothesis { bound, .. }
-        | Statistical::Expectation { bound, .. } => bound,
+        | Statistical::Expectation { bound, .. }
+        | Statistical::Simulation(Simulation { bound, .. }) => bound,
     }
 }

@@ -1,7 +1,7 @@
 //! Probabilities and expectations that have closed forms.
 
 use checker::ir::Statistical;
-use checker::stochastic::Runner;
+use checker::stochastic::{Precision, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -301,4 +301,74 @@ fn expectations_are_means() {
         let margin = 4.0 * ((2e6_f64).ln() / (2.0 * runs as f64)).sqrt();
         assert!((found - mean).abs() <= margin, "{}: {found}", query.text);
     }
+}
+
+#[test]
+fn trajectories_are_linear_between_their_points() {
+    let model = "
+        clock x; int n = 0;
+        process P() {
+            state a { x <= 2 }, b { x' == 3 && x <= 9 }, out { x' == 0 };
+            init a;
+            trans a -> b { guard x == 2; assign n = 4; }, b -> out { guard x == 8; assign x = 1; };
+        }
+        system P;";
+    let (network, query) = load(model, "simulate[<=5; 2]{x, n, P.b}").expect("the query compiles");
+    let Statistical::Simulation(asked) = &query.kind else {
+        panic!("it asks for runs");
+    };
+    let [interpreter, jit] = executors(&network);
+    for executor in [interpreter, jit] {
+        let mut runner = Runner::new(&network, &*executor);
+        let shown = runner.trajectory((0, 1), asked).expect("no run fails");
+        assert_eq!(
+            shown.points,
+            [
+                vec![(0.0, 0.0), (2.0, 2.0), (4.0, 8.0), (4.0, 1.0), (5.0, 1.0)],
+                vec![(0.0, 0.0), (2.0, 0.0), (2.0, 4.0), (5.0, 4.0)],
+                vec![
+                    (0.0, 0.0),
+                    (2.0, 0.0),
+                    (2.0, 1.0),
+                    (4.0, 1.0),
+                    (4.0, 0.0),
+                    (5.0, 0.0)
+                ],
+            ]
+        );
+    }
+}
+
+#[test]
+fn a_filter_ends_the_run_where_it_holds() {
+    let model = "
+        clock x; double d = 0.0;
+        process P() {
+            state a { x <= 4 }, out;
+            init a;
+            trans a -> out { assign d = x; };
+        }
+        system P;";
+    let (network, query) =
+        load(model, "simulate[<=5; 100]{x, x * x} : 3 : x >= 3 && P.a").expect("it compiles");
+    let Statistical::Simulation(asked) = &query.kind else {
+        panic!("it asks for runs");
+    };
+    let [_, jit] = executors(&network);
+    let precision = Precision::default();
+    let shown = simulate(&network, &*jit, asked, &precision, |_| false).expect("no run fails");
+    assert_eq!(shown.runs.len(), 3);
+    for run in &shown.runs {
+        assert_eq!(run.points[0], [(0.0, 0.0), (3.0, 3.0)]);
+        // A square is shown at many moments.
+        assert!(run.points[1].len() > 150, "{:?}", run.points[1].len());
+        for &(time, value) in &run.points[1] {
+            assert!((value - time * time).abs() < 1e-9);
+        }
+    }
+    let estimate = shown.estimate.expect("there is a filter");
+    assert!(
+        estimate.lower < 0.25 && 0.25 < estimate.upper,
+        "{estimate:?}"
+    );
 }

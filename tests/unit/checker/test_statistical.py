@@ -136,3 +136,32 @@ def test_verifyta_prints_the_lines_of_uppaal(
     assert "(10 runs) E(max) = ≈ 3" in out
     assert main(["verifyta", "-E", "2", path, str(queries)]) == 1
     assert "must be a number between 0 and 1" in capsys.readouterr().err
+
+
+def test_runs_are_shown(model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    answer = model.check("simulate[<=3; 5]{x, Q.B}")
+    assert [one.run for one in answer.trajectories] == [0, 1, 2, 3, 4]
+    points = answer.trajectories[0].points["x"]
+    assert (points[0], points[-1]) == ((0.0, 0.0), (3.0, 3.0))
+    assert answer.estimate is None
+    assert "5 runs shown" in repr(answer)
+    filtered = model.check("simulate[<=4; 100]{x} : 2 : Q.B && x <= 3")
+    assert len(filtered.trajectories) == 2
+    assert filtered.estimate is not None
+    path = str(tmp_path / "model.xta")
+    words = ["check", path, "--query", "simulate 5 [<=3] {x}"]
+    assert main([*words, "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["trajectories"][4]["run"] == 4
+    assert record["trajectories"][4]["points"]["x"][-1] == [3, 3]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert "run 0: x from 0 to 3, at the end 3" in out
+    assert "and 2 runs more" in out
+    queries = tmp_path / "model.q"
+    queries.write_text("simulate[<=3; 2]{x}", "utf-8")
+    assert main(["verifyta", path, str(queries)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-3] == "x:"
+    assert lines[-2].startswith("[0]: (0,0) ")
+    assert lines[-1].endswith(" (3,3)")

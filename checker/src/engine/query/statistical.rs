@@ -1,5 +1,6 @@
 //! Statistical queries: random runs of the model in the stochastic reading, and what they say.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::diagnostics::{Diagnostic, Span};
@@ -14,7 +15,7 @@ use crate::ir::{EdgeId, Network, Statistical};
 use crate::network;
 use crate::search::limits::{Counters, Watch as _};
 use crate::stochastic::statistics::Decision;
-use crate::stochastic::{Failure, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate};
+use crate::stochastic::{Failure, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate, simulate};
 use crate::syntax;
 use crate::syntax::ast;
 
@@ -71,9 +72,17 @@ impl LoadedModel {
                 explored: runs,
                 ..Counters::default()
             };
-            estimate(network, executor, &compiled.kind, &precision, |runs| {
-                watch.look(&counters(runs)).is_some()
-            })
+            let ends = |runs| watch.look(&counters(runs)).is_some();
+            match &compiled.kind {
+                Statistical::Simulation(asked) => {
+                    let simulated = simulate(network, executor, asked, &precision, ends)?;
+                    Ok((simulated.estimate.clone(), Some(Arc::new(simulated))))
+                }
+                kind => {
+                    let estimate = estimate(network, executor, kind, &precision, ends)?;
+                    Ok((Some(estimate), None))
+                }
+            }
         });
         let answer = match result {
             Err((reason, counters)) => Ok(Answer::new(Verdict::Unknown(reason), counters)),
@@ -88,8 +97,9 @@ impl LoadedModel {
                 }
             }
             Ok(Err(failure)) => Err(self.run_fails(network, &failure, query.span)),
-            Ok(Ok(estimate)) => {
-                let verdict = match estimate.decision {
+            Ok(Ok((estimate, simulated))) => {
+                let decision = estimate.as_ref().and_then(|estimate| estimate.decision);
+                let verdict = match decision {
                     Some(Decision::Below) => Verdict::NotSatisfied,
                     None if watch.has_stopped() => Verdict::Unknown(watch.stop()),
                     None if is_test(&compiled.kind) => Verdict::Maybe,
@@ -99,7 +109,8 @@ impl LoadedModel {
                 if let Some(remark) = remark(&compiled.kind, verdict) {
                     answer.remark(remark);
                 }
-                answer.estimate = Some(estimate);
+                answer.estimate = estimate;
+                answer.simulated = simulated;
                 Ok(answer)
             }
         };

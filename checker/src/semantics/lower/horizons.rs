@@ -473,7 +473,8 @@ pub(in crate::semantics) fn curved(condition: &Expr) -> Option<Span> {
     }
 }
 
-fn curved_number(expr: &Expr) -> Option<Span> {
+/// The first part of a number that is not linear in time.
+pub(in crate::semantics) fn curved_number(expr: &Expr) -> Option<Span> {
     if !expr.is_timed() {
         return None;
     }

@@ -114,6 +114,12 @@ fn statistical_queries_are_read() {
     );
     check("E[<=10; 100](max: x)", "E[<=10; 100](max: x)");
     check("E[x<=10; N](min: a[1])", "E[x<=10; N](min: ([] a 1))");
+    check("simulate [<=10; 5] {x, y}", "simulate[<=10; 5]{ x y}");
+    check(
+        "simulate 5 [<=10] {x} : 2 : p",
+        "simulate[<=10; 5]{ x} : 2 : p",
+    );
+    check("simulate N [#<=10] {x} : p", "simulate[#<=10; N]{ x} : p");
 }
 
 #[test]
@@ -122,10 +128,7 @@ fn unsupported_queries_are_named() {
         "Pr (<>[0,3] p \\/ q)",
         "unsupported: statistical model checking",
     );
-    check(
-        "simulate [<=10; 5] {x, y}",
-        "unsupported: statistical model checking",
-    );
+    check("Pmax", "unsupported: statistical model checking");
     check(
         "strategy S = minE(c)[<=9]{P.location}->{x}: <> g under T",
         "strategy S = unsupported: learning under T",

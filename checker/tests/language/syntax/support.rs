@@ -182,6 +182,11 @@ fn kind_shape(kind: &QueryKind) -> String {
 fn statistical_shape(query: &Statistical) -> String {
     match query {
         Statistical::Probability(estimated) => estimated_shape(estimated),
+        Statistical::Simulation {
+            bound,
+            items,
+            filter,
+        } => simulation_shape(bound, items, filter.as_ref()),
         Statistical::Hypothesis {
             estimated,
             at_least,
@@ -203,6 +208,23 @@ fn statistical_shape(query: &Statistical) -> String {
             format!("E{}({which}: {})", bound_shape(bound), shape(value))
         }
     }
+}
+
+fn simulation_shape(
+    bound: &RunBound,
+    items: &[Expr],
+    filter: Option<&(Option<Expr>, Expr)>,
+) -> String {
+    let filter = filter.map_or(String::new(), |(runs, reached)| {
+        let runs = runs.as_ref();
+        let runs = runs.map_or(String::new(), |runs| format!(" : {}", shape(runs)));
+        format!("{runs} : {}", shape(reached))
+    });
+    format!(
+        "simulate{}{{{}}}{filter}",
+        bound_shape(bound),
+        shapes(items)
+    )
 }
 
 fn estimated_shape(estimated: &Estimated) -> String {
