@@ -43,6 +43,9 @@ pub struct LoadedModel {
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
     code: Option<PreparedCode>,
+    /// Why only statistical queries can be asked, if that is so; `model` is then in the stochastic
+    /// reading too.
+    symbolic_refusal: Option<Rejection>,
     /// The model in the stochastic reading, once a statistical query was asked.
     pub(super) stochastic: Option<StochasticModel>,
 }
@@ -58,12 +61,23 @@ impl LoadedModel {
         if diagnostics.iter().any(Diagnostic::is_error) {
             return Err(Rejection::new(diagnostics, &sources));
         }
-        let (model, more) =
-            semantics::analyse(&parsed.document, &prelude, &sources, Reading::Symbolic);
-        diagnostics.extend(more);
+        let analysed = |reading| semantics::analyse(&parsed.document, &prelude, &sources, reading);
+        let (mut model, more) = analysed(Reading::Symbolic);
+        let mut symbolic_refusal = None;
+        let errors: Vec<Diagnostic> = more.iter().filter(|one| one.is_error()).cloned().collect();
+        if !errors.is_empty() && errors.iter().all(semantics::is_symbolic) {
+            model = analysed(Reading::Stochastic).0;
+        }
         let Some(model) = model else {
+            diagnostics.extend(more);
             return Err(Rejection::new(diagnostics, &sources));
         };
+        if errors.is_empty() {
+            diagnostics.extend(more);
+        } else {
+            diagnostics.push(statistical_only(&errors[0], &sources));
+            symbolic_refusal = Some(Rejection::new(errors, &sources));
+        }
         let warnings = Rejection::new(diagnostics, &sources).rendered;
         let queries = parsed.document.queries;
         let load_seconds = start.elapsed().as_secs_f64();
@@ -83,6 +97,7 @@ impl LoadedModel {
             warnings,
             load_seconds,
             code: None,
+            symbolic_refusal,
             stochastic: None,
         })
     }
@@ -175,6 +190,7 @@ impl LoadedModel {
     /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
     /// text.
     pub fn compile(&mut self, span: Span) -> Result<(Query, Vec<String>), Rejection> {
+        self.expect_symbolic()?;
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
             let names = self.strategy_names();
@@ -185,6 +201,11 @@ impl LoadedModel {
             }
         }
         Err(Rejection::new(diagnostics, &self.sources))
+    }
+
+    /// Refuses what needs zones if the model has a meaning in the stochastic reading only.
+    pub fn expect_symbolic(&self) -> Result<(), Rejection> {
+        self.symbolic_refusal.clone().map_or(Ok(()), Err)
     }
 
     /// The model in the stochastic reading: the text is analysed again when the first statistical
@@ -231,6 +252,18 @@ impl LoadedModel {
         self.strategies.retain(|one| one.name != named.name);
         self.strategies.push(named);
     }
+}
+
+/// The warning about a model that only statistical queries can be asked of.
+fn statistical_only(error: &Diagnostic, sources: &SourceMap) -> Diagnostic {
+    let line = sources.position(error.span).line;
+    Diagnostic::new(
+        semantics::codes::STATISTICAL_ONLY,
+        error.span,
+        "only statistical queries can be asked of this model",
+    )
+    .note(format!("line {line}: {}", error.message))
+    .help("ask Pr, E or simulate; or change this, to ask symbolic and game queries too")
 }
 
 /// A model in the stochastic reading.

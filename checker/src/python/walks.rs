@@ -122,6 +122,7 @@ pub(super) struct ExactWalk {
 pub(super) fn walk_exactly(model: &Bound<'_, Model>) -> PyResult<ExactWalk> {
     let ticks_per_unit = SIMULATED_TICKS_PER_UNIT;
     let state = model.get().with(|model| {
+        model.expect_symbolic().map_err(rejected)?;
         let choices = model.choices(ticks_per_unit);
         let start = choices.and_then(|choices| choices.initial());
         start.map_err(|error| failed_exactly(model, error))

@@ -348,13 +348,23 @@ impl<'a> Checker<'a> {
                 });
                 self.world.network.initial_clocks.push(0);
             }
+            // It lies among the words; the name is for people.
+            Type::RealClock => {
+                self.world.network.clocks.push(Clock {
+                    name: name.to_owned(),
+                    owner,
+                    hybrid: false,
+                    coordinates: Vec::new(),
+                });
+                self.world.network.initial_clocks.push(0);
+            }
             Type::Channel { urgent, broadcast } => self.world.network.channels.push(Channel {
                 name: name.to_owned(),
                 broadcast: *broadcast,
                 urgent: *urgent,
                 priority: 0,
             }),
-            Type::Array(array) if ty.size().clocks + ty.size().channels > 0 => {
+            Type::Array(array) if ty.any(&Type::is_named_part) => {
                 for i in 0..array.index.length {
                     let index = i64::from(array.index.first) + i64::from(i);
                     let name = format!("{name}[{index}]");

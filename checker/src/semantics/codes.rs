@@ -188,6 +188,8 @@ codes! {
     UNSUPPORTED_UNUSED = "W0215" "unsupported-unused";
     /// A live sequence chart, which does not change the system.
     CHART_IGNORED = "W0216" "chart-ignored";
+    /// A model that only statistical queries can be asked of.
+    STATISTICAL_ONLY = "W0217" "statistical-only";
     /// A function that UPPAAL calls after all that a query sees.
     HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

@@ -573,16 +573,7 @@ impl Checker<'_> {
 
 /// Whether it says that something is not supported, and not that something is wrong.
 fn is_unsupported(diagnostic: &Diagnostic) -> bool {
-    [
-        codes::CONSTRUCT_UNSUPPORTED,
-        codes::RANDOM_UNSUPPORTED,
-        codes::RATE_NOT_ZERO_OR_ONE,
-        codes::CLOCK_AS_NUMBER,
-        codes::CLOCK_WITH_DOUBLE,
-        codes::CLOCK_SET_TO_DIFFERENCE,
-        codes::HYBRID_CLOCK_COMPARED,
-    ]
-    .contains(&diagnostic.code)
+    diagnostic.code == codes::CONSTRUCT_UNSUPPORTED || super::is_symbolic(diagnostic)
 }
 
 /// The work of making a process, without its functions: see [`cancellation::work`].

@@ -157,7 +157,13 @@ impl Checker<'_> {
                 );
                 continue;
             };
-            if chances.rated_clocks.contains(&offset) {
+            let same = chances.rated_clocks.iter().position(|one| *one == offset);
+            if let Some(same) = same {
+                // A quantifier inside another one says the same several times.
+                let (_, first): &(Expr, Expr) = &pairs[same];
+                if format!("{:?}", first.kind) == format!("{:?}", rate.kind) {
+                    continue;
+                }
                 self.error(
                     codes::RATE_TWICE,
                     span,

@@ -147,6 +147,20 @@ pub fn analyse(
     ((!has_errors).then_some(model), sorted(checker.diagnostics))
 }
 
+/// Whether a mistake is one in the symbolic reading only: the model may have a meaning in the
+/// stochastic one.
+pub fn is_symbolic(diagnostic: &Diagnostic) -> bool {
+    [
+        codes::RANDOM_UNSUPPORTED,
+        codes::RATE_NOT_ZERO_OR_ONE,
+        codes::CLOCK_AS_NUMBER,
+        codes::CLOCK_WITH_DOUBLE,
+        codes::CLOCK_SET_TO_DIFFERENCE,
+        codes::HYBRID_CLOCK_COMPARED,
+    ]
+    .contains(&diagnostic.code)
+}
+
 impl Model {
     /// Checks and lowers a query; its functions and sites are appended to the network. `strategies`
     /// are the names of the strategies that exist so far.

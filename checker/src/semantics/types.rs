@@ -222,6 +222,14 @@ impl Type {
         matches!(self, Type::Clock { .. })
     }
 
+    /// Whether it is a clock or a channel: what has a name of its own in the network.
+    pub(super) fn is_named_part(&self) -> bool {
+        matches!(
+            self,
+            Type::Clock { .. } | Type::RealClock | Type::Channel { .. }
+        )
+    }
+
     /// Whether registers of doubles hold its values, and two words a value.
     pub(super) fn is_real(&self) -> bool {
         matches!(self, Type::Double | Type::RealClock)

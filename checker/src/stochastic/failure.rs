@@ -19,7 +19,7 @@ pub enum Failure {
     RunTime(RunTimeError),
     /// An output can be enabled, no invariant bounds the delay, and the location has no rate.
     NoRate(Stand),
-    /// The rate of an exponential delay is not a positive number.
+    /// The rate of an exponential delay is negative or no finite number.
     Rate(Stand, f64),
     /// The rate of a clock is not a finite number.
     ClockRate(Stand),

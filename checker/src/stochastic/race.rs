@@ -233,8 +233,11 @@ impl<'a> Race<'a> {
             return Err(Failure::NoRate(stand));
         };
         let rate = self.machine.real(rate, &[])?;
-        if !(rate > 0.0 && rate.is_finite()) {
+        if !(rate >= 0.0 && rate.is_finite()) {
             return Err(Failure::Rate(stand, rate));
+        }
+        if rate == 0.0 {
+            return Ok(f64::INFINITY);
         }
         if length == 0.0 {
             return Ok(first);
@@ -243,8 +246,8 @@ impl<'a> Race<'a> {
         Ok(windows.after(passed))
     }
 
-    /// Adds the times until `bound` at which an output of the process is enabled; returns the first
-    /// at which one on an urgent channel is.
+    /// Adds the times until `bound` at which an output of the process is enabled that is not on an
+    /// urgent channel; returns the first at which one on an urgent channel is.
     fn output_windows(
         &mut self,
         process: usize,
@@ -255,10 +258,12 @@ impl<'a> Race<'a> {
         for &edge in self.machine.edges(process) {
             let instances = self.instances(process, edge, true);
             for instance in instances {
-                let is_urgent = self.is_urgent(&instance)?;
-                let first = self.instance_windows(&instance, bound, windows)?;
-                if is_urgent {
-                    urgent = urgent.min(first);
+                if self.is_urgent(&instance)? {
+                    // It is taken as soon as it can be, so no time is drawn for it.
+                    let mut all = Windows::default();
+                    urgent = urgent.min(self.instance_windows(&instance, bound, &mut all)?);
+                } else {
+                    self.instance_windows(&instance, bound, windows)?;
                 }
             }
         }

@@ -34,14 +34,19 @@ fn codes_of(texts: &[String]) -> BTreeSet<String> {
     codes.collect()
 }
 
-/// The codes that an example gives, warnings included.
-fn codes(model: Option<&Example>, example: &Example) -> BTreeSet<String> {
+/// The codes that an example on the page of a code gives, warnings included.
+fn codes(code: &str, model: Option<&Example>, example: &Example) -> BTreeSet<String> {
     let result = match example.language {
         "query" => ask(model, |loaded| Ok(vec![loaded.add_query(example.text)])),
         "q" => ask(model, |loaded| {
             loaded.read_queries("example.q", example.text.as_bytes())
         }),
-        _ => LoadedModel::load("example", bytes(example.text)).map(|loaded| loaded.warnings),
+        _ => LoadedModel::load("example", bytes(example.text)).map(|loaded| {
+            // Such a model is read, and refused as soon as a symbolic query comes.
+            let refusal = loaded.expect_symbolic().err();
+            let refusal = refusal.filter(|_| code.starts_with('E'));
+            refusal.map_or(loaded.warnings, |refusal| refusal.rendered)
+        }),
     };
     codes_of(&result.unwrap_or_else(|rejection| rejection.rendered))
 }
@@ -82,7 +87,7 @@ fn every_page_shows_its_mistake_and_the_way_out() {
             problems.push(format!("{}: an example is missing", code.code));
             continue;
         };
-        let found = codes(of(Role::Model), wrong);
+        let found = codes(code.code, of(Role::Model), wrong);
         let is_right = if code.code == NEVER_ALONE {
             found.contains(code.code)
         } else {
@@ -91,7 +96,7 @@ fn every_page_shows_its_mistake_and_the_way_out() {
         if !is_right {
             problems.push(format!("{}: the wrong example gives {found:?}", code.code));
         }
-        let found = codes(of(Role::Model), right);
+        let found = codes(code.code, of(Role::Model), right);
         if !found.is_empty() {
             problems.push(format!("{}: the right example gives {found:?}", code.code));
         }

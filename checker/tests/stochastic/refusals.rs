@@ -1,6 +1,7 @@
 //! Models and queries that have no stochastic meaning: refused, or failing where they run.
 
-use checker::stochastic::Failure;
+use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::stochastic::{Failure, Precision};
 
 use super::{load, satisfied};
 
@@ -34,8 +35,8 @@ fn an_output_needs_a_rate_or_a_bound() {
 }
 
 #[test]
-fn rates_are_positive_numbers() {
-    for rate in ["0", "0 - 1", "1.0 / 0.0"] {
+fn rates_are_finite_and_not_negative() {
+    for rate in ["0 - 1", "0.0 - 0.5", "1.0 / 0.0"] {
         let model = format!(
             "process P() {{ state a {{ ; {rate} }}, b; init a; trans a -> b {{ }}; }} system P;"
         );
@@ -117,6 +118,15 @@ fn an_invariant_that_a_move_breaks_is_a_failure() {
 }
 
 #[test]
+fn two_rates_in_one_invariant_are_refused() {
+    let model = "
+        clock x; int n = 2;
+        process P() { state a { x' == 2 && x' == n }; init a; }
+        system P;";
+    refused(model, "Pr[<=9](<> x > 3)", "E0285");
+}
+
+#[test]
 fn two_rates_of_one_clock_are_a_failure() {
     let model = "
         clock x;
@@ -151,4 +161,43 @@ fn bounds_are_known_numbers() {
     refused(model, "Pr[n<=3](<> P.a)", "E0268");
     refused(model, "E[<=3](max: x)", "E0");
     refused(model, "E[<=3; 10](max: x >= 2 ? P : 1)", "E0");
+}
+
+#[test]
+fn a_model_that_zones_cannot_hold_is_asked_statistical_queries() {
+    let text = "
+        clock x; double d = 0.5;
+        process P() {
+            state a { x <= 2.5 }, out;
+            init a;
+            trans a -> out { guard x >= d && random(2) >= 0; };
+        }
+        system P;";
+    let text = text.replace(" && random(2) >= 0", "");
+    let mut model = LoadedModel::load("model.xta", text.into_bytes()).expect("it is accepted");
+    assert!(model.warnings[0].contains("W0217"), "{:?}", model.warnings);
+    let precision = Precision {
+        runs: Some(20_000),
+        ..Precision::default()
+    };
+    let options = Options {
+        code: CodeEngine::Interpreter,
+        precision,
+        ..Options::default()
+    };
+    let query = model.add_query("Pr[<=1.5](<> P.out)");
+    let answer = model.check(&query, &options).expect("it is answered");
+    assert_eq!(answer.verdict, Verdict::Satisfied);
+    let estimate = answer.estimate.expect("it has an estimate");
+    assert!((estimate.value - 0.5).abs() < 0.02, "{estimate:?}");
+    let query = model.add_query("E<> P.out");
+    let refused = model
+        .check(&query, &options)
+        .expect_err("zones cannot hold it");
+    assert!(
+        refused.rendered[0].contains("E0243"),
+        "{:?}",
+        refused.rendered
+    );
+    assert!(model.prepare_simulation(CodeEngine::Interpreter).is_err());
 }

@@ -139,6 +139,19 @@ fn a_clock_with_a_rate_bounds_a_run() {
 }
 
 #[test]
+fn a_quantifier_inside_another_one_sets_a_rate_once() {
+    let model = "
+        clock x[2], y[2]; int r[2] = {2, 4};
+        process P() {
+            state a { forall (i : int[0,1]) x[i]' == r[i] && forall (i : int[0,1]) y[i]' == 1 + r[i] };
+            init a;
+        }
+        system P;";
+    expect(model, "Pr[<=1](<> x[1] >= 4 && y[0] >= 3)", 1.0);
+    expect(model, "Pr[<=1](<> x[0] > 2 || y[1] > 5)", 0.0);
+}
+
+#[test]
 fn a_stopwatch_stands_still() {
     let model = "
         clock x, y;
@@ -207,6 +220,29 @@ fn an_urgent_channel_is_used_at_once() {
         system P;";
     expect(model, "Pr[<=5](<> P.out && x == 3)", 1.0);
     expect(model, "Pr[<=5](<> P.a && x > 3)", 0.0);
+}
+
+#[test]
+fn who_only_sends_on_urgent_channels_needs_no_rate() {
+    let model = "
+        bool ready = false;
+        urgent broadcast chan go;
+        process P() { state a, out; init a; trans a -> out { guard ready; sync go!; }; }
+        process Q() { state a { ; 2 }, b; init a; trans a -> b { assign ready = true; }; }
+        system P, Q;";
+    expect(model, "Pr[<=1](<> P.out)", 1.0 - (-2.0_f64).exp());
+}
+
+#[test]
+fn a_rate_of_zero_is_never() {
+    let model = "
+        int n = 0;
+        process P() { state a { ; n }, out; init a; trans a -> out { }; }
+        process Q() { state a { ; 1 }, b; init a; trans a -> b { assign n = 3; }; }
+        system P, Q;";
+    // The sum of exponential delays with rates 1 and 3.
+    let exact = 1.0 - 1.5 * (-1.0_f64).exp() + 0.5 * (-3.0_f64).exp();
+    expect(model, "Pr[<=1](<> P.out)", exact);
 }
 
 #[test]

@@ -30,6 +30,7 @@ impl LoadedModel {
         text: &str,
         rules: Rules,
     ) -> Result<Checked, Rejection> {
+        self.expect_symbolic()?;
         let unreadable = |why: Unreadable| Rejection {
             diagnostics: Vec::new(),
             rendered: vec![format!("error: {path}: {why}\n{HINT}")],

@@ -147,6 +147,7 @@ impl LoadedModel {
     /// Reads a strategy from the bytes of a file; gives the query that it answers, and the
     /// strategy. `path` names the file.
     pub fn read_strategy(&self, path: &str, bytes: &[u8]) -> Result<(String, Strategy), Rejection> {
+        self.expect_symbolic()?;
         strategy_json::read(self.network(), bytes).map_err(|mismatch| {
             let code = codes::STRATEGY_FILE.code;
             let help = mismatch.help.map(|help| format!("\n  hint: {help}"));

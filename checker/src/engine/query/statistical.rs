@@ -160,7 +160,7 @@ impl LoadedModel {
             Failure::Rate(stand, rate) => (
                 span(stand),
                 format!("the exponential rate of {} is {rate}", name(stand)),
-                "make it a positive number",
+                "make it a number that is 0 or greater; with 0 the location is never left",
             ),
             Failure::ClockRate(stand) => (
                 span(stand),

@@ -60,6 +60,7 @@ impl LoadedModel {
 
     /// Makes the code ready to run; needed once before the other functions here.
     pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
+        self.expect_symbolic()?;
         self.prepare_code(code, Tuning::default(), crate::diagnostics::Span::default())
     }
 
