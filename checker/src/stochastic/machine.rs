@@ -4,11 +4,10 @@
 //! else reads them.
 
 use super::failure::Failure;
+use super::program::Condition;
 use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::exec::{Context, Executor};
-use crate::ir::{
-    EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, STREAM_WORDS, Stream, Update,
-};
+use crate::ir::{FunctionId, LocationId, Network, ProcessId, STREAM_WORDS, Stream, Update};
 
 /// Whether a condition holds at a moment and in the interval behind it, and how long that interval
 /// is at least.
@@ -91,12 +90,6 @@ impl<'a> Machine<'a> {
         self.words[process as usize] = location.0 as i32;
     }
 
-    /// The edges that leave the current location of a process.
-    pub(super) fn edges(&self, process: usize) -> &'a [EdgeId] {
-        let LocationId(location) = self.location(process);
-        &self.network.processes[process].locations[location as usize].edges
-    }
-
     pub(super) fn double(&self, offset: u32) -> f64 {
         let offset = offset as usize;
         double_of_words(self.words[offset], self.words[offset + 1])
@@ -139,31 +132,40 @@ impl<'a> Machine<'a> {
     }
 
     /// A condition after this time, if nothing happens until then.
+    #[inline]
     pub(super) fn mask(
         &mut self,
-        condition: &Guard,
+        condition: Condition,
         arguments: &[i32],
         ahead: f64,
     ) -> Result<Mask, Failure> {
-        if condition.never_holds {
-            return Ok(Mask::constant(false));
+        match condition {
+            Condition::Always => Ok(Mask::constant(true)),
+            Condition::Never => Ok(Mask::constant(false)),
+            Condition::Words(function) => {
+                let bits = self.call(function, arguments)?;
+                Ok(Mask::constant(bits != 0))
+            }
+            Condition::Timed(function) => {
+                self.set_double(self.network.chances.ahead, ahead);
+                let bits = self.call(function, arguments)?;
+                Ok(Mask {
+                    now: bits & 1 != 0,
+                    behind: bits & 2 != 0,
+                    horizon: self.double(self.network.chances.result),
+                })
+            }
         }
-        let Some(function) = condition.function else {
-            return Ok(Mask::constant(true));
-        };
-        if condition.is_timed {
-            self.set_double(self.network.chances.ahead, ahead);
-        }
-        let bits = self.call(function, arguments)?;
-        Ok(Mask {
-            now: bits & 1 != 0,
-            behind: bits & 2 != 0,
-            horizon: if condition.is_timed {
-                self.double(self.network.chances.result)
-            } else {
-                f64::INFINITY
-            },
-        })
+    }
+
+    /// Whether a condition holds now.
+    #[inline]
+    pub(super) fn holds(
+        &mut self,
+        condition: Condition,
+        arguments: &[i32],
+    ) -> Result<bool, Failure> {
+        Ok(self.mask(condition, arguments, 0.0)?.now)
     }
 
     /// The double that a function leaves.

@@ -7,6 +7,7 @@ mod estimate;
 mod failure;
 mod in_order;
 mod machine;
+mod program;
 mod race;
 mod run;
 pub mod statistics;

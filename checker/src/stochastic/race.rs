@@ -3,21 +3,30 @@
 //! A process competes with its *outputs*: internal edges and sending edges. Its delay is drawn
 //! among the times at which one of them is enabled: uniformly if its invariant bounds them, else by
 //! the exponential distribution with the rate of its location, of which only those times count.
-//! Drawing anew after every move gives the same law as keeping what was drawn: both distributions,
+//! Where time stands still (urgent and committed locations), and at the first moment at which an
+//! urgent channel can be used, the delay is 0. The winner takes one of its outputs, all with the
+//! same chance; a sender on a binary channel competes while a receiver is ready, and takes one of
+//! them.
+//!
+//! What a process has drawn is its *plan*. It stays as it is until something changes on which it
+//! depends. Drawing anew at any other moment would give the same law: both distributions,
 //! conditioned on "not yet", are themselves again.
 //!
-//! Where time stands still (urgent and committed locations), and at the first moment at which an
-//! urgent channel can be used, the delay is 0 and every process with an output competes.
-//! The winner takes one of its outputs, all with the same chance; a sender on a binary channel
-//! competes while a receiver is ready, and takes one of them.
+//! Invariants, while no move is being made:
+//! * `attempts` and `bounds` of a process that is not in `stale` are what its plan says, counted
+//!   from now.
+//! * `spots` are the locations that the words of the state hold.
 //!
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
+use std::sync::Arc;
+
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
+use super::program::{Channel, Condition, Instance, Program, Spot};
 use super::windows::Windows;
 use crate::exec::Executor;
-use crate::ir::{Branch, Edge, EdgeId, LocationId, Network, ProcessId, Sync, Urgency};
+use crate::ir::{Branch, LocationId, Network, ProcessId, Update, Urgency};
 
 /// So many moves in less than [`ZENO_TIME`] are taken for a run that never gets on.
 pub const ZENO_MOVES: u64 = 100_000;
@@ -30,6 +39,10 @@ const TOLERANCE: f64 = 1e-12;
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 100_000;
 
+/// After this number of moves plans that wait for a clock are drawn anew, so that the rounding of
+/// the delays in between does not add up.
+const MOVES_OF_A_PLAN: u32 = 4096;
+
 /// What comes next: the delay until then, and who moves; nobody if it is infinite.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Next {
@@ -39,37 +52,59 @@ pub(super) struct Next {
     stopped_by: Option<usize>,
 }
 
-/// An edge with the values of its `select` bindings.
-#[derive(Clone, Debug)]
-struct Instance {
-    process: usize,
-    edge: EdgeId,
-    values: Vec<i32>,
-}
-
 /// A run in progress.
 pub(super) struct Race<'a> {
     pub(super) machine: Machine<'a>,
-    has_rates: bool,
+    program: Arc<Program<'a>>,
+    /// By process: in how long it tries to move; infinity if never.
+    attempts: Vec<f64>,
+    /// By process: how long it may stay where it is.
+    bounds: Vec<f64>,
+    /// The processes that plan anew before anything else happens.
+    stale: Vec<u32>,
+    is_stale: Vec<bool>,
+    /// By process: its enabled outputs, as found when it planned; only where the spot is plain.
+    enabled: Vec<Vec<u32>>,
+    /// By process: where it is.
+    locations: Vec<LocationId>,
+    /// How many processes are in committed locations.
+    committed: usize,
     windows: Windows,
+    /// Whose rates apply to a clock: by its place among the clocks of the network.
+    rated_by: Vec<Option<u32>>,
+    movers: Vec<(u32, u32)>,
+    choices: Vec<u32>,
     /// How long the run has lasted.
     pub(super) time: f64,
     /// How many moves it has made.
     pub(super) moves: u64,
     /// When the moves since then are counted for [`Failure::Zeno`]: time and number.
     since: (f64, u64),
+    /// The moves until plans are drawn anew that wait for a clock.
+    until_renewal: u32,
 }
 
 impl<'a> Race<'a> {
     pub(super) fn new(network: &'a Network, executor: &'a dyn Executor) -> Race<'a> {
-        let mut locations = network.processes.iter().flat_map(|one| &one.locations);
+        let processes = network.processes.len();
         Race {
             machine: Machine::new(network, executor),
-            has_rates: locations.any(|location| location.chances.rates.is_some()),
+            program: Arc::new(Program::new(network)),
+            attempts: vec![f64::INFINITY; processes],
+            bounds: vec![f64::INFINITY; processes],
+            stale: Vec::with_capacity(processes),
+            is_stale: vec![false; processes],
+            enabled: vec![Vec::new(); processes],
+            locations: vec![LocationId(0); processes],
+            committed: 0,
             windows: Windows::default(),
+            rated_by: vec![None; network.chances.clocks.len()],
+            movers: Vec::new(),
+            choices: Vec::new(),
             time: 0.0,
             moves: 0,
             since: (0.0, 0),
+            until_renewal: MOVES_OF_A_PLAN,
         }
     }
 
@@ -78,8 +113,33 @@ impl<'a> Race<'a> {
         self.machine.start(seed, run);
         self.time = 0.0;
         self.moves = 0;
-        self.since = (0.0, 0);
-        self.set_rates()
+        self.resume()
+    }
+
+    /// Plans for the state that the words of the machine hold now.
+    pub(super) fn resume(&mut self) -> Result<(), Failure> {
+        self.since = (self.time, 0);
+        self.until_renewal = MOVES_OF_A_PLAN;
+        self.committed = 0;
+        self.stale.clear();
+        for process in 0..self.locations.len() {
+            let location = self.machine.location(process);
+            self.locations[process] = location;
+            let spot = self.program.spot(process, location);
+            self.committed += usize::from(spot.urgency == Urgency::Committed);
+            self.is_stale[process] = true;
+            self.stale.push(process as u32);
+        }
+        if self.program.has_rates {
+            self.rated_by.fill(None);
+            for &clock in &self.machine.network.chances.clocks {
+                self.machine.set_rate(clock, 1.0);
+            }
+            for process in 0..self.locations.len() {
+                self.set_rates(process)?;
+            }
+        }
+        Ok(())
     }
 
     fn network(&self) -> &'a Network {
@@ -89,75 +149,92 @@ impl<'a> Race<'a> {
     fn stand(&self, process: usize) -> Stand {
         Stand {
             process: ProcessId(process as u32),
-            location: self.machine.location(process),
+            location: self.locations[process],
         }
     }
 
     fn urgency(&self, process: usize) -> Urgency {
-        let LocationId(location) = self.machine.location(process);
-        self.network().processes[process].locations[location as usize].urgency
+        self.program.spot(process, self.locations[process]).urgency
+    }
+
+    fn make_stale(&mut self, process: u32) {
+        let is_stale = &mut self.is_stale[process as usize];
+        if !*is_stale {
+            *is_stale = true;
+            self.stale.push(process);
+        }
     }
 
     /// Draws what comes next.
     pub(super) fn next(&mut self) -> Result<Next, Failure> {
-        let processes = 0..self.network().processes.len();
-        let mut frozen = None;
-        for process in processes.clone() {
-            let bound = self.invariant(process, 0.0)?;
-            if !bound.now {
-                return Err(Failure::InvariantBroken(self.stand(process)));
-            }
-            if self.urgency(process) != Urgency::Normal {
-                frozen = frozen.or(Some(process));
-            }
+        let program = Arc::clone(&self.program);
+        self.plan_anew(&program)?;
+        if self.committed > 0 {
+            return self.next_committed(&program);
         }
-        if let Some(process) = frozen {
-            return self.next_without_time(process);
+        let mut delay = f64::INFINITY;
+        for &attempt in &self.attempts {
+            delay = delay.min(attempt);
         }
-        let mut best = Next {
-            delay: f64::INFINITY,
-            winner: None,
-            stopped_by: None,
+        let mut least = f64::INFINITY;
+        for &bound in &self.bounds {
+            least = least.min(bound);
+        }
+        if delay > least * (1.0 + TOLERANCE) + TOLERANCE {
+            return self.next_at_the_latest(&program, least);
+        }
+        let winner = if delay.is_finite() {
+            Some(self.first_before(delay * (1.0 + TOLERANCE) + TOLERANCE))
+        } else {
+            None
         };
-        let (mut ties, mut least, mut least_of) = (0, f64::INFINITY, None);
-        for process in processes {
-            let bound = self.invariant_bound(process)?;
-            if bound < least {
-                (least, least_of) = (bound, Some(process));
-            }
-            let delay = self.draw(process, bound)?;
-            if delay < best.delay {
-                best.delay = delay;
-                best.winner = Some(process);
-                ties = 1;
-            } else if delay <= best.delay && delay.is_finite() {
-                ties += 1;
-                if self.machine.stream().below(ties) == 0 {
-                    best.winner = Some(process);
-                }
-            }
-        }
-        if best.delay > least * (1.0 + TOLERANCE) + TOLERANCE {
-            return Ok(Next {
-                delay: least,
-                winner: None,
-                stopped_by: least_of,
-            });
-        }
-        Ok(best)
+        Ok(Next {
+            delay,
+            winner,
+            stopped_by: None,
+        })
     }
 
-    /// What comes next where time stands still because of this process.
-    fn next_without_time(&mut self, by: usize) -> Result<Next, Failure> {
-        let (mut winner, mut ties) = (None, 0);
-        for process in 0..self.network().processes.len() {
-            if self.outputs(process)?.is_empty() {
-                continue;
-            }
-            ties += 1;
-            if ties == 1 || self.machine.stream().below(ties) == 0 {
-                winner = Some(process);
-            }
+    /// One of the processes whose attempts come until then.
+    fn first_before(&mut self, latest: f64) -> usize {
+        let mut attempts = self.attempts.iter().enumerate();
+        let mut before = attempts.by_ref().filter(|(_, attempt)| **attempt <= latest);
+        let (first, _) = before.next().expect("the least attempt comes until then");
+        let ties = before.count();
+        if ties == 0 {
+            return first;
+        }
+        let chosen = self.machine.stream().below(ties as u32 + 1) as usize;
+        let attempts = self.attempts.iter().enumerate();
+        let mut before = attempts.filter(|(_, attempt)| **attempt <= latest);
+        before.nth(chosen).expect("there are as many").0
+    }
+
+    /// What comes when time cannot pass as long as anybody has drawn: who can move then does; if
+    /// nobody can, time is locked.
+    fn next_at_the_latest(&mut self, program: &Program<'a>, least: f64) -> Result<Next, Failure> {
+        let stopped_by = self.bounds.iter().position(|&bound| bound <= least);
+        let mut winner = None;
+        if least <= TOLERANCE {
+            let all = 0..self.attempts.len();
+            winner = self.one_with_outputs(program, all)?;
+        }
+        Ok(Next {
+            delay: least,
+            winner,
+            stopped_by,
+        })
+    }
+
+    /// What comes next where a committed location must be left.
+    fn next_committed(&mut self, program: &Program<'a>) -> Result<Next, Failure> {
+        let all = 0..self.attempts.len();
+        let is_committed = |race: &Race<'_>, one: usize| race.urgency(one) == Urgency::Committed;
+        let committed: Vec<usize> = all.clone().filter(|&one| is_committed(self, one)).collect();
+        let by = committed[0];
+        let mut winner = self.one_with_outputs(program, committed)?;
+        if winner.is_none() && program.has_binary_channels {
+            winner = self.one_with_outputs(program, all)?;
         }
         Ok(Next {
             delay: 0.0,
@@ -166,23 +243,102 @@ impl<'a> Race<'a> {
         })
     }
 
+    /// One of the processes with an output that is enabled now.
+    fn one_with_outputs(
+        &mut self,
+        program: &Program<'a>,
+        processes: impl IntoIterator<Item = usize>,
+    ) -> Result<Option<usize>, Failure> {
+        let (mut winner, mut ties) = (None, 0);
+        for process in processes {
+            if !self.find_outputs(program, process)? {
+                continue;
+            }
+            ties += 1;
+            if ties == 1 || self.machine.stream().below(ties) == 0 {
+                winner = Some(process);
+            }
+        }
+        Ok(winner)
+    }
+
     /// The failure of a run in which nobody moves and time cannot pass.
     pub(super) fn time_lock(&self, next: Next) -> Option<Failure> {
         let by = next.stopped_by.filter(|_| next.winner.is_none())?;
         Some(Failure::TimeLock(self.stand(by)))
     }
 
-    fn invariant(&mut self, process: usize, ahead: f64) -> Result<Mask, Failure> {
-        let LocationId(location) = self.machine.location(process);
-        let location = &self.network().processes[process].locations[location as usize];
-        self.machine.mask(&location.invariant, &[], ahead)
+    /// Lets all processes plan whose plans may have changed.
+    fn plan_anew(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+        // The order of random numbers is that of processes.
+        self.stale.sort_unstable();
+        for index in 0..self.stale.len() {
+            let process = self.stale[index] as usize;
+            self.is_stale[process] = false;
+            self.plan(program, process)?;
+        }
+        self.stale.clear();
+        Ok(())
+    }
+
+    fn plan(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
+        let spot = program.spot(process, self.locations[process]);
+        let bound = self.invariant_bound(spot, process)?;
+        let is_urgent = spot.urgency != Urgency::Normal;
+        self.bounds[process] = if is_urgent { 0.0 } else { bound };
+        self.attempts[process] = if spot.is_plain {
+            self.find_plain_outputs(program, spot, process)?;
+            if self.enabled[process].is_empty() {
+                f64::INFINITY
+            } else if is_urgent {
+                0.0
+            } else if bound.is_finite() {
+                bound * self.machine.stream().uniform()
+            } else {
+                let rate = self.exponential_rate(spot, process)?;
+                if rate == 0.0 {
+                    f64::INFINITY
+                } else {
+                    self.machine.stream().exponential(rate)
+                }
+            }
+        } else if is_urgent {
+            let mut is_enabled = false;
+            for output in program.range(spot.outputs) {
+                is_enabled = is_enabled || self.output(program, output, 0.0)?.now;
+            }
+            if is_enabled { 0.0 } else { f64::INFINITY }
+        } else {
+            self.draw(program, spot, process, bound)?
+        };
+        Ok(())
+    }
+
+    /// The outputs of a process whose guards do not change as time passes.
+    fn find_plain_outputs(
+        &mut self,
+        program: &Program<'a>,
+        spot: &Spot,
+        process: usize,
+    ) -> Result<(), Failure> {
+        self.enabled[process].clear();
+        for number in spot.outputs.0..spot.outputs.1 {
+            let output = program.instance(number);
+            if self.machine.holds(output.guard, &output.values)? {
+                self.enabled[process].push(number);
+            }
+        }
+        Ok(())
     }
 
     /// How long a process may stay where it is.
-    fn invariant_bound(&mut self, process: usize) -> Result<f64, Failure> {
+    fn invariant_bound(&mut self, spot: &Spot, process: usize) -> Result<f64, Failure> {
         let mut ahead = 0.0;
         for _ in 0..MOST_CHANGES {
-            let mask = self.invariant(process, ahead)?;
+            let mask = self.machine.mask(spot.invariant, &[], ahead)?;
+            if ahead == 0.0 && !mask.now {
+                return Err(Failure::InvariantBroken(self.stand(process)));
+            }
             if !mask.behind {
                 return Ok(ahead);
             }
@@ -198,16 +354,29 @@ impl<'a> Race<'a> {
     }
 
     /// The delay of a process that may stay until `bound`.
-    fn draw(&mut self, process: usize, bound: f64) -> Result<f64, Failure> {
+    fn draw(
+        &mut self,
+        program: &Program<'a>,
+        spot: &Spot,
+        process: usize,
+        bound: f64,
+    ) -> Result<f64, Failure> {
         let mut windows = std::mem::take(&mut self.windows);
         windows.clear();
-        let urgent = self.output_windows(process, bound, &mut windows);
-        let delay = urgent.and_then(|urgent| Ok(self.drawn(process, bound, &windows)?.min(urgent)));
+        let urgent = self.output_windows(program, spot, bound, &mut windows);
+        let delay =
+            urgent.and_then(|urgent| Ok(self.drawn(spot, process, bound, &windows)?.min(urgent)));
         self.windows = windows;
         delay
     }
 
-    fn drawn(&mut self, process: usize, bound: f64, windows: &Windows) -> Result<f64, Failure> {
+    fn drawn(
+        &mut self,
+        spot: &Spot,
+        process: usize,
+        bound: f64,
+        windows: &Windows,
+    ) -> Result<f64, Failure> {
         let Some(first) = windows.first() else {
             return Ok(f64::INFINITY);
         };
@@ -226,16 +395,7 @@ impl<'a> Race<'a> {
             };
             return Ok(windows.start_of(chosen as usize));
         }
-        let stand = self.stand(process);
-        let location = stand.location.0 as usize;
-        let chances = &self.network().processes[process].locations[location].chances;
-        let Some(rate) = chances.exponential_rate else {
-            return Err(Failure::NoRate(stand));
-        };
-        let rate = self.machine.real(rate, &[])?;
-        if !(rate >= 0.0 && rate.is_finite()) {
-            return Err(Failure::Rate(stand, rate));
-        }
+        let rate = self.exponential_rate(spot, process)?;
         if rate == 0.0 {
             return Ok(f64::INFINITY);
         }
@@ -246,25 +406,36 @@ impl<'a> Race<'a> {
         Ok(windows.after(passed))
     }
 
+    fn exponential_rate(&mut self, spot: &Spot, process: usize) -> Result<f64, Failure> {
+        let Some(rate) = spot.exponential_rate else {
+            return Err(Failure::NoRate(self.stand(process)));
+        };
+        let rate = self.machine.real(rate, &[])?;
+        if rate >= 0.0 && rate.is_finite() {
+            Ok(rate)
+        } else {
+            Err(Failure::Rate(self.stand(process), rate))
+        }
+    }
+
     /// Adds the times until `bound` at which an output of the process is enabled that is not on an
     /// urgent channel; returns the first at which one on an urgent channel is.
     fn output_windows(
         &mut self,
-        process: usize,
+        program: &Program<'a>,
+        spot: &Spot,
         bound: f64,
         windows: &mut Windows,
     ) -> Result<f64, Failure> {
         let mut urgent = f64::INFINITY;
-        for &edge in self.machine.edges(process) {
-            let instances = self.instances(process, edge, true);
-            for instance in instances {
-                if self.is_urgent(&instance)? {
-                    // It is taken as soon as it can be, so no time is drawn for it.
-                    let mut all = Windows::default();
-                    urgent = urgent.min(self.instance_windows(&instance, bound, &mut all)?);
-                } else {
-                    self.instance_windows(&instance, bound, windows)?;
-                }
+        for instance in program.range(spot.outputs) {
+            if instance.may_be_urgent && self.is_urgent(instance)? {
+                // It is taken as soon as it can be, so no time is drawn for it.
+                let mut all = Windows::default();
+                let first = self.instance_windows(program, instance, bound, &mut all)?;
+                urgent = urgent.min(first);
+            } else {
+                self.instance_windows(program, instance, bound, windows)?;
             }
         }
         Ok(urgent)
@@ -273,14 +444,15 @@ impl<'a> Race<'a> {
     /// Adds the times until `bound` at which an instance is enabled; returns the first.
     fn instance_windows(
         &mut self,
-        instance: &Instance,
+        program: &Program<'a>,
+        instance: &Instance<'a>,
         bound: f64,
         windows: &mut Windows,
     ) -> Result<f64, Failure> {
         let (mut ahead, mut before) = (0.0, false);
         let mut first = f64::INFINITY;
         for _ in 0..MOST_CHANGES {
-            let mask = self.output(instance, ahead)?;
+            let mask = self.output(program, instance, ahead)?;
             let end = (ahead + mask.horizon).min(bound);
             if mask.behind && ahead < bound {
                 windows.add(ahead, end);
@@ -299,238 +471,288 @@ impl<'a> Race<'a> {
             before = mask.behind;
             ahead = next.min(bound);
         }
-        Err(Failure::NoProgress(self.stand(instance.process)))
+        Err(Failure::NoProgress(self.stand(instance.process as usize)))
     }
 
     /// Whether an instance is enabled after this time; a sender on a binary channel needs a
     /// receiver.
-    fn output(&mut self, instance: &Instance, ahead: f64) -> Result<Mask, Failure> {
-        let edge = self.edge(instance);
-        let guard = self.machine.mask(&edge.guard, &instance.values, ahead)?;
-        let Some(sync) = edge.sync.filter(|_| guard.now || guard.behind) else {
+    fn output(
+        &mut self,
+        program: &Program<'a>,
+        instance: &Instance<'a>,
+        ahead: f64,
+    ) -> Result<Mask, Failure> {
+        let guard = self.machine.mask(instance.guard, &instance.values, ahead)?;
+        if !instance.is_binary || !(guard.now || guard.behind) {
+            return Ok(guard);
+        }
+        let Some(channel) = self.channel(instance)? else {
             return Ok(guard);
         };
-        let channel = self.channel(sync, &instance.values)?;
         if self.network().channels[channel as usize].broadcast {
             return Ok(guard);
         }
         let mut ready = Mask::constant(false);
-        for process in (0..self.network().processes.len()).filter(|&one| one != instance.process) {
-            for receiver in self.receivers(process, channel)? {
-                let edge = self.edge(&receiver);
-                ready = ready.or(self.machine.mask(&edge.guard, &receiver.values, ahead)?);
+        for &process in program.listeners(channel) {
+            if process == instance.process {
+                continue;
+            }
+            let inputs = program
+                .spot(process as usize, self.locations[process as usize])
+                .inputs;
+            for receiver in program.range(inputs) {
+                if self.channel(receiver)? == Some(channel) {
+                    let mask = self.machine.mask(receiver.guard, &receiver.values, ahead)?;
+                    ready = ready.or(mask);
+                }
             }
         }
         Ok(guard.and(ready))
     }
 
-    fn edge(&self, instance: &Instance) -> &'a Edge {
-        &self.network().processes[instance.process].edges[instance.edge.0 as usize]
-    }
-
-    fn channel(&mut self, sync: Sync, values: &[i32]) -> Result<u32, Failure> {
-        Ok(match sync.index {
-            None => sync.channel.0,
-            Some(index) => sync.channel.0 + self.machine.call(index, values)? as u32,
+    fn channel(&mut self, instance: &Instance<'a>) -> Result<Option<u32>, Failure> {
+        Ok(match instance.channel {
+            Channel::None => None,
+            Channel::Known(channel) => Some(channel),
+            Channel::Computed(first, index) => {
+                Some(first + self.machine.call(index, &instance.values)? as u32)
+            }
         })
     }
 
-    fn is_urgent(&mut self, instance: &Instance) -> Result<bool, Failure> {
-        let Some(sync) = self.edge(instance).sync else {
-            return Ok(false);
-        };
-        let channel = self.channel(sync, &instance.values)?;
-        Ok(self.network().channels[channel as usize].urgent)
+    fn is_urgent(&mut self, instance: &Instance<'a>) -> Result<bool, Failure> {
+        let channel = self.channel(instance)?;
+        Ok(channel.is_some_and(|channel| self.network().channels[channel as usize].urgent))
     }
 
-    /// The instances of an edge, if it is an output (or, if that is not wanted, if it receives).
-    fn instances(&self, process: usize, edge: EdgeId, outputs: bool) -> Vec<Instance> {
-        let known = &self.network().processes[process].edges[edge.0 as usize];
-        let is_output = known.sync.is_none_or(|sync| sync.send);
-        if is_output != outputs {
-            return Vec::new();
+    /// Puts the outputs of a process that are enabled now into `choices`: only those that leave a
+    /// committed location if there is one. Returns whether there are any.
+    fn find_outputs(&mut self, program: &Program<'a>, process: usize) -> Result<bool, Failure> {
+        self.choices.clear();
+        let spot = program.spot(process, self.locations[process]);
+        let leaves_committed = self.committed == 0 || spot.urgency == Urgency::Committed;
+        if spot.is_plain && !self.is_stale[process] {
+            if leaves_committed {
+                self.choices.extend_from_slice(&self.enabled[process]);
+            }
+            // None is on a binary channel, so that no partner can commit.
+            return Ok(!self.choices.is_empty());
         }
-        let mut values: Vec<i32> = known.select.iter().map(|one| one.low).collect();
-        let mut instances = Vec::new();
-        loop {
-            instances.push(Instance {
-                process,
-                edge,
-                values: values.clone(),
-            });
-            let mut place = values.len();
-            loop {
-                if place == 0 {
-                    return instances;
-                }
-                place -= 1;
-                if values[place] < known.select[place].high {
-                    values[place] += 1;
-                    break;
-                }
-                values[place] = known.select[place].low;
+        for number in spot.outputs.0..spot.outputs.1 {
+            let instance = program.instance(number);
+            if !self.output(program, instance, 0.0)?.now {
+                continue;
+            }
+            if leaves_committed || self.partner_commits(program, instance)? {
+                self.choices.push(number);
             }
         }
-    }
-
-    /// The receiving instances of a process on a channel, whatever their guards say.
-    fn receivers(&mut self, process: usize, channel: u32) -> Result<Vec<Instance>, Failure> {
-        let mut found = Vec::new();
-        for &edge in self.machine.edges(process) {
-            for instance in self.instances(process, edge, false) {
-                let Some(sync) = self.edge(&instance).sync else {
-                    continue;
-                };
-                if self.channel(sync, &instance.values)? == channel {
-                    found.push(instance);
-                }
-            }
-        }
-        Ok(found)
-    }
-
-    /// The receiving instances that are enabled now.
-    fn ready(&mut self, process: usize, channel: u32) -> Result<Vec<Instance>, Failure> {
-        let mut ready = Vec::new();
-        for instance in self.receivers(process, channel)? {
-            let edge = self.edge(&instance);
-            if self.machine.mask(&edge.guard, &instance.values, 0.0)?.now {
-                ready.push(instance);
-            }
-        }
-        Ok(ready)
-    }
-
-    /// The outputs of a process that are enabled now: only those that leave a committed location if
-    /// there is one.
-    fn outputs(&mut self, process: usize) -> Result<Vec<Instance>, Failure> {
-        let all = 0..self.network().processes.len();
-        let is_committed = |race: &Race<'_>, one| race.urgency(one) == Urgency::Committed;
-        let must_commit = all.clone().any(|one| is_committed(self, one));
-        let leaves_committed = !must_commit || is_committed(self, process);
-        let mut enabled = Vec::new();
-        for &edge in self.machine.edges(process) {
-            for instance in self.instances(process, edge, true) {
-                if !self.output(&instance, 0.0)?.now {
-                    continue;
-                }
-                if leaves_committed || self.partner_commits(&instance)? {
-                    enabled.push(instance);
-                }
-            }
-        }
-        Ok(enabled)
+        Ok(!self.choices.is_empty())
     }
 
     /// Whether somebody who can receive from a sender is in a committed location.
-    fn partner_commits(&mut self, sender: &Instance) -> Result<bool, Failure> {
-        let Some(sync) = self.edge(sender).sync else {
+    fn partner_commits(
+        &mut self,
+        program: &Program<'a>,
+        sender: &Instance<'a>,
+    ) -> Result<bool, Failure> {
+        let Some(channel) = self.channel(sender)? else {
             return Ok(false);
         };
-        let channel = self.channel(sync, &sender.values)?;
-        for process in 0..self.network().processes.len() {
-            if process != sender.process
-                && self.urgency(process) == Urgency::Committed
-                && !self.ready(process, channel)?.is_empty()
-            {
-                return Ok(true);
+        for &process in program.listeners(channel) {
+            if process != sender.process && self.urgency(process as usize) == Urgency::Committed {
+                let before = self.movers.len();
+                self.add_ready(program, process, channel)?;
+                let is_ready = self.movers.len() > before;
+                self.movers.truncate(before);
+                if is_ready {
+                    return Ok(true);
+                }
             }
         }
         Ok(false)
     }
 
+    /// Adds the receiving instances of a process on a channel that are enabled now to `movers`.
+    fn add_ready(
+        &mut self,
+        program: &Program<'a>,
+        process: u32,
+        channel: u32,
+    ) -> Result<(), Failure> {
+        let inputs = program
+            .spot(process as usize, self.locations[process as usize])
+            .inputs;
+        for number in inputs.0..inputs.1 {
+            let input = program.instance(number);
+            if self.channel(input)? == Some(channel)
+                && self.machine.holds(input.guard, &input.values)?
+            {
+                self.movers.push((number, 0));
+            }
+        }
+        Ok(())
+    }
+
     /// Lets time pass.
     pub(super) fn wait(&mut self, delay: f64) {
-        self.machine.advance(delay);
-        self.time += delay;
+        if delay > 0.0 {
+            self.machine.advance(delay);
+            self.time += delay;
+            for attempt in &mut self.attempts {
+                *attempt -= delay;
+            }
+            for bound in &mut self.bounds {
+                *bound -= delay;
+            }
+        }
     }
 
     /// Lets a process move, if it can after all.
     pub(super) fn take(&mut self, process: usize) -> Result<(), Failure> {
-        let outputs = self.outputs(process)?;
-        let Some(sender) = self.one_of(&outputs) else {
+        let program = Arc::clone(&self.program);
+        if !self.find_outputs(&program, process)? {
             // Rounding has put the delay beside the window: it is drawn again.
+            self.make_stale(process as u32);
             return self.count_move(process, false);
-        };
-        let mut movers = vec![sender.clone()];
-        if let Some(sync) = self.edge(&sender).sync {
-            let channel = self.channel(sync, &sender.values)?;
-            self.add_receivers(&sender, channel, &mut movers)?;
         }
-        self.carry_out(&movers)?;
+        let chosen = match self.choices[..] {
+            [only] => only,
+            ref many => many[self.machine.stream().below(many.len() as u32) as usize],
+        };
+        self.movers.clear();
+        self.movers.push((chosen, 0));
+        let sender = program.instance(chosen);
+        if let Some(channel) = self.channel(sender)? {
+            self.add_receivers(&program, sender, channel)?;
+        }
+        self.carry_out(&program)?;
+        self.until_renewal -= 1;
+        if self.until_renewal == 0 {
+            self.renew(&program);
+        }
         self.count_move(process, true)
     }
 
-    fn one_of(&mut self, instances: &[Instance]) -> Option<Instance> {
-        match instances {
-            [] => None,
-            [one] => Some(one.clone()),
-            many => {
-                let chosen = self.machine.stream().below(many.len() as u32);
-                Some(many[chosen as usize].clone())
+    /// Makes plans stale that wait for a clock.
+    fn renew(&mut self, program: &Program<'a>) {
+        self.until_renewal = MOVES_OF_A_PLAN;
+        for process in 0..self.locations.len() {
+            let spot = program.spot(process, self.locations[process]);
+            if !spot.is_plain || spot.invariant.is_timed() {
+                self.make_stale(process as u32);
             }
         }
     }
 
     fn add_receivers(
         &mut self,
-        sender: &Instance,
+        program: &Program<'a>,
+        sender: &Instance<'a>,
         channel: u32,
-        movers: &mut Vec<Instance>,
     ) -> Result<(), Failure> {
         let is_broadcast = self.network().channels[channel as usize].broadcast;
         let needs_commitment = !is_broadcast
-            && self.urgency(sender.process) != Urgency::Committed
-            && (0..self.network().processes.len())
-                .any(|one| self.urgency(one) == Urgency::Committed);
-        let mut all = Vec::new();
-        for process in (0..self.network().processes.len()).filter(|&one| one != sender.process) {
-            if needs_commitment && self.urgency(process) != Urgency::Committed {
+            && self.committed > 0
+            && self.urgency(sender.process as usize) != Urgency::Committed;
+        let mut first = self.movers.len();
+        for &process in program.listeners(channel) {
+            if process == sender.process
+                || (needs_commitment && self.urgency(process as usize) != Urgency::Committed)
+            {
                 continue;
             }
-            let ready = self.ready(process, channel)?;
+            self.add_ready(program, process, channel)?;
             if is_broadcast {
-                movers.extend(self.one_of(&ready));
-            } else {
-                all.extend(ready);
+                self.keep_one(first);
+                first = self.movers.len();
             }
         }
-        movers.extend(self.one_of(&all));
+        if !is_broadcast {
+            self.keep_one(first);
+        }
         Ok(())
     }
 
+    /// Keeps one of the movers from this place on.
+    fn keep_one(&mut self, first: usize) {
+        let many = self.movers.len() - first;
+        if many > 1 {
+            let chosen = self.machine.stream().below(many as u32) as usize;
+            self.movers.swap(first, first + chosen);
+            self.movers.truncate(first + 1);
+        }
+    }
+
     /// Runs the updates of those who move, the sender first, and lets them enter their locations.
-    fn carry_out(&mut self, movers: &[Instance]) -> Result<(), Failure> {
+    fn carry_out(&mut self, program: &Program<'a>) -> Result<(), Failure> {
         let network = self.network();
-        let mut branches = Vec::with_capacity(movers.len());
-        for mover in movers {
-            branches.push(self.branch(mover)?);
+        for index in 0..self.movers.len() {
+            let mover = program.instance(self.movers[index].0);
+            if mover.edge.branches.len() > 1 {
+                self.movers[index].1 = self.branch(mover)?;
+            }
         }
         if let Some(update) = &network.before_update {
             self.machine.update(update, &[])?;
         }
-        for (mover, branch) in movers.iter().zip(&branches) {
-            self.machine
-                .update(&self.edge(mover).update, &mover.values)?;
-            self.machine.update(&branch.update, &mover.values)?;
+        for index in 0..self.movers.len() {
+            let (number, branch) = self.movers[index];
+            let mover = program.instance(number);
+            let branch: &Branch = &mover.edge.branches[branch as usize];
+            self.update(&mover.edge.update, &mover.values)?;
+            self.update(&branch.update, &mover.values)?;
         }
-        for (mover, branch) in movers.iter().zip(&branches) {
-            let process = ProcessId(mover.process as u32);
-            self.machine.enter(process, branch.target);
+        for index in 0..self.movers.len() {
+            let (number, branch) = self.movers[index];
+            let mover = program.instance(number);
+            self.enter(program, mover, branch as usize);
         }
         if let Some(update) = &network.after_update {
             self.machine.update(update, &[])?;
         }
-        self.set_rates()
+        if program.has_rates {
+            self.renew_rates(program)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn update(&mut self, update: &Update, values: &[i32]) -> Result<(), Failure> {
+        if update.function.is_some() {
+            self.machine.update(update, values)?;
+        }
+        Ok(())
+    }
+
+    /// Lets a mover enter the target of its branch, and finds who plans anew.
+    fn enter(&mut self, program: &Program<'a>, mover: &Instance<'a>, branch: usize) {
+        let process = mover.process as usize;
+        let id = ProcessId(mover.process);
+        let target = mover.edge.branches[branch].target;
+        self.make_stale(mover.process);
+        for &concerned in program.concerned(mover, branch) {
+            self.make_stale(concerned);
+        }
+        let before = self.locations[process];
+        if target == before {
+            return;
+        }
+        let is_committed =
+            |location| usize::from(program.spot(process, location).urgency == Urgency::Committed);
+        self.committed += is_committed(target);
+        self.committed -= is_committed(before);
+        self.locations[process] = target;
+        self.machine.enter(id, target);
+        for &follower in program.followers(id) {
+            self.make_stale(follower);
+        }
     }
 
     /// The branch that a mover takes: by weight.
-    fn branch(&mut self, mover: &Instance) -> Result<&'a Branch, Failure> {
-        let branches = &self.edge(mover).branches;
-        if let [only] = &branches[..] {
-            return Ok(only);
-        }
-        let stand = self.stand(mover.process);
+    fn branch(&mut self, mover: &Instance<'a>) -> Result<u32, Failure> {
+        let branches = &mover.edge.branches;
+        let stand = self.stand(mover.process as usize);
         let mut weights = Vec::with_capacity(branches.len());
         for branch in branches {
             let weight = match branch.weight {
@@ -538,52 +760,80 @@ impl<'a> Race<'a> {
                 None => 1.0,
             };
             if !(weight >= 0.0 && weight.is_finite()) {
-                return Err(Failure::Weight(stand, mover.edge));
+                return Err(Failure::Weight(stand, mover.id));
             }
             weights.push(weight);
         }
         let total: f64 = weights.iter().sum();
         let mut rest = self.machine.stream().uniform() * total;
         let mut chosen = None;
-        for (branch, weight) in branches.iter().zip(weights) {
+        for (branch, weight) in weights.into_iter().enumerate() {
             if weight > 0.0 {
                 // The last one takes what rounding leaves.
-                chosen = Some(branch);
+                chosen = Some(branch as u32);
                 if rest < weight {
                     break;
                 }
                 rest -= weight;
             }
         }
-        chosen.ok_or(Failure::NoWeight(stand, mover.edge))
+        chosen.ok_or(Failure::NoWeight(stand, mover.id))
     }
 
-    /// Gives every clock its rate: that of a location, else 1.
-    fn set_rates(&mut self) -> Result<(), Failure> {
-        if !self.has_rates {
-            return Ok(());
-        }
+    /// Gives the clocks their rates anew of which a stale process sets some, and finds whose plans
+    /// that concerns.
+    fn renew_rates(&mut self, program: &Program<'a>) -> Result<(), Failure> {
         let network = self.network();
-        for &clock in &network.chances.clocks {
-            self.machine.set_rate(clock, 1.0);
-        }
-        let mut rated: Vec<(u32, usize)> = Vec::new();
-        for (process, known) in network.processes.iter().enumerate() {
-            let LocationId(location) = self.machine.location(process);
-            let chances = &known.locations[location as usize].chances;
-            let Some(rates) = chances.rates else { continue };
-            for &clock in &chances.rated_clocks {
-                if let Some(&(_, other)) = rated.iter().find(|one| one.0 == clock) {
-                    let (first, second) = (self.stand(other), self.stand(process));
-                    return Err(Failure::RatesConflict(first, second));
-                }
-                rated.push((clock, process));
+        let clocks = &network.chances.clocks;
+        let before: Vec<f64> = clocks
+            .iter()
+            .map(|&clock| self.machine.clock(clock).1)
+            .collect();
+        for (place, &clock) in clocks.iter().enumerate() {
+            if self.rated_by[place].is_some() {
+                self.rated_by[place] = None;
+                self.machine.set_rate(clock, 1.0);
             }
-            self.machine.call(rates, &[])?;
-            for &clock in &chances.rated_clocks {
-                if !self.machine.clock(clock).1.is_finite() {
-                    return Err(Failure::ClockRate(self.stand(process)));
+        }
+        for process in 0..self.locations.len() {
+            self.set_rates(process)?;
+        }
+        for (&clock, before) in clocks.iter().zip(before) {
+            if self.machine.clock(clock).1.to_bits() != before.to_bits()
+                && let Some(readers) = program.rate_readers.get(&clock)
+            {
+                for &reader in readers {
+                    self.make_stale(reader);
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the location of a process set the rates of clocks.
+    fn set_rates(&mut self, process: usize) -> Result<(), Failure> {
+        let network = self.network();
+        let LocationId(location) = self.locations[process];
+        let chances = &network.processes[process].locations[location as usize].chances;
+        let Some(rates) = chances.rates else {
+            return Ok(());
+        };
+        let place = |clock: &u32| {
+            let place = network.chances.clocks.binary_search(clock);
+            place.expect("the clocks of the network are ascending, and all of them")
+        };
+        for clock in &chances.rated_clocks {
+            let rated_by = &mut self.rated_by[place(clock)];
+            if let Some(other) = *rated_by {
+                let (first, second) = (self.stand(other as usize), self.stand(process));
+                return Err(Failure::RatesConflict(first, second));
+            }
+            *rated_by = Some(process as u32);
+        }
+        self.machine.call(rates, &[])?;
+        for &clock in &chances.rated_clocks {
+            if !self.machine.clock(clock).1.is_finite() {
+                return Err(Failure::ClockRate(self.stand(process)));
             }
         }
         Ok(())
@@ -605,5 +855,12 @@ impl<'a> Race<'a> {
     /// Counts moves from here on, so that none is taken for Zeno's: the run is bounded by moves.
     pub(super) fn forget_moves(&mut self) {
         self.since = (self.time, 0);
+    }
+}
+
+/// What a condition of a query says of the state after this time.
+impl Race<'_> {
+    pub(super) fn mask(&mut self, condition: Condition, ahead: f64) -> Result<Mask, Failure> {
+        self.machine.mask(condition, &[], ahead)
     }
 }

@@ -4,6 +4,7 @@
 
 use super::failure::Failure;
 use super::machine::Mask;
+use super::program::Condition;
 use super::race::Race;
 use crate::cancellation;
 use crate::exec::Executor;
@@ -275,11 +276,16 @@ fn watched(race: &mut Race<'_>, path: &Path, delay: f64) -> Result<Option<(bool,
     let mut ahead = 0.0;
     for _ in 0..MOST_CHANGES {
         let (keep, reach) = match path {
-            Path::Eventually(goal) => (Mask::constant(true), race.machine.mask(goal, &[], ahead)?),
-            Path::Always(keep) => (race.machine.mask(keep, &[], ahead)?, Mask::constant(false)),
+            Path::Eventually(goal) => {
+                (Mask::constant(true), race.mask(Condition::of(goal), ahead)?)
+            }
+            Path::Always(keep) => (
+                race.mask(Condition::of(keep), ahead)?,
+                Mask::constant(false),
+            ),
             Path::Until(keep, goal) => (
-                race.machine.mask(keep, &[], ahead)?,
-                race.machine.mask(goal, &[], ahead)?,
+                race.mask(Condition::of(keep), ahead)?,
+                race.mask(Condition::of(goal), ahead)?,
             ),
         };
         if reach.now || !keep.now {

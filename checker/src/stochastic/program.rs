@@ -1,0 +1,396 @@
+//! What does not change from run to run: the moves of every location with their conditions, and
+//! who has to plan anew when words change.
+//!
+//! Invariant: what a process plans depends only on the words that its [`Spot`] reads, on the
+//! location of the process itself, and on the locations of those that could receive from it on
+//! binary channels. [`Program::readers`] and [`Program::followers`] list, for each word and for
+//! each process, all processes whose plans that concerns in some location.
+
+use rustc_hash::FxHashMap;
+
+use crate::analysis::function_reads::read_words;
+use crate::ir::{
+    Edge, EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, Sync, Update, Urgency,
+};
+
+/// A condition, as it is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Condition {
+    /// It holds whatever happens.
+    Always,
+    /// It never holds.
+    Never,
+    /// It does not change as time passes; the function returns its mask.
+    Words(FunctionId),
+    /// It may change as time passes.
+    Timed(FunctionId),
+}
+
+impl Condition {
+    pub(super) fn of(guard: &Guard) -> Condition {
+        match guard.function {
+            _ if guard.never_holds => Condition::Never,
+            None => Condition::Always,
+            Some(function) if guard.is_timed => Condition::Timed(function),
+            Some(function) => Condition::Words(function),
+        }
+    }
+
+    pub(super) fn is_timed(self) -> bool {
+        matches!(self, Condition::Timed(_))
+    }
+
+    fn function(self) -> Option<FunctionId> {
+        match self {
+            Condition::Always | Condition::Never => None,
+            Condition::Words(function) | Condition::Timed(function) => Some(function),
+        }
+    }
+}
+
+/// What a move synchronises on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Channel {
+    /// Nothing.
+    None,
+    /// This channel.
+    Known(u32),
+    /// The first channel of an array, and the function that says how many behind it.
+    Computed(u32, FunctionId),
+}
+
+/// An edge with the values of its `select` bindings.
+#[derive(Debug)]
+pub(super) struct Instance<'a> {
+    pub(super) process: u32,
+    pub(super) id: EdgeId,
+    pub(super) edge: &'a Edge,
+    pub(super) values: Box<[i32]>,
+    pub(super) guard: Condition,
+    pub(super) channel: Channel,
+    /// Whether it sends on a binary channel, or may.
+    pub(super) is_binary: bool,
+    /// Whether its channel is urgent, or may be.
+    pub(super) may_be_urgent: bool,
+    /// Where the list of its first branch lies in [`Program::concerned`].
+    branches: u32,
+}
+
+/// A process in a location.
+#[derive(Debug)]
+pub(super) struct Spot {
+    pub(super) urgency: Urgency,
+    pub(super) invariant: Condition,
+    /// Its outputs, as a range of [`Program::instances`].
+    pub(super) outputs: (u32, u32),
+    /// Its receiving instances, likewise.
+    pub(super) inputs: (u32, u32),
+    /// Leaves the rate of the exponential delay.
+    pub(super) exponential_rate: Option<FunctionId>,
+    /// Sets the rates of clocks.
+    pub(super) rates: Option<FunctionId>,
+    /// Whether its outputs that are enabled stay so as time passes, and none is on an urgent
+    /// channel or needs a receiver.
+    pub(super) is_plain: bool,
+}
+
+/// A network, prepared for runs.
+#[derive(Debug)]
+pub(super) struct Program<'a> {
+    pub(super) network: &'a Network,
+    first_spots: Vec<u32>,
+    spots: Vec<Spot>,
+    instances: Vec<Instance<'a>>,
+    /// By branch of an edge: the processes that plan anew after it, beside those that move.
+    concerned: Vec<Box<[u32]>>,
+    /// By channel: the processes that may receive on it.
+    listeners: Vec<Vec<u32>>,
+    /// By the first word of a clock: whose plans depend on its rate.
+    pub(super) rate_readers: FxHashMap<u32, Box<[u32]>>,
+    /// By process: whose plans depend on where it is, the process itself left out.
+    followers: Vec<Box<[u32]>>,
+    /// Whether some location sets the rate of a clock.
+    pub(super) has_rates: bool,
+    pub(super) has_binary_channels: bool,
+}
+
+impl<'a> Program<'a> {
+    /// Prepares a network.
+    pub(super) fn new(network: &'a Network) -> Program<'a> {
+        let mut program = Program {
+            network,
+            first_spots: Vec::with_capacity(network.processes.len()),
+            spots: Vec::new(),
+            instances: Vec::new(),
+            concerned: Vec::new(),
+            listeners: vec![Vec::new(); network.channels.len()],
+            rate_readers: FxHashMap::default(),
+            followers: Vec::new(),
+            has_rates: false,
+            has_binary_channels: network.channels.iter().any(|channel| !channel.broadcast),
+        };
+        for process in 0..network.processes.len() {
+            program.add_process(process);
+        }
+        program.find_listeners();
+        program.find_dependences();
+        program
+    }
+
+    fn add_process(&mut self, process: usize) {
+        let network = self.network;
+        self.first_spots.push(self.spots.len() as u32);
+        for location in &network.processes[process].locations {
+            let outputs = self.add_instances(process, &location.edges, true);
+            let inputs = self.add_instances(process, &location.edges, false);
+            let chances = &location.chances;
+            self.has_rates |= chances.rates.is_some();
+            let is_plain = self.instances[outputs.0 as usize..outputs.1 as usize]
+                .iter()
+                .all(|one| !one.guard.is_timed() && !one.is_binary && !one.may_be_urgent);
+            self.spots.push(Spot {
+                urgency: location.urgency,
+                invariant: Condition::of(&location.invariant),
+                outputs,
+                inputs,
+                exponential_rate: chances.exponential_rate,
+                rates: chances.rates,
+                is_plain,
+            });
+        }
+    }
+
+    /// Adds the outputs among some edges, or those that receive.
+    fn add_instances(&mut self, process: usize, edges: &[EdgeId], outputs: bool) -> (u32, u32) {
+        let first = self.instances.len() as u32;
+        let network = self.network;
+        for &id in edges {
+            let edge = &network.processes[process].edges[id.0 as usize];
+            let is_output = edge.sync.is_none_or(|sync| sync.send);
+            if is_output != outputs || edge.guard.never_holds {
+                continue;
+            }
+            let range = edge.sync.map_or(0..0, channels_of);
+            let channels = &network.channels[range.start as usize..range.end as usize];
+            let channel = match edge.sync {
+                None => Channel::None,
+                Some(sync) => match sync.index {
+                    None => Channel::Known(sync.channel.0),
+                    Some(index) => Channel::Computed(sync.channel.0, index),
+                },
+            };
+            let is_binary = outputs && channels.iter().any(|channel| !channel.broadcast);
+            let may_be_urgent = outputs && channels.iter().any(|channel| channel.urgent);
+            each_selection(edge, &mut |values| {
+                self.instances.push(Instance {
+                    process: process as u32,
+                    id,
+                    edge,
+                    values: values.into(),
+                    guard: Condition::of(&edge.guard),
+                    channel,
+                    is_binary,
+                    may_be_urgent,
+                    branches: 0,
+                });
+            });
+        }
+        (first, self.instances.len() as u32)
+    }
+
+    fn find_listeners(&mut self) {
+        for (process, known) in self.network.processes.iter().enumerate() {
+            let syncs = known.edges.iter().filter_map(|edge| edge.sync);
+            for sync in syncs.filter(|sync| !sync.send) {
+                for channel in channels_of(sync) {
+                    let listeners = &mut self.listeners[channel as usize];
+                    if listeners.last() != Some(&(process as u32)) {
+                        listeners.push(process as u32);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The functions of which the plans of a process depend, in whichever location.
+    fn functions_of_plans(&self, process: usize) -> Vec<FunctionId> {
+        let mut functions = Vec::new();
+        let of_instance = |instance: &Instance<'_>, functions: &mut Vec<FunctionId>| {
+            functions.extend(instance.guard.function());
+            if let Channel::Computed(_, index) = instance.channel {
+                functions.push(index);
+            }
+        };
+        for spot in self.spots_of(process) {
+            functions.extend(spot.invariant.function());
+            functions.extend(spot.exponential_rate);
+            functions.extend(spot.rates);
+            for output in self.range(spot.outputs) {
+                of_instance(output, &mut functions);
+                if !output.is_binary {
+                    continue;
+                }
+                for partner in self.partners(output) {
+                    for spot in self.spots_of(partner as usize) {
+                        for input in self.range(spot.inputs) {
+                            of_instance(input, &mut functions);
+                        }
+                    }
+                }
+            }
+        }
+        functions.sort_unstable();
+        functions.dedup();
+        functions
+    }
+
+    /// Who could receive from a sender.
+    fn partners(&self, sender: &Instance<'_>) -> Vec<u32> {
+        let mut partners: Vec<u32> = Vec::new();
+        for channel in sender.edge.sync.map_or(0..0, channels_of) {
+            partners.extend(&self.listeners[channel as usize]);
+        }
+        partners.sort_unstable();
+        partners.dedup();
+        partners.retain(|&one| one != sender.process);
+        partners
+    }
+
+    fn find_dependences(&mut self) {
+        let network = self.network;
+        let words = network.layout.words as usize;
+        let mut readers: Vec<Vec<u32>> = vec![Vec::new(); words];
+        let mut followers: Vec<Vec<u32>> = vec![Vec::new(); network.processes.len()];
+        for process in 0..network.processes.len() {
+            let reader = process as u32;
+            let functions = self.functions_of_plans(process);
+            match read_words(network, functions, words) {
+                Some(read) => {
+                    for word in read {
+                        readers[word as usize].push(reader);
+                    }
+                }
+                None => readers.iter_mut().for_each(|list| list.push(reader)),
+            }
+            for spot in self.spots_of(process) {
+                for output in self.range(spot.outputs).iter().filter(|one| one.is_binary) {
+                    for partner in self.partners(output) {
+                        followers[partner as usize].push(reader);
+                    }
+                }
+            }
+        }
+        for (process, followers) in followers.iter_mut().enumerate() {
+            followers.extend(&readers[process]);
+            followers.sort_unstable();
+            followers.dedup();
+            followers.retain(|&one| one != process as u32);
+        }
+        self.followers = followers.into_iter().map(Vec::into_boxed_slice).collect();
+        for &clock in &network.chances.clocks {
+            let list = union_of(&readers, [(clock, CLOCK_WORDS)]);
+            if !list.is_empty() {
+                self.rate_readers.insert(clock, list);
+            }
+        }
+        let around = [&network.before_update, &network.after_update];
+        let around: Vec<(u32, u32)> = around
+            .into_iter()
+            .flatten()
+            .flat_map(|update| update.writes.iter().copied())
+            .collect();
+        let mut known: FxHashMap<(u32, u32), u32> = FxHashMap::default();
+        let concerned = &mut self.concerned;
+        for instance in &mut self.instances {
+            let edge = instance.edge;
+            let of_edge = known.entry((instance.process, instance.id.0));
+            instance.branches = *of_edge.or_insert_with(|| {
+                let first = concerned.len() as u32;
+                concerned.extend(edge.branches.iter().map(|branch| {
+                    let updates: [&Update; 2] = [&edge.update, &branch.update];
+                    let writes = updates.into_iter().flat_map(|update| &update.writes);
+                    union_of(&readers, writes.chain(&around).copied())
+                }));
+                first
+            });
+        }
+    }
+
+    fn spots_of(&self, process: usize) -> &[Spot] {
+        let first = self.first_spots[process] as usize;
+        &self.spots[first..first + self.network.processes[process].locations.len()]
+    }
+
+    /// A process in a location.
+    pub(super) fn spot(&self, process: usize, LocationId(location): LocationId) -> &Spot {
+        &self.spots[(self.first_spots[process] + location) as usize]
+    }
+
+    /// The instances with these numbers.
+    pub(super) fn range(&self, (first, end): (u32, u32)) -> &[Instance<'a>] {
+        &self.instances[first as usize..end as usize]
+    }
+
+    /// The instance with this number.
+    pub(super) fn instance(&self, number: u32) -> &Instance<'a> {
+        &self.instances[number as usize]
+    }
+
+    /// The processes that plan anew after a branch of an instance, beside those that move.
+    pub(super) fn concerned(&self, instance: &Instance<'_>, branch: usize) -> &[u32] {
+        &self.concerned[instance.branches as usize + branch]
+    }
+
+    /// The processes that may receive on a channel, ascending.
+    pub(super) fn listeners(&self, channel: u32) -> &[u32] {
+        &self.listeners[channel as usize]
+    }
+
+    /// The processes whose plans depend on where a process is, beside itself.
+    pub(super) fn followers(&self, ProcessId(process): ProcessId) -> &[u32] {
+        &self.followers[process as usize]
+    }
+}
+
+/// The words of a clock: its value and its rate.
+const CLOCK_WORDS: u32 = 4;
+
+fn channels_of(sync: Sync) -> std::ops::Range<u32> {
+    sync.channel.0..sync.channel.0 + sync.count
+}
+
+/// All that read one of the words in some ranges.
+fn union_of(readers: &[Vec<u32>], ranges: impl IntoIterator<Item = (u32, u32)>) -> Box<[u32]> {
+    let mut union = Vec::new();
+    for (first, count) in ranges {
+        for list in &readers[first as usize..(first + count) as usize] {
+            union.extend(list);
+        }
+        union.sort_unstable();
+        union.dedup();
+    }
+    union.into_boxed_slice()
+}
+
+/// Hands over all combinations of the values of the `select` bindings of an edge, in order.
+fn each_selection(edge: &Edge, visit: &mut dyn FnMut(&[i32])) {
+    let mut values: Vec<i32> = edge.select.iter().map(|one| one.low).collect();
+    if edge.select.iter().any(|one| one.low > one.high) {
+        return;
+    }
+    loop {
+        visit(&values);
+        let mut place = values.len();
+        loop {
+            if place == 0 {
+                return;
+            }
+            place -= 1;
+            if values[place] < edge.select[place].high {
+                values[place] += 1;
+                break;
+            }
+            values[place] = edge.select[place].low;
+        }
+    }
+}
