@@ -15,6 +15,7 @@ const WHOLE_ROOT: f64 = 67_108_864.0;
 
 /// The value, with one NaN for all: the IEEE leaves sign and payload of a NaN open, processors and
 /// compilers differ in them, and they must not leak into states.
+#[inline]
 pub(crate) fn canonical(value: f64) -> f64 {
     if value.is_nan() { f64::NAN } else { value }
 }

@@ -41,6 +41,7 @@ pub struct Stream<'a>(&'a mut [i32]);
 
 impl<'a> Stream<'a> {
     /// The stream that these [`STREAM_WORDS`] words hold.
+    #[inline]
     pub fn of(words: &'a mut [i32]) -> Stream<'a> {
         Stream(&mut words[..STREAM_WORDS])
     }
@@ -55,63 +56,93 @@ impl<'a> Stream<'a> {
     }
 
     /// A number in `[0, 1)`, one of the 2^53 equidistant ones.
+    #[inline]
     pub fn uniform(&mut self) -> f64 {
         StandardUniform.sample(self)
     }
 
     /// A number in `(0, 1]`, one of 2^53 equidistant ones.
+    #[inline]
     pub fn open_uniform(&mut self) -> f64 {
         OpenClosed01.sample(self)
     }
 
     /// An exponentially distributed number. The rate is greater than 0.
+    #[inline]
     pub fn exponential(&mut self, rate: f64) -> f64 {
         let one: f64 = Exp1.sample(self);
         one / rate
     }
 
     /// An integer less than `n`, each with the same probability. `n` is not 0.
+    #[inline]
     pub fn below(&mut self, n: u32) -> u32 {
         let range = Uniform::new(0, n).expect("some integer is less than the bound");
         range.sample(self)
     }
 
+    #[inline]
     fn number(&self, place: usize) -> u64 {
-        let [low, high] = [place, place + 1].map(|word| u64::from(self.0[word] as u32));
-        high << 32 | low
+        let (low, high) = (self.0[place] as u32, self.0[place + 1] as u32);
+        u64::from(high) << 32 | u64::from(low)
     }
 
+    #[inline]
     fn set_number(&mut self, place: usize, number: u64) {
         self.0[place] = number as i32;
         self.0[place + 1] = (number >> 32) as i32;
     }
 
+    /// Makes the words of a block.
+    #[inline]
+    fn fill(&mut self, block: u64) {
+        let counter = words_of(block, self.number(RUN));
+        let seed = self.number(SEED);
+        let random = philox(counter, [seed as u32, (seed >> 32) as u32]);
+        for (target, word) in self.0[BLOCK..].iter_mut().zip(random) {
+            *target = word as i32;
+        }
+    }
+
+    #[inline]
     fn next_word(&mut self) -> u32 {
         let position = self.number(POSITION);
         let word = (position % BLOCK_WORDS as u64) as usize;
         if word == 0 {
-            let block = position / BLOCK_WORDS as u64;
-            let counter = words_of(block, self.number(RUN));
-            let seed = self.number(SEED);
-            let random = philox(counter, [seed as u32, (seed >> 32) as u32]);
-            self.0[BLOCK..].copy_from_slice(&random.map(|word| word as i32));
+            self.fill(position / BLOCK_WORDS as u64);
         }
         self.set_number(POSITION, position.wrapping_add(1));
         self.0[BLOCK + word] as u32
+    }
+
+    /// Two words, the first one low.
+    #[inline]
+    fn next_pair(&mut self) -> u64 {
+        let position = self.number(POSITION);
+        let word = (position % BLOCK_WORDS as u64) as usize;
+        if word + 1 == BLOCK_WORDS {
+            let low = u64::from(self.next_word());
+            return u64::from(self.next_word()) << 32 | low;
+        }
+        if word == 0 {
+            self.fill(position / BLOCK_WORDS as u64);
+        }
+        self.set_number(POSITION, position.wrapping_add(2));
+        self.number(BLOCK + word)
     }
 }
 
 impl TryRng for Stream<'_> {
     type Error = Infallible;
 
+    #[inline]
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
         Ok(self.next_word())
     }
 
+    #[inline]
     fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        let low = u64::from(self.next_word());
-        let high = u64::from(self.next_word());
-        Ok(high << 32 | low)
+        Ok(self.next_pair())
     }
 
     fn try_fill_bytes(&mut self, target: &mut [u8]) -> Result<(), Infallible> {
@@ -122,6 +153,7 @@ impl TryRng for Stream<'_> {
     }
 }
 
+#[inline]
 fn words_of(low: u64, high: u64) -> [u32; 4] {
     [
         low as u32,
@@ -137,21 +169,21 @@ const MULTIPLIERS: [u32; 2] = [0xd251_1f53, 0xcd9e_8d57];
 const WEYL: [u32; 2] = [0x9e37_79b9, 0xbb67_ae85];
 
 /// Philox4x32-10.
-fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
+#[inline]
+fn philox(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
+    let [mut a, mut b, mut c, mut d] = counter;
+    let [mut left, mut right] = key;
     for _ in 0..ROUNDS {
-        let [first, second] = [0, 1].map(|half| {
-            let product = u64::from(MULTIPLIERS[half]) * u64::from(counter[2 * half]);
-            [product as u32, (product >> 32) as u32]
-        });
-        counter = [
-            second[1] ^ counter[1] ^ key[0],
-            second[0],
-            first[1] ^ counter[3] ^ key[1],
-            first[0],
-        ];
-        key = [0, 1].map(|half| key[half].wrapping_add(WEYL[half]));
+        let first = u64::from(MULTIPLIERS[0]) * u64::from(a);
+        let second = u64::from(MULTIPLIERS[1]) * u64::from(c);
+        a = (second >> 32) as u32 ^ b ^ left;
+        b = second as u32;
+        c = (first >> 32) as u32 ^ d ^ right;
+        d = first as u32;
+        left = left.wrapping_add(WEYL[0]);
+        right = right.wrapping_add(WEYL[1]);
     }
-    counter
+    [a, b, c, d]
 }
 
 macro_rules! distributions {

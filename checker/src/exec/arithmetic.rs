@@ -146,12 +146,14 @@ pub(crate) fn truncate(value: f64) -> Result<i32, RunTimeErrorKind> {
 }
 
 /// The words of a double, low word first.
+#[inline]
 pub(crate) fn double_words(value: f64) -> [i32; 2] {
     let bits = canonical(value).to_bits();
     [bits as i32, (bits >> 32) as i32]
 }
 
 /// The double that two words hold, low word first.
+#[inline]
 pub(crate) fn double_of_words(low: i32, high: i32) -> f64 {
     f64::from_bits(u64::from(low as u32) | u64::from(high as u32) << 32)
 }

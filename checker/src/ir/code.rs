@@ -354,6 +354,19 @@ pub enum Relation {
     NotEqual,
 }
 
+impl Relation {
+    /// The relation of the right side to the left side.
+    pub fn swapped(self) -> Relation {
+        match self {
+            Relation::Less => Relation::Greater,
+            Relation::LessEqual => Relation::GreaterEqual,
+            Relation::Greater => Relation::Less,
+            Relation::GreaterEqual => Relation::LessEqual,
+            Relation::Equal | Relation::NotEqual => self,
+        }
+    }
+}
+
 impl MathFunction {
     /// The types of the parameters.
     pub fn parameters(self) -> &'static [RegisterType] {

@@ -1,5 +1,6 @@
 //! What guards ask and updates do, where this is known without running code.
 
+use super::code::Relation;
 use super::ids::{ClockId, FunctionId};
 
 /// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and
@@ -20,6 +21,9 @@ pub struct Guard {
     /// In the stochastic reading, where `function` returns a mask (see [`super::Chances`]): whether
     /// it leaves the time for which the mask stands.
     pub is_timed: bool,
+    /// In the stochastic reading: the same condition in parts, where it compares clocks with
+    /// numbers that do not change as time passes, and nothing else in it does.
+    pub parts: Option<Box<GuardParts>>,
 }
 
 impl Guard {
@@ -27,6 +31,36 @@ impl Guard {
     pub fn is_trivial(&self) -> bool {
         self.function.is_none() && self.fixed.is_empty()
     }
+}
+
+/// A condition as a conjunction: of one on words, and of comparisons of real clocks with numbers.
+#[derive(Clone, Debug)]
+pub struct GuardParts {
+    /// Returns the mask of the condition on words; `None` is true. Its parameters are the edge's
+    /// select values.
+    pub on_words: Option<FunctionId>,
+    /// The comparisons.
+    pub comparisons: Vec<RealComparison>,
+}
+
+/// The comparison of a real clock with a number that does not change as time passes.
+#[derive(Clone, Copy, Debug)]
+pub struct RealComparison {
+    /// The first word of the clock.
+    pub clock: u32,
+    /// How they relate; the clock stands at the left.
+    pub relation: Relation,
+    /// The number.
+    pub bound: RealBound,
+}
+
+/// A number that does not change as time passes.
+#[derive(Clone, Copy, Debug)]
+pub enum RealBound {
+    /// It is known.
+    Constant(f64),
+    /// The function leaves it as a double; its parameters are the edge's select values.
+    Computed(FunctionId),
 }
 
 /// `left - right < bound`, or `<=` if not strict.

@@ -13,7 +13,7 @@ use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, Root, co
 use super::types::{Class, Memory, Type};
 use crate::ir::{
     self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
-    FixedConstraint, FunctionId, Guard, Update,
+    FixedConstraint, FunctionId, Guard, Relation, Update,
 };
 use crate::syntax::ast;
 
@@ -110,12 +110,53 @@ impl Checker<'_> {
         builder.select_parameters(locals);
         let parts_by_reference: Vec<&Expr> = parts.iter().collect();
         let (function, is_timed) = builder.mask(place.to_owned(), &parts_by_reference);
+        // Offsets in queries are final, those in the model are not: only these are relocated.
+        let apart = (is_timed && !self.is_query).then(|| self.guard_parts(parts, locals, place));
         Guard {
             function: Some(function),
             is_timed,
+            parts: apart.flatten().map(Box::new),
             never_holds: parts.iter().any(|part| part.interval == (0, 0)),
             ..Guard::default()
         }
+    }
+
+    /// A conjunction in parts, if each of them is a condition on words or compares a clock with a
+    /// number that does not change as time passes.
+    fn guard_parts(
+        &mut self,
+        parts: &[Expr],
+        locals: &[LocalId],
+        place: &str,
+    ) -> Option<ir::GuardParts> {
+        let (timed, on_words): (Vec<&Expr>, Vec<&Expr>) =
+            parts.iter().partition(|part| part.is_timed());
+        let compared: Option<Vec<_>> = timed.into_iter().map(clock_with_number).collect();
+        let mut comparisons = Vec::new();
+        for (clock, relation, bound) in compared? {
+            let bound = match bound.kind {
+                Kind::Double(value) => ir::RealBound::Constant(value),
+                _ => {
+                    let function = self.make_real(bound.clone(), locals, place.to_owned())?;
+                    ir::RealBound::Computed(function)
+                }
+            };
+            comparisons.push(ir::RealComparison {
+                clock,
+                relation,
+                bound,
+            });
+        }
+        let on_words = (!on_words.is_empty()).then(|| {
+            let known = self.locals.clone();
+            let mut builder = self.builder(&known);
+            builder.select_parameters(locals);
+            builder.mask(place.to_owned(), &on_words).0
+        });
+        Some(ir::GuardParts {
+            on_words,
+            comparisons,
+        })
     }
 
     /// A function that leaves the value of a number as a double.
@@ -459,4 +500,23 @@ fn assignments(effects: &Effects) -> Vec<ClockAssignment> {
         },
     };
     effects.assignments.iter().map(assignment).collect()
+}
+
+/// The first word of a clock, its relation to a number, and the number, if that is what a condition
+/// is about.
+fn clock_with_number(condition: &Expr) -> Option<(u32, Relation, &Expr)> {
+    let Kind::CompareReal(relation, left, right) = &condition.kind else {
+        return None;
+    };
+    let (clock, relation, bound) = match (&left.kind, &right.kind) {
+        (Kind::ClockReading(clock), _) => (clock, *relation, right),
+        (_, Kind::ClockReading(clock)) => (clock, relation.swapped(), left),
+        _ => return None,
+    };
+    let is_state = clock
+        .variable()
+        .is_some_and(|place| place.root == Root::State);
+    let offset = known_offset(clock, Memory::Words).filter(|_| is_state)?;
+    let is_convex = relation != Relation::NotEqual;
+    (is_convex && !bound.is_timed()).then_some((offset, relation, bound))
 }

@@ -79,6 +79,14 @@ impl Relocation {
         self.functions(&mut network.functions);
         let chances = &mut network.chances;
         let words = [&mut chances.stream, &mut chances.result, &mut chances.ahead];
+        for process in &mut network.processes {
+            let locations = process.locations.iter_mut().map(|one| &mut one.invariant);
+            let edges = process.edges.iter_mut().map(|one| &mut one.guard);
+            let parts = locations.chain(edges).filter_map(|one| one.parts.as_mut());
+            for comparison in parts.flat_map(|parts| &mut parts.comparisons) {
+                comparison.clock = self.offset(comparison.clock);
+            }
+        }
         let locations = network.processes.iter_mut().flat_map(|p| &mut p.locations);
         let rated = locations.flat_map(|location| &mut location.chances.rated_clocks);
         for offset in words.into_iter().chain(&mut chances.clocks).chain(rated) {

@@ -3,8 +3,8 @@
 //! Invariant: the words `ahead` say how far ahead of the state the last mask was asked; nothing
 //! else reads them.
 
+use super::condition::Condition;
 use super::failure::Failure;
-use super::program::Condition;
 use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::exec::{Context, Executor};
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, STREAM_WORDS, Stream, Update};
@@ -50,6 +50,8 @@ pub(super) struct Machine<'a> {
     pub(super) network: &'a Network,
     executor: &'a dyn Executor,
     words: Vec<i32>,
+    /// Values of clocks, for [`Machine::look_ahead`].
+    values: Vec<f64>,
 }
 
 impl<'a> Machine<'a> {
@@ -58,6 +60,7 @@ impl<'a> Machine<'a> {
             network,
             executor,
             words: network.initial.clone(),
+            values: Vec::new(),
         }
     }
 
@@ -69,9 +72,31 @@ impl<'a> Machine<'a> {
     }
 
     /// The random numbers of the run.
+    #[inline]
     pub(super) fn stream(&mut self) -> Stream<'_> {
         let start = self.network.chances.stream as usize;
         Stream::of(&mut self.words[start..start + STREAM_WORDS])
+    }
+
+    /// Looks at the state as it is after this time, if nothing happens until then.
+    pub(super) fn look_ahead<R>(&mut self, time: f64, look: impl FnOnce(&mut Self) -> R) -> R {
+        let network = self.network;
+        let mut values = std::mem::take(&mut self.values);
+        values.clear();
+        values.extend(
+            network
+                .chances
+                .clocks
+                .iter()
+                .map(|&clock| self.clock(clock).0),
+        );
+        self.advance(time);
+        let found = look(self);
+        for (&clock, &value) in network.chances.clocks.iter().zip(&values) {
+            self.set_double(clock, value);
+        }
+        self.values = values;
+        found
     }
 
     pub(super) fn clone_words(&self) -> Vec<i32> {
@@ -82,34 +107,41 @@ impl<'a> Machine<'a> {
         self.words.copy_from_slice(words);
     }
 
+    #[inline]
     pub(super) fn location(&self, process: usize) -> LocationId {
         LocationId(self.words[process] as u32)
     }
 
+    #[inline]
     pub(super) fn enter(&mut self, ProcessId(process): ProcessId, location: LocationId) {
         self.words[process as usize] = location.0 as i32;
     }
 
+    #[inline]
     pub(super) fn double(&self, offset: u32) -> f64 {
         let offset = offset as usize;
         double_of_words(self.words[offset], self.words[offset + 1])
     }
 
+    #[inline]
     pub(super) fn set_double(&mut self, offset: u32, value: f64) {
         let offset = offset as usize;
         self.words[offset..offset + 2].copy_from_slice(&double_words(value));
     }
 
     /// The value of the clock at these words, and its rate.
+    #[inline]
     pub(super) fn clock(&self, offset: u32) -> (f64, f64) {
         (self.double(offset), self.double(offset + 2))
     }
 
+    #[inline]
     pub(super) fn set_rate(&mut self, clock: u32, rate: f64) {
         self.set_double(clock + 2, rate);
     }
 
     /// Lets time pass.
+    #[inline]
     pub(super) fn advance(&mut self, time: f64) {
         if time == 0.0 {
             return;
@@ -122,6 +154,7 @@ impl<'a> Machine<'a> {
     }
 
     /// Calls a function of the model.
+    #[inline]
     pub(super) fn call(&mut self, function: FunctionId, arguments: &[i32]) -> Result<i32, Failure> {
         let mut context = Context {
             state: &mut self.words,
@@ -146,6 +179,7 @@ impl<'a> Machine<'a> {
                 let bits = self.call(function, arguments)?;
                 Ok(Mask::constant(bits != 0))
             }
+            Condition::Compared(_) => unreachable!("it is asked as a whole"),
             Condition::Timed(function) => {
                 self.set_double(self.network.chances.ahead, ahead);
                 let bits = self.call(function, arguments)?;
@@ -169,11 +203,13 @@ impl<'a> Machine<'a> {
     }
 
     /// The double that a function leaves.
+    #[inline]
     pub(super) fn real(&mut self, function: FunctionId, arguments: &[i32]) -> Result<f64, Failure> {
         self.call(function, arguments)?;
         Ok(self.double(self.network.chances.result))
     }
 
+    #[inline]
     pub(super) fn update(&mut self, update: &Update, arguments: &[i32]) -> Result<(), Failure> {
         if let Some(function) = update.function {
             self.call(function, arguments)?;

@@ -3,6 +3,7 @@
 //! Every run draws from a generator of its own, numbered by the run: run k of a seed is the same
 //! whatever the number of threads, and results count in the order of run numbers.
 
+mod condition;
 mod estimate;
 mod failure;
 mod in_order;
@@ -10,6 +11,7 @@ mod machine;
 mod program;
 mod race;
 mod run;
+mod span;
 pub mod statistics;
 mod windows;
 

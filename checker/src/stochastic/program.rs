@@ -8,45 +8,14 @@
 
 use rustc_hash::FxHashMap;
 
+use super::condition::{Comparisons, Condition, Number};
+use super::machine::Machine;
 use crate::analysis::function_reads::read_words;
+use crate::exec::Executor;
 use crate::ir::{
-    Edge, EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, Sync, Update, Urgency,
+    Edge, EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, RealBound, Sync, Update,
+    Urgency,
 };
-
-/// A condition, as it is asked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Condition {
-    /// It holds whatever happens.
-    Always,
-    /// It never holds.
-    Never,
-    /// It does not change as time passes; the function returns its mask.
-    Words(FunctionId),
-    /// It may change as time passes.
-    Timed(FunctionId),
-}
-
-impl Condition {
-    pub(super) fn of(guard: &Guard) -> Condition {
-        match guard.function {
-            _ if guard.never_holds => Condition::Never,
-            None => Condition::Always,
-            Some(function) if guard.is_timed => Condition::Timed(function),
-            Some(function) => Condition::Words(function),
-        }
-    }
-
-    pub(super) fn is_timed(self) -> bool {
-        matches!(self, Condition::Timed(_))
-    }
-
-    fn function(self) -> Option<FunctionId> {
-        match self {
-            Condition::Always | Condition::Never => None,
-            Condition::Words(function) | Condition::Timed(function) => Some(function),
-        }
-    }
-}
 
 /// What a move synchronises on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +41,7 @@ pub(super) struct Instance<'a> {
     pub(super) is_binary: bool,
     /// Whether its channel is urgent, or may be.
     pub(super) may_be_urgent: bool,
-    /// Where the list of its first branch lies in [`Program::concerned`].
+    /// The number of its first branch among those of all edges.
     branches: u32,
 }
 
@@ -85,8 +54,8 @@ pub(super) struct Spot {
     pub(super) outputs: (u32, u32),
     /// Its receiving instances, likewise.
     pub(super) inputs: (u32, u32),
-    /// Leaves the rate of the exponential delay.
-    pub(super) exponential_rate: Option<FunctionId>,
+    /// The rate of the exponential delay.
+    pub(super) exponential_rate: Option<Number>,
     /// Sets the rates of clocks.
     pub(super) rates: Option<FunctionId>,
     /// Whether its outputs that are enabled stay so as time passes, and none is on an urgent
@@ -101,6 +70,9 @@ pub(super) struct Program<'a> {
     first_spots: Vec<u32>,
     spots: Vec<Spot>,
     instances: Vec<Instance<'a>>,
+    comparisons: Vec<Comparisons>,
+    /// By branch of an edge: its weight, if it has branches with weights.
+    weights: Vec<Number>,
     /// By branch of an edge: the processes that plan anew after it, beside those that move.
     concerned: Vec<Box<[u32]>>,
     /// By channel: the processes that may receive on it.
@@ -116,12 +88,15 @@ pub(super) struct Program<'a> {
 
 impl<'a> Program<'a> {
     /// Prepares a network.
-    pub(super) fn new(network: &'a Network) -> Program<'a> {
+    pub(super) fn new(network: &'a Network, executor: &'a dyn Executor) -> Program<'a> {
+        let mut machine = Machine::new(network, executor);
         let mut program = Program {
             network,
             first_spots: Vec::with_capacity(network.processes.len()),
             spots: Vec::new(),
             instances: Vec::new(),
+            comparisons: Vec::new(),
+            weights: Vec::new(),
             concerned: Vec::new(),
             listeners: vec![Vec::new(); network.channels.len()],
             rate_readers: FxHashMap::default(),
@@ -130,30 +105,34 @@ impl<'a> Program<'a> {
             has_binary_channels: network.channels.iter().any(|channel| !channel.broadcast),
         };
         for process in 0..network.processes.len() {
-            program.add_process(process);
+            program.add_process(process, &mut machine);
         }
         program.find_listeners();
-        program.find_dependences();
+        program.find_dependences(&mut machine);
         program
     }
 
-    fn add_process(&mut self, process: usize) {
+    fn add_process(&mut self, process: usize, machine: &mut Machine<'a>) {
         let network = self.network;
         self.first_spots.push(self.spots.len() as u32);
         for location in &network.processes[process].locations {
-            let outputs = self.add_instances(process, &location.edges, true);
-            let inputs = self.add_instances(process, &location.edges, false);
+            let outputs = self.add_instances((process, &location.edges), true, machine);
+            let inputs = self.add_instances((process, &location.edges), false, machine);
             let chances = &location.chances;
             self.has_rates |= chances.rates.is_some();
             let is_plain = self.instances[outputs.0 as usize..outputs.1 as usize]
                 .iter()
                 .all(|one| !one.guard.is_timed() && !one.is_binary && !one.may_be_urgent);
+            let invariant = self.condition(&location.invariant, &[], machine);
+            let exponential_rate = chances
+                .exponential_rate
+                .map(|rate| number(rate, &[], machine));
             self.spots.push(Spot {
                 urgency: location.urgency,
-                invariant: Condition::of(&location.invariant),
+                invariant,
                 outputs,
                 inputs,
-                exponential_rate: chances.exponential_rate,
+                exponential_rate,
                 rates: chances.rates,
                 is_plain,
             });
@@ -161,7 +140,12 @@ impl<'a> Program<'a> {
     }
 
     /// Adds the outputs among some edges, or those that receive.
-    fn add_instances(&mut self, process: usize, edges: &[EdgeId], outputs: bool) -> (u32, u32) {
+    fn add_instances(
+        &mut self,
+        (process, edges): (usize, &[EdgeId]),
+        outputs: bool,
+        machine: &mut Machine<'a>,
+    ) -> (u32, u32) {
         let first = self.instances.len() as u32;
         let network = self.network;
         for &id in edges {
@@ -172,30 +156,63 @@ impl<'a> Program<'a> {
             }
             let range = edge.sync.map_or(0..0, channels_of);
             let channels = &network.channels[range.start as usize..range.end as usize];
-            let channel = match edge.sync {
-                None => Channel::None,
-                Some(sync) => match sync.index {
-                    None => Channel::Known(sync.channel.0),
-                    Some(index) => Channel::Computed(sync.channel.0, index),
-                },
-            };
             let is_binary = outputs && channels.iter().any(|channel| !channel.broadcast);
             let may_be_urgent = outputs && channels.iter().any(|channel| channel.urgent);
             each_selection(edge, &mut |values| {
-                self.instances.push(Instance {
-                    process: process as u32,
-                    id,
-                    edge,
-                    values: values.into(),
-                    guard: Condition::of(&edge.guard),
-                    channel,
-                    is_binary,
-                    may_be_urgent,
-                    branches: 0,
-                });
+                let guard = self.condition(&edge.guard, values, machine);
+                if guard != Condition::Never {
+                    self.instances.push(Instance {
+                        process: process as u32,
+                        id,
+                        edge,
+                        values: values.into(),
+                        guard,
+                        channel: channel_of(edge.sync, values, machine),
+                        is_binary,
+                        may_be_urgent,
+                        branches: 0,
+                    });
+                }
             });
         }
         (first, self.instances.len() as u32)
+    }
+
+    /// A guard or an invariant; what does not depend on the state is computed once.
+    fn condition(&mut self, guard: &Guard, values: &[i32], machine: &mut Machine<'a>) -> Condition {
+        let Some(parts) = &guard.parts else {
+            return folded(Condition::of(guard), values, machine);
+        };
+        if guard.never_holds {
+            return Condition::Never;
+        }
+        let on_words = parts.on_words.map_or(Condition::Always, Condition::Words);
+        let on_words = folded(on_words, values, machine);
+        if on_words == Condition::Never {
+            return Condition::Never;
+        }
+        let bounds = parts.comparisons.iter().map(|one| {
+            let bound = match one.bound {
+                RealBound::Constant(value) => Number::Known(value),
+                RealBound::Computed(function) => number(function, values, machine),
+            };
+            (one.clock, one.relation, bound)
+        });
+        self.comparisons.push(Comparisons {
+            on_words,
+            bounds: bounds.collect(),
+            whole: guard.function.expect("comparisons have a function"),
+        });
+        Condition::Compared(self.comparisons.len() as u32 - 1)
+    }
+
+    /// The function that a condition depends on.
+    fn function(&self, condition: Condition) -> Option<FunctionId> {
+        match condition {
+            Condition::Always | Condition::Never => None,
+            Condition::Words(function) | Condition::Timed(function) => Some(function),
+            Condition::Compared(place) => Some(self.comparisons(place).whole),
+        }
     }
 
     fn find_listeners(&mut self) {
@@ -216,14 +233,16 @@ impl<'a> Program<'a> {
     fn functions_of_plans(&self, process: usize) -> Vec<FunctionId> {
         let mut functions = Vec::new();
         let of_instance = |instance: &Instance<'_>, functions: &mut Vec<FunctionId>| {
-            functions.extend(instance.guard.function());
+            functions.extend(self.function(instance.guard));
             if let Channel::Computed(_, index) = instance.channel {
                 functions.push(index);
             }
         };
         for spot in self.spots_of(process) {
-            functions.extend(spot.invariant.function());
-            functions.extend(spot.exponential_rate);
+            functions.extend(self.function(spot.invariant));
+            if let Some(Number::Computed(rate)) = spot.exponential_rate {
+                functions.push(rate);
+            }
             functions.extend(spot.rates);
             for output in self.range(spot.outputs) {
                 of_instance(output, &mut functions);
@@ -256,7 +275,7 @@ impl<'a> Program<'a> {
         partners
     }
 
-    fn find_dependences(&mut self) {
+    fn find_dependences(&mut self, machine: &mut Machine<'a>) {
         let network = self.network;
         let words = network.layout.words as usize;
         let mut readers: Vec<Vec<u32>> = vec![Vec::new(); words];
@@ -300,12 +319,18 @@ impl<'a> Program<'a> {
             .flat_map(|update| update.writes.iter().copied())
             .collect();
         let mut known: FxHashMap<(u32, u32), u32> = FxHashMap::default();
-        let concerned = &mut self.concerned;
+        let (concerned, weights) = (&mut self.concerned, &mut self.weights);
         for instance in &mut self.instances {
             let edge = instance.edge;
             let of_edge = known.entry((instance.process, instance.id.0));
             instance.branches = *of_edge.or_insert_with(|| {
                 let first = concerned.len() as u32;
+                let has_bindings = !edge.select.is_empty();
+                weights.extend(edge.branches.iter().map(|branch| match branch.weight {
+                    None => Number::Known(1.0),
+                    Some(weight) if has_bindings => Number::Computed(weight),
+                    Some(weight) => number(weight, &[], machine),
+                }));
                 concerned.extend(edge.branches.iter().map(|branch| {
                     let updates: [&Update; 2] = [&edge.update, &branch.update];
                     let writes = updates.into_iter().flat_map(|update| &update.writes);
@@ -326,6 +351,14 @@ impl<'a> Program<'a> {
         &self.spots[(self.first_spots[process] + location) as usize]
     }
 
+    /// Whether the result of a function may change as time passes.
+    pub(super) fn is_timed(&self, function: FunctionId) -> bool {
+        let words = self.network.layout.words as usize;
+        let read = read_words(self.network, [function], words);
+        let clocks = &self.network.chances.clocks;
+        read.is_none_or(|read| read.iter().any(|word| clocks.binary_search(word).is_ok()))
+    }
+
     /// The instances with these numbers.
     pub(super) fn range(&self, (first, end): (u32, u32)) -> &[Instance<'a>] {
         &self.instances[first as usize..end as usize]
@@ -334,6 +367,16 @@ impl<'a> Program<'a> {
     /// The instance with this number.
     pub(super) fn instance(&self, number: u32) -> &Instance<'a> {
         &self.instances[number as usize]
+    }
+
+    /// The parts of a condition.
+    pub(super) fn comparisons(&self, place: u32) -> &Comparisons {
+        &self.comparisons[place as usize]
+    }
+
+    /// The weight of a branch of an instance.
+    pub(super) fn weight(&self, instance: &Instance<'_>, branch: usize) -> Number {
+        self.weights[instance.branches as usize + branch]
     }
 
     /// The processes that plan anew after a branch of an instance, beside those that move.
@@ -354,6 +397,53 @@ impl<'a> Program<'a> {
 
 /// The words of a clock: its value and its rate.
 const CLOCK_WORDS: u32 = 4;
+
+/// Whether the result of a function depends on its arguments only.
+fn is_constant(function: FunctionId, machine: &Machine<'_>) -> bool {
+    read_words(machine.network, [function], 0).is_some_and(|words| words.is_empty())
+}
+
+/// A condition, computed now if it does not depend on the state.
+fn folded(condition: Condition, values: &[i32], machine: &mut Machine<'_>) -> Condition {
+    let Condition::Words(function) = condition else {
+        return condition;
+    };
+    if !is_constant(function, machine) {
+        return condition;
+    }
+    // What fails is called again when it is asked, and fails there.
+    match machine.call(function, values) {
+        Ok(0) => Condition::Never,
+        Ok(_) => Condition::Always,
+        Err(_) => condition,
+    }
+}
+
+/// A number, computed now if it does not depend on the state.
+fn number(function: FunctionId, values: &[i32], machine: &mut Machine<'_>) -> Number {
+    if !is_constant(function, machine) {
+        return Number::Computed(function);
+    }
+    match machine.real(function, values) {
+        Ok(value) => Number::Known(value),
+        Err(_) => Number::Computed(function),
+    }
+}
+
+fn channel_of(sync: Option<Sync>, values: &[i32], machine: &mut Machine<'_>) -> Channel {
+    let Some(sync) = sync else {
+        return Channel::None;
+    };
+    let first = sync.channel.0;
+    match sync.index {
+        None => Channel::Known(first),
+        Some(index) if is_constant(index, machine) => match machine.call(index, values) {
+            Ok(offset) => Channel::Known(first + offset as u32),
+            Err(_) => Channel::Computed(first, index),
+        },
+        Some(index) => Channel::Computed(first, index),
+    }
+}
 
 fn channels_of(sync: Sync) -> std::ops::Range<u32> {
     sync.channel.0..sync.channel.0 + sync.count

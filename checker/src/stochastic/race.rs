@@ -19,11 +19,11 @@
 //!
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
-use std::sync::Arc;
-
+use super::condition::{Condition, Number};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
-use super::program::{Channel, Condition, Instance, Program, Spot};
+use super::program::{Channel, Instance, Program, Spot};
+use super::span::Span;
 use super::windows::Windows;
 use crate::exec::Executor;
 use crate::ir::{Branch, LocationId, Network, ProcessId, Update, Urgency};
@@ -55,7 +55,6 @@ pub(super) struct Next {
 /// A run in progress.
 pub(super) struct Race<'a> {
     pub(super) machine: Machine<'a>,
-    program: Arc<Program<'a>>,
     /// By process: in how long it tries to move; infinity if never.
     attempts: Vec<f64>,
     /// By process: how long it may stay where it is.
@@ -89,7 +88,6 @@ impl<'a> Race<'a> {
         let processes = network.processes.len();
         Race {
             machine: Machine::new(network, executor),
-            program: Arc::new(Program::new(network)),
             attempts: vec![f64::INFINITY; processes],
             bounds: vec![f64::INFINITY; processes],
             stale: Vec::with_capacity(processes),
@@ -109,15 +107,19 @@ impl<'a> Race<'a> {
     }
 
     /// Goes back to the initial state.
-    pub(super) fn start(&mut self, seed: u64, run: u64) -> Result<(), Failure> {
+    pub(super) fn start(
+        &mut self,
+        program: &Program<'a>,
+        (seed, run): (u64, u64),
+    ) -> Result<(), Failure> {
         self.machine.start(seed, run);
         self.time = 0.0;
         self.moves = 0;
-        self.resume()
+        self.resume(program)
     }
 
     /// Plans for the state that the words of the machine hold now.
-    pub(super) fn resume(&mut self) -> Result<(), Failure> {
+    pub(super) fn resume(&mut self, program: &Program<'a>) -> Result<(), Failure> {
         self.since = (self.time, 0);
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
@@ -125,12 +127,12 @@ impl<'a> Race<'a> {
         for process in 0..self.locations.len() {
             let location = self.machine.location(process);
             self.locations[process] = location;
-            let spot = self.program.spot(process, location);
+            let spot = program.spot(process, location);
             self.committed += usize::from(spot.urgency == Urgency::Committed);
             self.is_stale[process] = true;
             self.stale.push(process as u32);
         }
-        if self.program.has_rates {
+        if program.has_rates {
             self.rated_by.fill(None);
             for &clock in &self.machine.network.chances.clocks {
                 self.machine.set_rate(clock, 1.0);
@@ -154,7 +156,8 @@ impl<'a> Race<'a> {
     }
 
     fn urgency(&self, process: usize) -> Urgency {
-        self.program.spot(process, self.locations[process]).urgency
+        let LocationId(location) = self.locations[process];
+        self.network().processes[process].locations[location as usize].urgency
     }
 
     fn make_stale(&mut self, process: u32) {
@@ -166,11 +169,10 @@ impl<'a> Race<'a> {
     }
 
     /// Draws what comes next.
-    pub(super) fn next(&mut self) -> Result<Next, Failure> {
-        let program = Arc::clone(&self.program);
-        self.plan_anew(&program)?;
+    pub(super) fn next(&mut self, program: &Program<'a>) -> Result<Next, Failure> {
+        self.plan_anew(program)?;
         if self.committed > 0 {
-            return self.next_committed(&program);
+            return self.next_committed(program);
         }
         let mut delay = f64::INFINITY;
         for &attempt in &self.attempts {
@@ -181,7 +183,7 @@ impl<'a> Race<'a> {
             least = least.min(bound);
         }
         if delay > least * (1.0 + TOLERANCE) + TOLERANCE {
-            return self.next_at_the_latest(&program, least);
+            return self.next_at_the_latest(program, least);
         }
         let winner = if delay.is_finite() {
             Some(self.first_before(delay * (1.0 + TOLERANCE) + TOLERANCE))
@@ -283,7 +285,7 @@ impl<'a> Race<'a> {
 
     fn plan(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
         let spot = program.spot(process, self.locations[process]);
-        let bound = self.invariant_bound(spot, process)?;
+        let bound = self.invariant_bound(program, spot, process)?;
         let is_urgent = spot.urgency != Urgency::Normal;
         self.bounds[process] = if is_urgent { 0.0 } else { bound };
         self.attempts[process] = if spot.is_plain {
@@ -324,7 +326,7 @@ impl<'a> Race<'a> {
         self.enabled[process].clear();
         for number in spot.outputs.0..spot.outputs.1 {
             let output = program.instance(number);
-            if self.machine.holds(output.guard, &output.values)? {
+            if self.holds(program, output.guard, &output.values)? {
                 self.enabled[process].push(number);
             }
         }
@@ -332,10 +334,23 @@ impl<'a> Race<'a> {
     }
 
     /// How long a process may stay where it is.
-    fn invariant_bound(&mut self, spot: &Spot, process: usize) -> Result<f64, Failure> {
+    fn invariant_bound(
+        &mut self,
+        program: &Program<'a>,
+        spot: &Spot,
+        process: usize,
+    ) -> Result<f64, Failure> {
+        if let Condition::Compared(_) = spot.invariant {
+            let span = self.span(program, spot.invariant, &[])?;
+            let is_broken = |span: Option<Span>| span.is_none_or(|span| span.low > 0.0);
+            if is_broken(span) {
+                return Err(Failure::InvariantBroken(self.stand(process)));
+            }
+            return Ok(span.map_or(0.0, |span| span.high));
+        }
         let mut ahead = 0.0;
         for _ in 0..MOST_CHANGES {
-            let mask = self.machine.mask(spot.invariant, &[], ahead)?;
+            let mask = self.mask_of(program, spot.invariant, &[], ahead)?;
             if ahead == 0.0 && !mask.now {
                 return Err(Failure::InvariantBroken(self.stand(process)));
             }
@@ -407,10 +422,11 @@ impl<'a> Race<'a> {
     }
 
     fn exponential_rate(&mut self, spot: &Spot, process: usize) -> Result<f64, Failure> {
-        let Some(rate) = spot.exponential_rate else {
-            return Err(Failure::NoRate(self.stand(process)));
+        let rate = match spot.exponential_rate {
+            None => return Err(Failure::NoRate(self.stand(process))),
+            Some(Number::Known(rate)) => rate,
+            Some(Number::Computed(rate)) => self.machine.real(rate, &[])?,
         };
-        let rate = self.machine.real(rate, &[])?;
         if rate >= 0.0 && rate.is_finite() {
             Ok(rate)
         } else {
@@ -449,6 +465,15 @@ impl<'a> Race<'a> {
         bound: f64,
         windows: &mut Windows,
     ) -> Result<f64, Failure> {
+        if matches!(instance.guard, Condition::Compared(_)) && !instance.is_binary {
+            let span = self.span(program, instance.guard, &instance.values)?;
+            let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
+            let Some(span) = span.filter(|span| span.low <= latest) else {
+                return Ok(f64::INFINITY);
+            };
+            windows.add(span.low, span.high.min(bound).max(span.low));
+            return Ok(span.low);
+        }
         let (mut ahead, mut before) = (0.0, false);
         let mut first = f64::INFINITY;
         for _ in 0..MOST_CHANGES {
@@ -482,7 +507,7 @@ impl<'a> Race<'a> {
         instance: &Instance<'a>,
         ahead: f64,
     ) -> Result<Mask, Failure> {
-        let guard = self.machine.mask(instance.guard, &instance.values, ahead)?;
+        let guard = self.mask_of(program, instance.guard, &instance.values, ahead)?;
         if !instance.is_binary || !(guard.now || guard.behind) {
             return Ok(guard);
         }
@@ -502,7 +527,7 @@ impl<'a> Race<'a> {
                 .inputs;
             for receiver in program.range(inputs) {
                 if self.channel(receiver)? == Some(channel) {
-                    let mask = self.machine.mask(receiver.guard, &receiver.values, ahead)?;
+                    let mask = self.mask_of(program, receiver.guard, &receiver.values, ahead)?;
                     ready = ready.or(mask);
                 }
             }
@@ -525,6 +550,54 @@ impl<'a> Race<'a> {
         Ok(channel.is_some_and(|channel| self.network().channels[channel as usize].urgent))
     }
 
+    /// When a conjunction of comparisons holds; `None` if never.
+    #[inline]
+    fn span(
+        &mut self,
+        program: &Program<'a>,
+        condition: Condition,
+        values: &[i32],
+    ) -> Result<Option<Span>, Failure> {
+        let Condition::Compared(place) = condition else {
+            unreachable!("only comparisons are taken apart");
+        };
+        let comparisons = program.comparisons(place);
+        if !self.machine.holds(comparisons.on_words, values)? {
+            return Ok(None);
+        }
+        self.machine.span(comparisons, values)
+    }
+
+    /// Whether a condition holds now.
+    #[inline]
+    fn holds(
+        &mut self,
+        program: &Program<'a>,
+        condition: Condition,
+        values: &[i32],
+    ) -> Result<bool, Failure> {
+        if let Condition::Compared(_) = condition {
+            let span = self.span(program, condition, values)?;
+            return Ok(span.is_some_and(|span| span.low <= TOLERANCE));
+        }
+        self.machine.holds(condition, values)
+    }
+
+    /// A condition after this time, if nothing happens until then.
+    fn mask_of(
+        &mut self,
+        program: &Program<'a>,
+        condition: Condition,
+        values: &[i32],
+        ahead: f64,
+    ) -> Result<Mask, Failure> {
+        let whole = match condition {
+            Condition::Compared(place) => Condition::Timed(program.comparisons(place).whole),
+            other => other,
+        };
+        self.machine.mask(whole, values, ahead)
+    }
+
     /// Puts the outputs of a process that are enabled now into `choices`: only those that leave a
     /// committed location if there is one. Returns whether there are any.
     fn find_outputs(&mut self, program: &Program<'a>, process: usize) -> Result<bool, Failure> {
@@ -540,7 +613,12 @@ impl<'a> Race<'a> {
         }
         for number in spot.outputs.0..spot.outputs.1 {
             let instance = program.instance(number);
-            if !self.output(program, instance, 0.0)?.now {
+            let is_enabled = if instance.is_binary {
+                self.output(program, instance, 0.0)?.now
+            } else {
+                self.holds(program, instance.guard, &instance.values)?
+            };
+            if !is_enabled {
                 continue;
             }
             if leaves_committed || self.partner_commits(program, instance)? {
@@ -586,7 +664,7 @@ impl<'a> Race<'a> {
         for number in inputs.0..inputs.1 {
             let input = program.instance(number);
             if self.channel(input)? == Some(channel)
-                && self.machine.holds(input.guard, &input.values)?
+                && self.holds(program, input.guard, &input.values)?
             {
                 self.movers.push((number, 0));
             }
@@ -609,9 +687,8 @@ impl<'a> Race<'a> {
     }
 
     /// Lets a process move, if it can after all.
-    pub(super) fn take(&mut self, process: usize) -> Result<(), Failure> {
-        let program = Arc::clone(&self.program);
-        if !self.find_outputs(&program, process)? {
+    pub(super) fn take(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
+        if !self.find_outputs(program, process)? {
             // Rounding has put the delay beside the window: it is drawn again.
             self.make_stale(process as u32);
             return self.count_move(process, false);
@@ -624,12 +701,12 @@ impl<'a> Race<'a> {
         self.movers.push((chosen, 0));
         let sender = program.instance(chosen);
         if let Some(channel) = self.channel(sender)? {
-            self.add_receivers(&program, sender, channel)?;
+            self.add_receivers(program, sender, channel)?;
         }
-        self.carry_out(&program)?;
+        self.carry_out(program)?;
         self.until_renewal -= 1;
         if self.until_renewal == 0 {
-            self.renew(&program);
+            self.renew(program);
         }
         self.count_move(process, true)
     }
@@ -690,7 +767,7 @@ impl<'a> Race<'a> {
         for index in 0..self.movers.len() {
             let mover = program.instance(self.movers[index].0);
             if mover.edge.branches.len() > 1 {
-                self.movers[index].1 = self.branch(mover)?;
+                self.movers[index].1 = self.branch(program, mover)?;
             }
         }
         if let Some(update) = &network.before_update {
@@ -750,14 +827,14 @@ impl<'a> Race<'a> {
     }
 
     /// The branch that a mover takes: by weight.
-    fn branch(&mut self, mover: &Instance<'a>) -> Result<u32, Failure> {
+    fn branch(&mut self, program: &Program<'a>, mover: &Instance<'a>) -> Result<u32, Failure> {
         let branches = &mover.edge.branches;
         let stand = self.stand(mover.process as usize);
         let mut weights = Vec::with_capacity(branches.len());
-        for branch in branches {
-            let weight = match branch.weight {
-                Some(weight) => self.machine.real(weight, &mover.values)?,
-                None => 1.0,
+        for branch in 0..branches.len() {
+            let weight = match program.weight(mover, branch) {
+                Number::Known(weight) => weight,
+                Number::Computed(weight) => self.machine.real(weight, &mover.values)?,
             };
             if !(weight >= 0.0 && weight.is_finite()) {
                 return Err(Failure::Weight(stand, mover.id));
@@ -858,8 +935,8 @@ impl<'a> Race<'a> {
     }
 }
 
-/// What a condition of a query says of the state after this time.
 impl Race<'_> {
+    /// What a condition of a query says of the state after this time.
     pub(super) fn mask(&mut self, condition: Condition, ahead: f64) -> Result<Mask, Failure> {
         self.machine.mask(condition, &[], ahead)
     }

@@ -2,9 +2,12 @@
 //!
 //! What is asked is watched at all moments: after every move, and all through every delay.
 
+use std::sync::Arc;
+
+use super::condition::Condition;
 use super::failure::Failure;
-use super::machine::Mask;
-use super::program::Condition;
+use super::machine::{Machine, Mask};
+use super::program::Program;
 use super::race::Race;
 use crate::cancellation;
 use crate::exec::Executor;
@@ -86,6 +89,7 @@ impl Trajectory {
 
 /// Makes runs of a network, one after the other.
 pub struct Runner<'a> {
+    program: Arc<Program<'a>>,
     race: Race<'a>,
 }
 
@@ -93,6 +97,7 @@ impl<'a> Runner<'a> {
     /// What makes runs of a network in the stochastic reading.
     pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Runner<'a> {
         Runner {
+            program: Arc::new(Program::new(network, executor)),
             race: Race::new(network, executor),
         }
     }
@@ -131,8 +136,8 @@ impl<'a> Runner<'a> {
         } else {
             f64::INFINITY
         };
-        let mut look = |race: &mut Race<'_>| -> Result<(), Failure> {
-            let value = race.machine.real(value, &[])?;
+        let mut look = |machine: &mut Machine<'_>| -> Result<(), Failure> {
+            let value = machine.real(value, &[])?;
             extreme = if maximum {
                 extreme.max(value)
             } else {
@@ -140,17 +145,15 @@ impl<'a> Runner<'a> {
             };
             Ok(())
         };
+        let is_timed = self.program.is_timed(value);
         self.until_bound((seed, run), bound, &mut |race, delay| {
-            look(race)?;
-            if delay > 0.0 && delay.is_finite() {
-                let before = race.machine.clone_words();
-                race.machine.advance(delay);
-                look(race)?;
-                race.machine.restore(&before);
+            look(&mut race.machine)?;
+            if is_timed && delay > 0.0 && delay.is_finite() {
+                race.machine.look_ahead(delay, &mut look)?;
             }
             Ok(false)
         })?;
-        look(&mut self.race)?;
+        look(&mut self.race.machine)?;
         Ok((extreme, self.race.moves))
     }
 
@@ -207,12 +210,12 @@ impl<'a> Runner<'a> {
     /// returns true.
     fn until_bound(
         &mut self,
-        (seed, run): (u64, u64),
+        numbers: (u64, u64),
         bound: &RunBound,
         watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
-        let race = &mut self.race;
-        race.start(seed, run)?;
+        let Runner { program, race } = self;
+        race.start(program, numbers)?;
         loop {
             if bound.limit == RunLimit::Moves {
                 race.forget_moves();
@@ -226,7 +229,7 @@ impl<'a> Runner<'a> {
                 watch(race, 0.0)?;
                 return Ok(());
             }
-            let next = race.next()?;
+            let next = race.next(program)?;
             // At the very end of the run it does not matter any more that time cannot pass.
             let is_over = rest < next.delay
                 || (next.winner.is_none() && rest <= next.delay && rest.is_finite());
@@ -247,7 +250,7 @@ impl<'a> Runner<'a> {
                 };
             };
             race.wait(delay);
-            race.take(winner)?;
+            race.take(program, winner)?;
             cancellation::work(UNITS_FOR_MOVE);
         }
     }

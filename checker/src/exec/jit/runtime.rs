@@ -81,15 +81,21 @@ pub(super) fn failure_status(kind: RunTimeErrorKind, SiteId(site): SiteId) -> i6
 }
 
 /// The result of a call by its status.
+#[inline]
 pub(super) fn result_of_status(status: i64) -> Result<i32, RunTimeError> {
     if status >= 0 {
         return Ok(status as i32);
     }
+    Err(error_of_status(status))
+}
+
+#[cold]
+fn error_of_status(status: i64) -> RunTimeError {
     let kind = kinds().nth((status >> 32 & 0xff) as usize);
-    Err(RunTimeError {
+    RunTimeError {
         kind: kind.expect("a status has the number of a kind"),
         site: SiteId(status as u32),
-    })
+    }
 }
 
 /// Lets a call take more rounds of loops; returns its status, an error if it must end here.
