@@ -21,6 +21,8 @@ pub struct Guard {
     /// In the stochastic reading, where `function` returns a mask (see [`super::Chances`]): whether
     /// it leaves the time for which the mask stands.
     pub is_timed: bool,
+    /// In the stochastic reading: whether it is not linear in time even where its clocks are.
+    pub is_curved: bool,
     /// In the stochastic reading: the same condition in parts, where it compares clocks with
     /// numbers that do not change as time passes, and nothing else in it does.
     pub parts: Option<Box<GuardParts>>,

@@ -153,10 +153,6 @@ codes! {
     HOOK_SIGNATURE = "E0281" "hook-signature";
     /// A function that makes the initial state and ends in an error.
     HOOK_FAILS = "E0282" "hook-fails";
-    /// A condition of a statistical query that is not linear in time.
-    CONDITION_CURVED = "E0283" "condition-curved";
-    /// The rate of a clock that changes as time passes.
-    RATE_VARIES = "E0284" "rate-varies";
     /// An invariant that gives a clock two rates.
     RATE_TWICE = "E0285" "rate-twice";
     /// A channel, or a condition on clocks, where a statement is needed.

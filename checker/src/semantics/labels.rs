@@ -94,14 +94,6 @@ impl Checker<'_> {
 
     /// Lowers a conjunction of conditions on real clocks.
     fn make_mask(&mut self, parts: &[Expr], locals: &[LocalId], place: &str) -> Guard {
-        for span in parts.iter().filter_map(curved) {
-            self.error(
-                codes::CONDITION_CURVED,
-                span,
-                "this does not change at a constant rate as time passes",
-                "compare sums of clocks that run at constant rates; multiply them by variables only",
-            );
-        }
         if !self.can_lower() || parts.is_empty() {
             return Guard::default();
         }
@@ -115,6 +107,7 @@ impl Checker<'_> {
         Guard {
             function: Some(function),
             is_timed,
+            is_curved: parts.iter().any(|part| curved(part).is_some()),
             parts: apart.flatten().map(Box::new),
             never_holds: parts.iter().any(|part| part.interval == (0, 0)),
             ..Guard::default()
@@ -212,14 +205,7 @@ impl Checker<'_> {
                     "leave one of them out",
                 );
             }
-            if rate.is_timed() {
-                self.error(
-                    codes::RATE_VARIES,
-                    rate.span,
-                    "statistical queries need rates that stay the same until the next move; this one depends on a clock",
-                    "approximate it by locations with constant rates",
-                );
-            }
+            chances.flows.push(rate.is_timed());
             chances.rated_clocks.push(offset);
             pairs.push((*clock, *rate));
         }

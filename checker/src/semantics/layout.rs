@@ -19,8 +19,10 @@ pub(super) mod chance_words {
     pub(in crate::semantics) const RESULT: u32 = STREAM + STREAM_WORDS as u32;
     /// How far ahead of the state conditions are asked.
     pub(in crate::semantics) const AHEAD: u32 = RESULT + 2;
+    /// Where conditions leave their signature.
+    pub(in crate::semantics) const SIGNATURE: u32 = AHEAD + 2;
     /// All of them.
-    pub(in crate::semantics) const COUNT: u32 = AHEAD + 2;
+    pub(in crate::semantics) const COUNT: u32 = SIGNATURE + 2;
 }
 
 /// From provisional offsets to those of the final layout.
@@ -78,7 +80,12 @@ impl Relocation {
     pub(super) fn network(self, network: &mut Network) {
         self.functions(&mut network.functions);
         let chances = &mut network.chances;
-        let words = [&mut chances.stream, &mut chances.result, &mut chances.ahead];
+        let words = [
+            &mut chances.stream,
+            &mut chances.result,
+            &mut chances.ahead,
+            &mut chances.signature,
+        ];
         for process in &mut network.processes {
             let locations = process.locations.iter_mut().map(|one| &mut one.invariant);
             let edges = process.edges.iter_mut().map(|one| &mut one.guard);

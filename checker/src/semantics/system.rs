@@ -29,6 +29,7 @@ impl Checker<'_> {
                 stream: chance_words::STREAM,
                 result: chance_words::RESULT,
                 ahead: chance_words::AHEAD,
+                signature: chance_words::SIGNATURE,
                 clocks: Vec::new(),
             };
         }

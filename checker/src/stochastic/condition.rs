@@ -16,6 +16,9 @@ pub(super) enum Condition {
     Compared(u32),
     /// It may change as time passes; the function returns its mask.
     Timed(FunctionId),
+    /// It may change as time passes, and is not linear in time: it is only asked of the state as it
+    /// is.
+    Curved(FunctionId),
 }
 
 /// A number that does not change as time passes.
@@ -43,12 +46,16 @@ impl Condition {
         match guard.function {
             _ if guard.never_holds => Condition::Never,
             None => Condition::Always,
+            Some(function) if guard.is_curved => Condition::Curved(function),
             Some(function) if guard.is_timed => Condition::Timed(function),
             Some(function) => Condition::Words(function),
         }
     }
 
     pub(super) fn is_timed(self) -> bool {
-        matches!(self, Condition::Timed(_) | Condition::Compared(_))
+        matches!(
+            self,
+            Condition::Compared(_) | Condition::Timed(_) | Condition::Curved(_)
+        )
     }
 }

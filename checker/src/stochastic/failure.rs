@@ -37,6 +37,8 @@ pub enum Failure {
     Zeno(Stand),
     /// The clock that bounds the run stands still or runs backwards, and nothing can happen.
     BoundNeverReached,
+    /// The value of an expression is no finite number.
+    NoNumber,
     /// A comparison changes more often than numbers can tell apart.
     NoProgress(Stand),
 }

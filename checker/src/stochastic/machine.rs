@@ -135,6 +135,12 @@ impl<'a> Machine<'a> {
         (self.double(offset), self.double(offset + 2))
     }
 
+    /// Gives a clock a value.
+    #[inline]
+    pub(super) fn set_value(&mut self, clock: u32, value: f64) {
+        self.set_double(clock, value);
+    }
+
     #[inline]
     pub(super) fn set_rate(&mut self, clock: u32, rate: f64) {
         self.set_double(clock + 2, rate);
@@ -180,6 +186,10 @@ impl<'a> Machine<'a> {
                 Ok(Mask::constant(bits != 0))
             }
             Condition::Compared(_) => unreachable!("it is asked as a whole"),
+            Condition::Curved(function) => {
+                let (now, _) = self.side(function, arguments)?;
+                Ok(Mask::constant(now))
+            }
             Condition::Timed(function) => {
                 self.set_double(self.network.chances.ahead, ahead);
                 let bits = self.call(function, arguments)?;
@@ -190,6 +200,17 @@ impl<'a> Machine<'a> {
                 })
             }
         }
+    }
+
+    /// Whether a timed condition holds now, and its signature.
+    pub(super) fn side(
+        &mut self,
+        function: FunctionId,
+        arguments: &[i32],
+    ) -> Result<(bool, f64), Failure> {
+        self.set_double(self.network.chances.ahead, 0.0);
+        let bits = self.call(function, arguments)?;
+        Ok((bits & 1 != 0, self.double(self.network.chances.signature)))
     }
 
     /// Whether a condition holds now.

@@ -5,9 +5,12 @@
 
 mod condition;
 mod estimate;
+mod extreme;
 mod failure;
 mod in_order;
+mod integrator;
 mod machine;
+mod motion;
 mod program;
 mod race;
 mod run;

@@ -83,6 +83,8 @@ pub(super) struct Program<'a> {
     followers: Vec<Box<[u32]>>,
     /// Whether some location sets the rate of a clock.
     pub(super) has_rates: bool,
+    /// Whether the rate of some clock may change as time passes.
+    pub(super) has_flows: bool,
     pub(super) has_binary_channels: bool,
 }
 
@@ -102,6 +104,7 @@ impl<'a> Program<'a> {
             rate_readers: FxHashMap::default(),
             followers: Vec::new(),
             has_rates: false,
+            has_flows: false,
             has_binary_channels: network.channels.iter().any(|channel| !channel.broadcast),
         };
         for process in 0..network.processes.len() {
@@ -120,6 +123,7 @@ impl<'a> Program<'a> {
             let inputs = self.add_instances((process, &location.edges), false, machine);
             let chances = &location.chances;
             self.has_rates |= chances.rates.is_some();
+            self.has_flows |= chances.flows.contains(&true);
             let is_plain = self.instances[outputs.0 as usize..outputs.1 as usize]
                 .iter()
                 .all(|one| !one.guard.is_timed() && !one.is_binary && !one.may_be_urgent);
@@ -210,7 +214,9 @@ impl<'a> Program<'a> {
     fn function(&self, condition: Condition) -> Option<FunctionId> {
         match condition {
             Condition::Always | Condition::Never => None,
-            Condition::Words(function) | Condition::Timed(function) => Some(function),
+            Condition::Words(function)
+            | Condition::Timed(function)
+            | Condition::Curved(function) => Some(function),
             Condition::Compared(place) => Some(self.comparisons(place).whole),
         }
     }
@@ -353,10 +359,7 @@ impl<'a> Program<'a> {
 
     /// Whether the result of a function may change as time passes.
     pub(super) fn is_timed(&self, function: FunctionId) -> bool {
-        let words = self.network.layout.words as usize;
-        let read = read_words(self.network, [function], words);
-        let clocks = &self.network.chances.clocks;
-        read.is_none_or(|read| read.iter().any(|word| clocks.binary_search(word).is_ok()))
+        !clocks_of(self.network, function).is_empty()
     }
 
     /// The instances with these numbers.
@@ -392,6 +395,18 @@ impl<'a> Program<'a> {
     /// The processes whose plans depend on where a process is, beside itself.
     pub(super) fn followers(&self, ProcessId(process): ProcessId) -> &[u32] {
         &self.followers[process as usize]
+    }
+}
+
+/// The first words of the clocks whose values a function may read.
+pub(super) fn clocks_of(network: &Network, function: FunctionId) -> Vec<u32> {
+    let clocks = &network.chances.clocks;
+    match read_words(network, [function], network.layout.words as usize) {
+        None => clocks.clone(),
+        Some(mut words) => {
+            words.retain(|word| clocks.binary_search(word).is_ok());
+            words
+        }
     }
 }
 

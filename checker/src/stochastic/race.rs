@@ -19,14 +19,17 @@
 //!
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
+use rustc_hash::FxHashMap;
+
 use super::condition::{Condition, Number};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
-use super::program::{Channel, Instance, Program, Spot};
+use super::motion::Motion;
+use super::program::{Channel, Instance, Program, Spot, clocks_of};
 use super::span::Span;
 use super::windows::Windows;
 use crate::exec::Executor;
-use crate::ir::{Branch, LocationId, Network, ProcessId, Update, Urgency};
+use crate::ir::{Branch, FunctionId, LocationId, Network, ProcessId, Update, Urgency};
 
 /// So many moves in less than [`ZENO_TIME`] are taken for a run that never gets on.
 pub const ZENO_MOVES: u64 = 100_000;
@@ -38,6 +41,9 @@ const TOLERANCE: f64 = 1e-12;
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 100_000;
+
+/// How much longer than the rest of a run an invariant is looked at.
+const FAR_BEYOND: f64 = 1000.0;
 
 /// After this number of moves plans that wait for a clock are drawn anew, so that the rounding of
 /// the delays in between does not add up.
@@ -69,6 +75,16 @@ pub(super) struct Race<'a> {
     /// How many processes are in committed locations.
     committed: usize,
     windows: Windows,
+    pub(super) motion: Motion,
+    /// By process: whether its plan was found by looking along the motion of clocks. It reaches only
+    /// until somebody moves.
+    is_stepped: Vec<bool>,
+    /// How long the run may still last.
+    rest: f64,
+    /// How far ahead conditions are looked at along the motion of clocks.
+    until: f64,
+    /// The clocks that conditions read.
+    clocks_of: FxHashMap<FunctionId, Box<[u32]>>,
     /// Whose rates apply to a clock: by its place among the clocks of the network.
     rated_by: Vec<Option<u32>>,
     movers: Vec<(u32, u32)>,
@@ -84,7 +100,11 @@ pub(super) struct Race<'a> {
 }
 
 impl<'a> Race<'a> {
-    pub(super) fn new(network: &'a Network, executor: &'a dyn Executor) -> Race<'a> {
+    pub(super) fn new(
+        network: &'a Network,
+        executor: &'a dyn Executor,
+        fixed_step: Option<f64>,
+    ) -> Race<'a> {
         let processes = network.processes.len();
         Race {
             machine: Machine::new(network, executor),
@@ -96,6 +116,11 @@ impl<'a> Race<'a> {
             locations: vec![LocationId(0); processes],
             committed: 0,
             windows: Windows::default(),
+            motion: Motion::new(fixed_step),
+            is_stepped: vec![false; processes],
+            rest: f64::INFINITY,
+            until: f64::INFINITY,
+            clocks_of: FxHashMap::default(),
             rated_by: vec![None; network.chances.clocks.len()],
             movers: Vec::new(),
             choices: Vec::new(),
@@ -124,6 +149,8 @@ impl<'a> Race<'a> {
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
         self.stale.clear();
+        self.is_stepped.fill(false);
+        self.motion.end();
         for process in 0..self.locations.len() {
             let location = self.machine.location(process);
             self.locations[process] = location;
@@ -140,8 +167,34 @@ impl<'a> Race<'a> {
             for process in 0..self.locations.len() {
                 self.set_rates(process)?;
             }
+            self.find_flows(program);
         }
         Ok(())
+    }
+
+    /// Finds which clocks flow in the present locations.
+    fn find_flows(&mut self, program: &Program<'a>) {
+        if !program.has_flows {
+            return;
+        }
+        let network = self.network();
+        let flows = network
+            .processes
+            .iter()
+            .enumerate()
+            .filter_map(|(process, known)| {
+                let stand = self.stand(process);
+                let chances = &known.locations[stand.location.0 as usize].chances;
+                let rated = chances.rated_clocks.iter().zip(&chances.flows);
+                let clocks: Vec<u32> = rated
+                    .filter(|(_, flows)| **flows)
+                    .map(|(&clock, _)| clock)
+                    .collect();
+                let rates = chances.rates.filter(|_| !clocks.is_empty())?;
+                Some((rates, stand, clocks))
+            });
+        let flows: Vec<_> = flows.collect();
+        self.motion.set_flows(flows);
     }
 
     fn network(&self) -> &'a Network {
@@ -168,8 +221,9 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Draws what comes next.
-    pub(super) fn next(&mut self, program: &Program<'a>) -> Result<Next, Failure> {
+    /// Draws what comes next, if it comes before the end of the run, `rest` from now.
+    pub(super) fn next(&mut self, program: &Program<'a>, rest: f64) -> Result<Next, Failure> {
+        self.rest = rest;
         self.plan_anew(program)?;
         if self.committed > 0 {
             return self.next_committed(program);
@@ -272,11 +326,22 @@ impl<'a> Race<'a> {
 
     /// Lets all processes plan whose plans may have changed.
     fn plan_anew(&mut self, program: &Program<'a>) -> Result<(), Failure> {
-        // The order of random numbers is that of processes.
-        self.stale.sort_unstable();
+        // The order of random numbers is that of processes. Those who look along the motion of
+        // clocks come last, so that they need not look farther than to the first attempt.
+        let is_stepped = &self.is_stepped;
+        self.stale
+            .sort_unstable_by_key(|&process| (is_stepped[process as usize], process));
         for index in 0..self.stale.len() {
             let process = self.stale[index] as usize;
             self.is_stale[process] = false;
+            if self.is_stepped[process] {
+                self.is_stepped[process] = false;
+                self.attempts[process] = f64::INFINITY;
+                let first = self.attempts.iter().copied().fold(self.rest, f64::min);
+                self.until = first.max(0.0);
+            } else {
+                self.until = self.rest;
+            }
             self.plan(program, process)?;
         }
         self.stale.clear();
@@ -340,6 +405,9 @@ impl<'a> Race<'a> {
         spot: &Spot,
         process: usize,
     ) -> Result<f64, Failure> {
+        if self.steps(program, spot.invariant) {
+            return self.stepped_bound(program, spot, process);
+        }
         if let Condition::Compared(_) = spot.invariant {
             let span = self.span(program, spot.invariant, &[])?;
             let is_broken = |span: Option<Span>| span.is_none_or(|span| span.low > 0.0);
@@ -368,6 +436,65 @@ impl<'a> Race<'a> {
         Err(Failure::NoProgress(self.stand(process)))
     }
 
+    /// How long a process may stay where it is, if that is found by looking along the motion of
+    /// clocks: not beyond the end of the run, but where a process without a rate needs to know, which
+    /// is far beyond it.
+    fn stepped_bound(
+        &mut self,
+        program: &Program<'a>,
+        spot: &Spot,
+        process: usize,
+    ) -> Result<f64, Failure> {
+        self.is_stepped[process] = true;
+        let until = self.until;
+        let needs_bound = spot.exponential_rate.is_none() && spot.outputs.0 < spot.outputs.1;
+        self.until = self.rest * if needs_bound { FAR_BEYOND } else { 1.0 };
+        let mut ahead = 0.0;
+        let found = loop {
+            // When it changes again is not asked of an invariant that does not hold.
+            let until = std::mem::replace(&mut self.until, ahead);
+            let mask = self.mask_of(program, spot.invariant, &[], ahead)?;
+            self.until = until;
+            if ahead == 0.0 && !mask.now {
+                return Err(Failure::InvariantBroken(self.stand(process)));
+            }
+            if !mask.behind {
+                break ahead;
+            }
+            let mask = self.mask_of(program, spot.invariant, &[], ahead)?;
+            if mask.horizon.is_infinite() {
+                break f64::INFINITY;
+            }
+            ahead += mask.horizon;
+        };
+        self.until = until;
+        Ok(found)
+    }
+
+    /// Whether a condition is looked at along the motion of clocks.
+    fn steps(&mut self, program: &Program<'a>, condition: Condition) -> bool {
+        match condition {
+            Condition::Curved(_) => true,
+            Condition::Always | Condition::Never | Condition::Words(_) => false,
+            Condition::Compared(_) | Condition::Timed(_) if !self.motion.is_flowing() => false,
+            Condition::Compared(place) => {
+                let mut bounds = program.comparisons(place).bounds.iter();
+                bounds.any(|&(clock, _, _)| self.motion.flows(clock))
+            }
+            Condition::Timed(function) => self.reads_flow(function),
+        }
+    }
+
+    /// Whether a function reads a clock that flows.
+    pub(super) fn reads_flow(&mut self, function: FunctionId) -> bool {
+        let network = self.network();
+        let clocks = self
+            .clocks_of
+            .entry(function)
+            .or_insert_with(|| clocks_of(network, function).into_boxed_slice());
+        clocks.iter().any(|&clock| self.motion.flows(clock))
+    }
+
     /// The delay of a process that may stay until `bound`.
     fn draw(
         &mut self,
@@ -378,6 +505,10 @@ impl<'a> Race<'a> {
     ) -> Result<f64, Failure> {
         let mut windows = std::mem::take(&mut self.windows);
         windows.clear();
+        if bound.is_finite() {
+            // A uniform delay is drawn from all of its windows.
+            self.until = bound;
+        }
         let urgent = self.output_windows(program, spot, bound, &mut windows);
         let delay =
             urgent.and_then(|urgent| Ok(self.drawn(spot, process, bound, &windows)?.min(urgent)));
@@ -465,7 +596,9 @@ impl<'a> Race<'a> {
         bound: f64,
         windows: &mut Windows,
     ) -> Result<f64, Failure> {
-        if matches!(instance.guard, Condition::Compared(_)) && !instance.is_binary {
+        let steps = self.steps(program, instance.guard);
+        self.is_stepped[instance.process as usize] |= steps;
+        if matches!(instance.guard, Condition::Compared(_)) && !instance.is_binary && !steps {
             let span = self.span(program, instance.guard, &instance.values)?;
             let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
             let Some(span) = span.filter(|span| span.low <= latest) else {
@@ -591,10 +724,17 @@ impl<'a> Race<'a> {
         values: &[i32],
         ahead: f64,
     ) -> Result<Mask, Failure> {
+        let steps = self.steps(program, condition);
         let whole = match condition {
             Condition::Compared(place) => Condition::Timed(program.comparisons(place).whole),
             other => other,
         };
+        if let (true, Condition::Timed(function) | Condition::Curved(function)) = (steps, whole) {
+            let asked = (function, values);
+            return self
+                .motion
+                .mask(&mut self.machine, asked, ahead, self.until);
+        }
         self.machine.mask(whole, values, ahead)
     }
 
@@ -673,9 +813,14 @@ impl<'a> Race<'a> {
     }
 
     /// Lets time pass.
-    pub(super) fn wait(&mut self, delay: f64) {
+    pub(super) fn wait(&mut self, delay: f64) -> Result<(), Failure> {
         if delay > 0.0 {
-            self.machine.advance(delay);
+            if self.motion.is_flowing() {
+                self.motion.go_to(&mut self.machine, delay)?;
+                self.motion.end();
+            } else {
+                self.machine.advance(delay);
+            }
             self.time += delay;
             for attempt in &mut self.attempts {
                 *attempt -= delay;
@@ -684,10 +829,17 @@ impl<'a> Race<'a> {
                 *bound -= delay;
             }
         }
+        Ok(())
     }
 
     /// Lets a process move, if it can after all.
     pub(super) fn take(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
+        self.motion.end();
+        for process in 0..self.is_stepped.len() {
+            if self.is_stepped[process] {
+                self.make_stale(process as u32);
+            }
+        }
         if !self.find_outputs(program, process)? {
             // Rounding has put the delay beside the window: it is drawn again.
             self.make_stale(process as u32);
@@ -875,8 +1027,10 @@ impl<'a> Race<'a> {
         for process in 0..self.locations.len() {
             self.set_rates(process)?;
         }
+        self.find_flows(program);
         for (&clock, before) in clocks.iter().zip(before) {
-            if self.machine.clock(clock).1.to_bits() != before.to_bits()
+            if !self.motion.flows(clock)
+                && self.machine.clock(clock).1.to_bits() != before.to_bits()
                 && let Some(readers) = program.rate_readers.get(&clock)
             {
                 for &reader in readers {
@@ -936,8 +1090,35 @@ impl<'a> Race<'a> {
 }
 
 impl Race<'_> {
-    /// What a condition of a query says of the state after this time.
-    pub(super) fn mask(&mut self, condition: Condition, ahead: f64) -> Result<Mask, Failure> {
-        self.machine.mask(condition, &[], ahead)
+    /// What a condition of a query says of the state after this time; changes are looked for until
+    /// the delay is over.
+    pub(super) fn mask(
+        &mut self,
+        condition: Condition,
+        ahead: f64,
+        delay: f64,
+    ) -> Result<Mask, Failure> {
+        let function = match condition {
+            Condition::Curved(function) => function,
+            Condition::Timed(function) if self.motion.is_flowing() && self.reads_flow(function) => {
+                function
+            }
+            _ => return self.machine.mask(condition, &[], ahead),
+        };
+        let asked: (FunctionId, &[i32]) = (function, &[]);
+        self.motion.mask(&mut self.machine, asked, ahead, delay)
+    }
+
+    /// Looks at the state after this time, if nothing happens until then.
+    pub(super) fn look_ahead<R>(
+        &mut self,
+        time: f64,
+        look: impl FnOnce(&mut Machine<'_>) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        if self.motion.is_flowing() {
+            self.motion.look(&mut self.machine, time, look)
+        } else {
+            self.machine.look_ahead(time, look)
+        }
     }
 }

@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 use super::condition::Condition;
+use super::extreme::Extreme;
 use super::failure::Failure;
 use super::machine::{Machine, Mask};
 use super::program::Program;
@@ -15,6 +16,9 @@ use crate::ir::{FunctionId, Network, Path, RunBound, RunLimit, Simulation};
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
+
+/// Moves so near to the bound, as a part of it, come at the bound.
+const TOLERANCE: f64 = 1e-12;
 
 /// What a move takes: see [`cancellation::work`].
 const UNITS_FOR_MOVE: usize = 256;
@@ -49,21 +53,19 @@ const SAMPLES: f64 = 300.0;
 const MOST_POINTS: usize = 100_000;
 
 impl Trajectory {
-    /// Records the values of a state that comes after the time of the race by `ahead`; within a
-    /// delay only those that are not linear.
+    /// Records the values of a state at a time; within a delay only those that are not linear.
     fn record(
         &mut self,
-        race: &mut Race<'_>,
+        machine: &mut Machine<'_>,
         asked: &Simulation,
-        ahead: f64,
-        is_end: bool,
+        (time, is_end): (f64, bool),
+        flows: bool,
     ) -> Result<(), Failure> {
-        let time = race.time + ahead;
         for (item, points) in asked.items.iter().zip(&mut self.points) {
-            if !(is_end || item.is_curved) {
+            if !(is_end || item.is_curved || flows) {
                 continue;
             }
-            let value = race.machine.real(item.value, &[])?;
+            let value = machine.real(item.value, &[])?;
             if let [.., before, last] = &mut points[..]
                 && before.1.to_bits() == value.to_bits()
                 && last.1.to_bits() == value.to_bits()
@@ -96,9 +98,19 @@ pub struct Runner<'a> {
 impl<'a> Runner<'a> {
     /// What makes runs of a network in the stochastic reading.
     pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Runner<'a> {
+        Runner::with_step(network, executor, None)
+    }
+
+    /// The same; differential equations are solved by Euler's method with this step, adaptively
+    /// without one.
+    pub fn with_step(
+        network: &'a Network,
+        executor: &'a dyn Executor,
+        fixed_step: Option<f64>,
+    ) -> Runner<'a> {
         Runner {
             program: Arc::new(Program::new(network, executor)),
-            race: Race::new(network, executor),
+            race: Race::new(network, executor, fixed_step),
         }
     }
 
@@ -122,8 +134,7 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// The least or greatest value of an expression in run number `run` of a seed. Between two
-    /// moves it is looked at where a delay begins and where it ends.
+    /// The least or greatest value of an expression in run number `run` of a seed.
     pub fn extreme(
         &mut self,
         (seed, run): (u64, u64),
@@ -131,30 +142,17 @@ impl<'a> Runner<'a> {
         value: FunctionId,
         maximum: bool,
     ) -> Result<(f64, u64), Failure> {
-        let mut extreme = if maximum {
-            f64::NEG_INFINITY
-        } else {
-            f64::INFINITY
-        };
-        let mut look = |machine: &mut Machine<'_>| -> Result<(), Failure> {
-            let value = machine.real(value, &[])?;
-            extreme = if maximum {
-                extreme.max(value)
-            } else {
-                extreme.min(value)
-            };
-            Ok(())
-        };
         let is_timed = self.program.is_timed(value);
+        let mut extreme = Extreme::new(value, maximum);
         self.until_bound((seed, run), bound, &mut |race, delay| {
-            look(&mut race.machine)?;
+            extreme.look(&mut race.machine)?;
             if is_timed && delay > 0.0 && delay.is_finite() {
-                race.machine.look_ahead(delay, &mut look)?;
+                extreme.look_through(race, delay)?;
             }
             Ok(false)
         })?;
-        look(&mut self.race.machine)?;
-        Ok((extreme, self.race.moves))
+        extreme.look(&mut self.race.machine)?;
+        Ok((extreme.value(), self.race.moves))
     }
 
     /// Run number `run` of a seed, as the values of expressions over time; until what it must
@@ -174,11 +172,11 @@ impl<'a> Runner<'a> {
             .as_ref()
             .map(|(reached, _)| Path::Eventually(reached.clone()));
         let step = asked.bound.value / SAMPLES;
-        let is_sampled = asked.bound.limit == RunLimit::Time
-            && step > 0.0
-            && asked.items.iter().any(|item| item.is_curved);
+        let is_sampled = asked.bound.limit == RunLimit::Time && step > 0.0;
+        let is_curved = asked.items.iter().any(|item| item.is_curved);
         self.until_bound((seed, run), &asked.bound, &mut |race, delay| {
-            trajectory.record(race, asked, 0.0, true)?;
+            let start = race.time;
+            trajectory.record(&mut race.machine, asked, (start, true), false)?;
             let mut shown = delay;
             if let Some(path) = &reached
                 && let Some((true, ahead)) = watched(race, path, delay)?
@@ -186,20 +184,21 @@ impl<'a> Runner<'a> {
                 trajectory.satisfied = true;
                 shown = ahead;
             }
-            if shown > 0.0 && shown.is_finite() {
-                let before = race.machine.clone_words();
-                let mut ahead = 0.0;
-                while ahead < shown {
-                    let next = if is_sampled {
-                        shown.min(ahead + step)
-                    } else {
-                        shown
-                    };
-                    race.machine.advance(next - ahead);
-                    ahead = next;
-                    trajectory.record(race, asked, ahead, ahead >= shown)?;
-                }
-                race.machine.restore(&before);
+            let flows = race.motion.is_flowing();
+            let mut ahead = 0.0;
+            while ahead < shown && shown.is_finite() {
+                let next = if !(flows || is_curved) {
+                    shown
+                } else if is_sampled {
+                    ahead + step
+                } else {
+                    race.motion.next_look(&mut race.machine, ahead)?
+                };
+                ahead = shown.min(next);
+                let moment = (start + ahead, ahead >= shown);
+                race.look_ahead(ahead, |machine| {
+                    trajectory.record(machine, asked, moment, flows)
+                })?;
             }
             Ok(reached.is_some() && trajectory.satisfied)
         })?;
@@ -225,20 +224,26 @@ impl<'a> Runner<'a> {
                 }
             }
             let rest = rest(race, bound);
-            if rest <= 0.0 {
-                watch(race, 0.0)?;
-                return Ok(());
-            }
-            let next = race.next(program)?;
-            // At the very end of the run it does not matter any more that time cannot pass.
-            let is_over = rest < next.delay
-                || (next.winner.is_none() && rest <= next.delay && rest.is_finite());
-            let delay = next.delay.min(rest);
+            let next = race.next(program, rest)?;
+            let rest = match bound.limit {
+                RunLimit::Clock(clock) if race.motion.flows(clock) => {
+                    let goal = (clock, bound.value);
+                    let reached = race.motion.reach(&mut race.machine, goal, next.delay)?;
+                    reached.unwrap_or(f64::INFINITY)
+                }
+                _ => rest,
+            };
+            // Moves at the very moment of the bound still count. If nobody moves then, it does not
+            // matter any more that time cannot pass.
+            let slack = TOLERANCE * bound.value.max(1.0);
+            let is_over = rest + slack < next.delay
+                || (next.winner.is_none() && rest.is_finite() && rest <= next.delay + slack);
+            let delay = next.delay.min(rest).max(0.0);
             if watch(race, delay)? {
                 return Ok(());
             }
             if is_over {
-                race.wait(rest);
+                race.wait(delay)?;
                 return Ok(());
             }
             let Some(winner) = next.winner else {
@@ -249,7 +254,7 @@ impl<'a> Runner<'a> {
                     None => Err(Failure::BoundNeverReached),
                 };
             };
-            race.wait(delay);
+            race.wait(delay)?;
             race.take(program, winner)?;
             cancellation::work(UNITS_FOR_MOVE);
         }
@@ -259,12 +264,15 @@ impl<'a> Runner<'a> {
 /// How much time the bound leaves if nothing happens.
 fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
     match bound.limit {
-        RunLimit::Time => bound.value - race.time,
+        RunLimit::Time => (bound.value - race.time).max(0.0),
         RunLimit::Moves => f64::INFINITY,
         RunLimit::Clock(clock) => {
             let (value, rate) = race.machine.clock(clock);
             if value >= bound.value {
                 0.0
+            } else if race.motion.flows(clock) {
+                // It is found when it is known how long nothing happens.
+                f64::INFINITY
             } else if rate > 0.0 {
                 (bound.value - value) / rate
             } else {
@@ -279,16 +287,17 @@ fn watched(race: &mut Race<'_>, path: &Path, delay: f64) -> Result<Option<(bool,
     let mut ahead = 0.0;
     for _ in 0..MOST_CHANGES {
         let (keep, reach) = match path {
-            Path::Eventually(goal) => {
-                (Mask::constant(true), race.mask(Condition::of(goal), ahead)?)
-            }
+            Path::Eventually(goal) => (
+                Mask::constant(true),
+                race.mask(Condition::of(goal), ahead, delay)?,
+            ),
             Path::Always(keep) => (
-                race.mask(Condition::of(keep), ahead)?,
+                race.mask(Condition::of(keep), ahead, delay)?,
                 Mask::constant(false),
             ),
             Path::Until(keep, goal) => (
-                race.mask(Condition::of(keep), ahead)?,
-                race.mask(Condition::of(goal), ahead)?,
+                race.mask(Condition::of(keep), ahead, delay)?,
+                race.mask(Condition::of(goal), ahead, delay)?,
             ),
         };
         if reach.now || !keep.now {

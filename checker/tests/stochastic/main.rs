@@ -12,6 +12,7 @@ use checker::semantics::{self, Reading};
 use checker::stochastic::{Failure, Runner};
 use checker::syntax;
 
+mod flows;
 mod refusals;
 mod values;
 

@@ -140,20 +140,6 @@ fn two_rates_of_one_clock_are_a_failure() {
 }
 
 #[test]
-fn what_is_not_linear_in_time_is_refused() {
-    let model = "
-        clock x, y;
-        process P() { state a { x <= 5 }, b; init a; trans a -> b { guard x * y >= 3; }; }
-        system P;";
-    refused(model, "Pr[<=9](<> P.b)", "E0283");
-    let model = "
-        clock x, y;
-        process P() { state a { x' == y && x <= 5 }, b; init a; trans a -> b { }; }
-        system P;";
-    refused(model, "Pr[<=9](<> P.b)", "E0284");
-}
-
-#[test]
 fn bounds_are_known_numbers() {
     let model = "int n = 3; clock x; process P() { state a; init a; } system P;";
     refused(model, "Pr[<=n](<> P.a)", "E0213");

@@ -1,7 +1,7 @@
 //! Probabilities and expectations that have closed forms.
 
 use checker::ir::Statistical;
-use checker::stochastic::{Precision, Runner, simulate};
+use checker::stochastic::{Failure, Precision, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -407,4 +407,45 @@ fn a_filter_ends_the_run_where_it_holds() {
         estimate.lower < 0.25 && 0.25 < estimate.upper,
         "{estimate:?}"
     );
+}
+
+#[test]
+fn moves_at_the_bound_count() {
+    let model = "
+        clock x;
+        process A() { state a { x <= 3 }, out; init a; trans a -> out { guard x >= 3; }; }
+        process B() {
+            state a { x <= 3 }, b, out;
+            commit b;
+            init a;
+            trans a -> b { guard x >= 3; }, b -> out { };
+        }
+        first = A(); second = A(); third = B();
+        system first, second, third;";
+    expect(
+        model,
+        "Pr[<=3](<> first.out && second.out && third.out)",
+        1.0,
+    );
+    expect(
+        model,
+        "Pr[<=2.9](<> first.out || second.out || third.b)",
+        0.0,
+    );
+}
+
+#[test]
+fn a_value_that_is_no_number_is_an_error() {
+    let model = "
+        double v = 0.0;
+        process P() { state a { ; 5 }, b; init a; trans a -> b { assign v = sqrt(0 - 1.0); }; }
+        system P;";
+    let (network, query) = load(model, "E[<=9; 50](max: v)").unwrap();
+    let &Statistical::Expectation { value, .. } = &query.kind else {
+        panic!("it is an expectation");
+    };
+    let [_, jit] = executors(&network);
+    let mut runner = Runner::new(&network, &*jit);
+    let failed = runner.extreme((1, 0), bound_of(&query), value, true);
+    assert_eq!(failed, Err(Failure::NoNumber));
 }

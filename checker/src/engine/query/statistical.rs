@@ -219,6 +219,11 @@ impl LoadedModel {
                     .to_owned(),
                 "bound the run by time: [<=100]",
             ),
+            Failure::NoNumber => (
+                query,
+                "the value of the expression is no finite number in some run".to_owned(),
+                "keep arguments of functions in their domains, and divisors away from 0",
+            ),
             Failure::NoProgress(stand) => (
                 span(stand),
                 format!(

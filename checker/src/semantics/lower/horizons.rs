@@ -6,8 +6,13 @@
 //! holds at that moment, bit 1 whether it holds in the open interval behind it. It leaves in the
 //! words RESULT for how long bit 1 stays as it is, at least; infinity if for ever.
 //!
-//! Between two moves every clock is linear in time, so every term that [`curved`] lets pass is
-//! linear too, and comes as its value with its slope (forward differentiation).
+//! Where every clock is linear in time, every term that [`curved_number`] lets pass is linear too,
+//! and comes as its value with its slope (forward differentiation). A condition with other terms is
+//! *curved*: its mask is only good for the very state that the words hold, with AHEAD at 0, and
+//! says nothing of what comes behind. So is any mask if the rate of a clock in it changes as time
+//! passes. To find when such conditions change, the function also leaves a *signature*: a number
+//! that depends on which side of each comparison is the greater, and stays the same as long as none
+//! of these changes.
 //!
 //! Invariants:
 //! * The right side of `&&` is evaluated only if the left side may hold, that of `||` only if it
@@ -33,6 +38,9 @@ const TOLERANCE: f64 = 1e-12;
 /// Holds at the moment and behind it.
 const ALWAYS: i32 = 3;
 
+/// A signature is a polynomial in this number, so that the order of comparisons counts.
+const SIGNATURE_BASE: f64 = 0.97;
+
 /// A number that is linear in time: its value, and its slope unless that is 0.
 #[derive(Clone, Copy)]
 struct Linear {
@@ -45,6 +53,7 @@ struct Linear {
 struct Horizon {
     ahead: Register,
     horizon: Register,
+    signature: Register,
 }
 
 impl Builder<'_> {
@@ -60,6 +69,7 @@ impl Builder<'_> {
         let shared = is_timed.then(|| Horizon {
             ahead: self.load(word_pair(chance_words::AHEAD), &Type::Double),
             horizon: self.double(f64::INFINITY),
+            signature: self.double(0.0),
         });
         for condition in conditions {
             if let (Some(shared), true) = (shared, condition.is_timed()) {
@@ -86,8 +96,12 @@ impl Builder<'_> {
     }
 
     fn leave_horizon(&mut self, shared: Option<Horizon>) {
-        if let Some(Horizon { horizon, .. }) = shared {
+        if let Some(shared) = shared {
+            let Horizon {
+                horizon, signature, ..
+            } = shared;
             self.store(word_pair(chance_words::RESULT), horizon, &Type::Double);
+            self.store(word_pair(chance_words::SIGNATURE), signature, &Type::Double);
         }
     }
 
@@ -168,12 +182,35 @@ impl Builder<'_> {
                 result
             }
             Kind::CompareReal(relation, left, right) => {
-                let left = self.linear(left, shared);
-                let right = self.linear(right, shared);
+                let [left, right] = [left, right].map(|side| {
+                    if curved_number(side).is_some() {
+                        let value = self.value(side);
+                        Linear { value, slope: None }
+                    } else {
+                        self.linear(side, shared)
+                    }
+                });
                 self.compared(*relation, left, right, shared, expr.span)
             }
-            other => unreachable!("checking leaves no such condition: {other:?}"),
+            _ => {
+                let mask = self.untimed(expr);
+                self.sign(mask, shared);
+                mask
+            }
         }
+    }
+
+    /// Adds what is known of a part to the signature.
+    fn sign(&mut self, code: Register, shared: Horizon) {
+        let base = self.double(SIGNATURE_BASE);
+        let before = self.real(DoubleOperator::Multiply, shared.signature, base);
+        let target = self.register(RegisterType::Double);
+        self.emit(Instruction::IntegerToDouble {
+            target,
+            source: code,
+        });
+        let signature = self.real(DoubleOperator::Add, before, target);
+        self.copy(shared.signature, signature);
     }
 
     /// The mask of what does not change as time passes.
@@ -339,6 +376,10 @@ impl Builder<'_> {
         let at_least = self.real_related(Relation::GreaterEqual, gap, minus);
         let near = self.bits(IntegerOperator::And, at_most, at_least, span);
         self.bound_horizon(gap, slope, near, shared, span);
+        let one = self.integer(1);
+        let at_least_code = self.bits(IntegerOperator::ShiftLeft, at_least, one, span);
+        let code = self.bits(IntegerOperator::Or, at_most, at_least_code, span);
+        self.sign(code, shared);
         // What holds behind the moment where the two are equal depends on the slope.
         let (now, turned, keeps) = match relation {
             Relation::LessEqual => (at_most, Relation::Greater, false),
@@ -456,7 +497,7 @@ impl Builder<'_> {
     }
 }
 
-/// The first part of a condition that is not linear in time, and so cannot be lowered.
+/// The first part of a condition that is not linear in time even where clocks are.
 pub(in crate::semantics) fn curved(condition: &Expr) -> Option<Span> {
     if !condition.is_timed() {
         return None;

@@ -1,0 +1,283 @@
+//! What clocks do while nothing else happens, where some of them *flow*: their rates change as time
+//! passes. And conditions there, which change where a comparison changes its side.
+//!
+//! Times are counted from the last move. Invariant: unless a function says otherwise, the words of
+//! the machine are those of time 0.
+
+use super::failure::{Failure, Stand};
+use super::integrator::Integrator;
+use super::machine::{Machine, Mask};
+use crate::cancellation;
+use crate::ir::FunctionId;
+
+/// A step of the integrator is looked at so many times.
+const LOOKS: f64 = 4.0;
+/// Where no clock flows, conditions that are not linear in time are looked at so often.
+const STEP_OF_LOOKS: f64 = 0.01;
+/// How far behind a moment a condition is asked what holds behind it, as a part of the time to the
+/// next look.
+const NUDGE: f64 = 1e-9;
+/// Nothing is looked for behind this time.
+const LAST_LOOK: f64 = 1e12;
+/// What a look takes: see [`cancellation::work`].
+const UNITS_FOR_LOOK: usize = 256;
+
+/// The clocks of a network between two moves.
+#[derive(Debug, Default)]
+pub(super) struct Motion {
+    integrator: Integrator,
+    /// The first words of the clocks that flow.
+    flowing: Vec<u32>,
+    /// What sets their rates, and who does.
+    rates: Vec<(FunctionId, Stand)>,
+    /// All clocks at time 0: their first words, values and rates.
+    base: Vec<(u32, f64, f64)>,
+    has_begun: bool,
+    values: Vec<f64>,
+}
+
+impl Motion {
+    /// With steps of this length, by Euler's method; adaptive ones without it.
+    pub(super) fn new(fixed_step: Option<f64>) -> Motion {
+        Motion {
+            integrator: Integrator::new(fixed_step),
+            ..Motion::default()
+        }
+    }
+
+    /// Says which clocks flow, and what sets their rates.
+    pub(super) fn set_flows(
+        &mut self,
+        flows: impl IntoIterator<Item = (FunctionId, Stand, Vec<u32>)>,
+    ) {
+        self.flowing.clear();
+        self.rates.clear();
+        for (function, stand, clocks) in flows {
+            self.rates.push((function, stand));
+            self.flowing.extend(clocks);
+        }
+        self.has_begun = false;
+    }
+
+    pub(super) fn is_flowing(&self) -> bool {
+        !self.flowing.is_empty()
+    }
+
+    /// Whether a clock flows.
+    pub(super) fn flows(&self, clock: u32) -> bool {
+        self.flowing.contains(&clock)
+    }
+
+    /// Says that the words of the machine are those of time 0 now.
+    pub(super) fn end(&mut self) {
+        self.has_begun = false;
+    }
+
+    fn begin(&mut self, machine: &Machine<'_>) {
+        if self.has_begun {
+            return;
+        }
+        self.has_begun = true;
+        self.base.clear();
+        for &clock in &machine.network.chances.clocks {
+            let (value, rate) = machine.clock(clock);
+            self.base.push((clock, value, rate));
+        }
+        self.values.clear();
+        let flowing = self.flowing.iter();
+        self.values
+            .extend(flowing.map(|&clock| machine.clock(clock).0));
+        self.integrator.begin(&self.values);
+    }
+
+    /// Makes the words of the machine those of a time.
+    pub(super) fn go_to(&mut self, machine: &mut Machine<'_>, time: f64) -> Result<(), Failure> {
+        self.begin(machine);
+        if !self.is_flowing() {
+            linear(machine, &self.base, time);
+            return Ok(());
+        }
+        let (base, flowing, rates) = (&self.base, &self.flowing, &self.rates);
+        let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
+            slopes_at(machine, (base, flowing, rates), time, values, target)
+        };
+        self.integrator.at(time, &mut slopes, &mut self.values)?;
+        linear(machine, &self.base, time);
+        for (&clock, &value) in self.flowing.iter().zip(&self.values) {
+            machine.set_value(clock, value);
+        }
+        Ok(())
+    }
+
+    /// Makes the words of the machine those of time 0 again.
+    fn go_back(&self, machine: &mut Machine<'_>) {
+        for &(clock, value, rate) in &self.base {
+            machine.set_value(clock, value);
+            machine.set_rate(clock, rate);
+        }
+    }
+
+    /// Looks at the state at a time.
+    pub(super) fn look<R>(
+        &mut self,
+        machine: &mut Machine<'_>,
+        time: f64,
+        look: impl FnOnce(&mut Machine<'_>) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
+        let arrived = self.go_to(machine, time);
+        let found = arrived.and_then(|()| look(machine));
+        self.go_back(machine);
+        found
+    }
+
+    /// The next time behind this one at which something that changes is looked at.
+    pub(super) fn next_look(
+        &mut self,
+        machine: &mut Machine<'_>,
+        time: f64,
+    ) -> Result<f64, Failure> {
+        self.begin(machine);
+        if !self.is_flowing() {
+            return Ok(time + self.integrator.fixed_step.unwrap_or(STEP_OF_LOOKS));
+        }
+        let (base, flowing, rates) = (&self.base, &self.flowing, &self.rates);
+        let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
+            slopes_at(machine, (base, flowing, rates), time, values, target)
+        };
+        let found = self.integrator.step_behind(time, &mut slopes);
+        self.go_back(machine);
+        let (start, length) = found?;
+        let part = ((time - start) / length * LOOKS).floor() + 1.0;
+        let next = start + length * (part / LOOKS);
+        Ok(if next > time { next } else { start + length })
+    }
+
+    /// The mask of a condition after a time; its horizon is when it changes next, infinity if that
+    /// is not before `until`.
+    pub(super) fn mask(
+        &mut self,
+        machine: &mut Machine<'_>,
+        (function, arguments): (FunctionId, &[i32]),
+        time: f64,
+        until: f64,
+    ) -> Result<Mask, Failure> {
+        let ask = |motion: &mut Motion, machine: &mut Machine<'_>, time: f64| {
+            motion.look(machine, time, |machine| machine.side(function, arguments))
+        };
+        let (now, _) = ask(self, machine, time)?;
+        let mut next = self.next_look(machine, time)?;
+        let mut known = time + NUDGE * (next - time);
+        let (behind, side) = ask(self, machine, known)?;
+        if time >= until {
+            return Ok(Mask {
+                now,
+                behind,
+                horizon: f64::INFINITY,
+            });
+        }
+        loop {
+            cancellation::work(UNITS_FOR_LOOK);
+            let (_, other) = ask(self, machine, next)?;
+            if other.to_bits() != side.to_bits() {
+                let change = bisected(known, next, &mut |time| {
+                    let (_, found) = ask(self, machine, time)?;
+                    Ok(found.to_bits() == side.to_bits())
+                })?;
+                return Ok(Mask {
+                    now,
+                    behind,
+                    horizon: change - time,
+                });
+            }
+            if next >= until.min(LAST_LOOK) {
+                return Ok(Mask {
+                    now,
+                    behind,
+                    horizon: f64::INFINITY,
+                });
+            }
+            known = next;
+            next = self.next_look(machine, next)?;
+        }
+    }
+
+    /// When a clock reaches a value, if that is before `until`.
+    pub(super) fn reach(
+        &mut self,
+        machine: &mut Machine<'_>,
+        (clock, value): (u32, f64),
+        until: f64,
+    ) -> Result<Option<f64>, Failure> {
+        let is_below = |motion: &mut Motion, machine: &mut Machine<'_>, time: f64| {
+            motion.look(machine, time, |machine| Ok(machine.clock(clock).0 < value))
+        };
+        if !is_below(self, machine, 0.0)? {
+            return Ok(Some(0.0));
+        }
+        let mut known = 0.0;
+        while known < until.min(LAST_LOOK) {
+            cancellation::work(UNITS_FOR_LOOK);
+            let next = self.next_look(machine, known)?;
+            if !is_below(self, machine, next)? {
+                let time = bisected(known, next, &mut |time| is_below(self, machine, time))?;
+                return Ok((time <= until).then_some(time));
+            }
+            known = next;
+        }
+        Ok(None)
+    }
+}
+
+/// The first time at which something is different, between one where it is not and one where it is.
+fn bisected(
+    mut same: f64,
+    mut other: f64,
+    is_same: &mut dyn FnMut(f64) -> Result<bool, Failure>,
+) -> Result<f64, Failure> {
+    loop {
+        let middle = same + (other - same) / 2.0;
+        if middle <= same || middle >= other {
+            return Ok(other);
+        }
+        if is_same(middle)? {
+            same = middle;
+        } else {
+            other = middle;
+        }
+    }
+}
+
+/// Makes the words of all clocks those of a time, as if none flowed.
+fn linear(machine: &mut Machine<'_>, base: &[(u32, f64, f64)], time: f64) {
+    for &(clock, value, rate) in base {
+        machine.set_value(clock, value + rate * time);
+    }
+}
+
+/// What flows: all clocks at time 0, those that flow, and what sets their rates.
+type Equation<'a> = (&'a [(u32, f64, f64)], &'a [u32], &'a [(FunctionId, Stand)]);
+
+/// The rates of the clocks that flow, if these have some values at a time.
+fn slopes_at(
+    machine: &mut Machine<'_>,
+    (base, flowing, rates): Equation<'_>,
+    time: f64,
+    values: &[f64],
+    target: &mut [f64],
+) -> Result<(), Failure> {
+    linear(machine, base, time);
+    for (&clock, &value) in flowing.iter().zip(values) {
+        machine.set_value(clock, value);
+    }
+    for &(function, _) in rates {
+        machine.call(function, &[])?;
+    }
+    for (target, &clock) in target.iter_mut().zip(flowing) {
+        *target = machine.clock(clock).1;
+    }
+    if target.iter().all(|slope| slope.is_finite()) {
+        Ok(())
+    } else {
+        Err(Failure::ClockRate(rates[0].1))
+    }
+}
