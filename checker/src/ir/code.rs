@@ -356,6 +356,7 @@ pub enum Relation {
 
 impl Relation {
     /// The relation of the right side to the left side.
+    #[must_use]
     pub fn swapped(self) -> Relation {
         match self {
             Relation::Less => Relation::Greater,

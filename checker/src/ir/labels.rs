@@ -6,6 +6,7 @@ use super::ids::{ClockId, FunctionId};
 /// A condition on words and clocks: a guard or an invariant. It holds if `function` returns 1, and
 /// then on the clock values that satisfy `fixed` and all constraints that the function emitted.
 #[derive(Clone, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is an independent fact")]
 pub struct Guard {
     /// Decides the part on the words and emits clock constraints ([`Instruction::Constrain`]);
     /// `None` is true. Its parameters are the edge's select values; it returns an integer.

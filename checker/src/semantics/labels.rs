@@ -127,12 +127,11 @@ impl Checker<'_> {
         let compared: Option<Vec<_>> = timed.into_iter().map(clock_with_number).collect();
         let mut comparisons = Vec::new();
         for (clock, relation, bound) in compared? {
-            let bound = match bound.kind {
-                Kind::Double(value) => ir::RealBound::Constant(value),
-                _ => {
-                    let function = self.make_real(bound.clone(), locals, place.to_owned())?;
-                    ir::RealBound::Computed(function)
-                }
+            let bound = if let Kind::Double(value) = bound.kind {
+                ir::RealBound::Constant(value)
+            } else {
+                let function = self.make_real(bound.clone(), locals, place.to_owned())?;
+                ir::RealBound::Computed(function)
             };
             comparisons.push(ir::RealComparison {
                 clock,

@@ -263,6 +263,8 @@ const DENSE_WEIGHTS: [f64; 7] = [
 
 #[cfg(test)]
 mod tests {
+    #![expect(clippy::unnecessary_wraps, reason = "equations may fail")]
+
     use super::{Failure, Integrator};
 
     fn decay(_: f64, values: &[f64], slopes: &mut [f64]) -> Result<(), Failure> {

@@ -99,14 +99,6 @@ impl<'a> Machine<'a> {
         found
     }
 
-    pub(super) fn clone_words(&self) -> Vec<i32> {
-        self.words.clone()
-    }
-
-    pub(super) fn restore(&mut self, words: &[i32]) {
-        self.words.copy_from_slice(words);
-    }
-
     #[inline]
     pub(super) fn location(&self, process: usize) -> LocationId {
         LocationId(self.words[process] as u32)

@@ -110,6 +110,11 @@ fn at_most(gap: f64, slope: f64, is_strict: bool) -> Option<Span> {
 
 #[cfg(test)]
 mod tests {
+    #![expect(
+        clippy::unnecessary_wraps,
+        reason = "it is compared with what may be none"
+    )]
+
     use super::{Span, compared};
     use crate::ir::Relation;
 

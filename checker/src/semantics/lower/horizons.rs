@@ -52,7 +52,7 @@ struct Linear {
 #[derive(Clone, Copy)]
 struct Horizon {
     ahead: Register,
-    horizon: Register,
+    least: Register,
     signature: Register,
 }
 
@@ -68,7 +68,7 @@ impl Builder<'_> {
         let mask = self.integer(ALWAYS);
         let shared = is_timed.then(|| Horizon {
             ahead: self.load(word_pair(chance_words::AHEAD), &Type::Double),
-            horizon: self.double(f64::INFINITY),
+            least: self.double(f64::INFINITY),
             signature: self.double(0.0),
         });
         for condition in conditions {
@@ -434,8 +434,8 @@ impl Builder<'_> {
         self.switch(yes);
         let minus = self.real(DoubleOperator::Subtract, zero, gap);
         let time = self.real(DoubleOperator::Divide, minus, slope);
-        let least = self.real(DoubleOperator::Minimum, shared.horizon, time);
-        self.copy(shared.horizon, least);
+        let least = self.real(DoubleOperator::Minimum, shared.least, time);
+        self.copy(shared.least, least);
         self.jump(end);
         self.switch(end);
     }

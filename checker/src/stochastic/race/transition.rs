@@ -1,0 +1,221 @@
+//! What a move does: receivers and branches are chosen, updates run, locations are entered, rates
+//! set, and those found who plan anew.
+
+use super::{MOVES_OF_A_PLAN, Race};
+use crate::ir::{Branch, LocationId, ProcessId, Update, Urgency};
+use crate::stochastic::condition::Number;
+use crate::stochastic::failure::Failure;
+use crate::stochastic::program::{Instance, Program};
+
+impl<'a> Race<'a> {
+    /// Makes plans stale that wait for a clock.
+    pub(super) fn renew(&mut self, program: &Program<'a>) {
+        self.until_renewal = MOVES_OF_A_PLAN;
+        for process in 0..self.locations.len() {
+            let spot = program.spot(process, self.locations[process]);
+            if !spot.is_plain || spot.invariant.is_timed() {
+                self.make_stale(process as u32);
+            }
+        }
+    }
+
+    pub(super) fn add_receivers(
+        &mut self,
+        program: &Program<'a>,
+        sender: &Instance<'a>,
+        channel: u32,
+    ) -> Result<(), Failure> {
+        let is_broadcast = self.network().channels[channel as usize].broadcast;
+        let needs_commitment = !is_broadcast
+            && self.committed > 0
+            && self.urgency(sender.process as usize) != Urgency::Committed;
+        let mut first = self.movers.len();
+        for &process in program.listeners(channel) {
+            if process == sender.process
+                || (needs_commitment && self.urgency(process as usize) != Urgency::Committed)
+            {
+                continue;
+            }
+            self.add_ready(program, process, channel)?;
+            if is_broadcast {
+                self.keep_one(first);
+                first = self.movers.len();
+            }
+        }
+        if !is_broadcast {
+            self.keep_one(first);
+        }
+        Ok(())
+    }
+
+    /// Keeps one of the movers from this place on.
+    pub(super) fn keep_one(&mut self, first: usize) {
+        let many = self.movers.len() - first;
+        if many > 1 {
+            let chosen = self.machine.stream().below(many as u32) as usize;
+            self.movers.swap(first, first + chosen);
+            self.movers.truncate(first + 1);
+        }
+    }
+
+    /// Runs the updates of those who move, the sender first, and lets them enter their locations.
+    pub(super) fn carry_out(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+        let network = self.network();
+        for index in 0..self.movers.len() {
+            let mover = program.instance(self.movers[index].0);
+            if mover.edge.branches.len() > 1 {
+                self.movers[index].1 = self.branch(program, mover)?;
+            }
+        }
+        if let Some(update) = &network.before_update {
+            self.machine.update(update, &[])?;
+        }
+        for index in 0..self.movers.len() {
+            let (number, branch) = self.movers[index];
+            let mover = program.instance(number);
+            let branch: &Branch = &mover.edge.branches[branch as usize];
+            self.update(&mover.edge.update, &mover.values)?;
+            self.update(&branch.update, &mover.values)?;
+        }
+        for index in 0..self.movers.len() {
+            let (number, branch) = self.movers[index];
+            let mover = program.instance(number);
+            self.enter(program, mover, branch as usize);
+        }
+        if let Some(update) = &network.after_update {
+            self.machine.update(update, &[])?;
+        }
+        if program.has_rates {
+            self.renew_rates(program)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    pub(super) fn update(&mut self, update: &Update, values: &[i32]) -> Result<(), Failure> {
+        if update.function.is_some() {
+            self.machine.update(update, values)?;
+        }
+        Ok(())
+    }
+
+    /// Lets a mover enter the target of its branch, and finds who plans anew.
+    pub(super) fn enter(&mut self, program: &Program<'a>, mover: &Instance<'a>, branch: usize) {
+        let process = mover.process as usize;
+        let id = ProcessId(mover.process);
+        let target = mover.edge.branches[branch].target;
+        self.make_stale(mover.process);
+        for &concerned in program.concerned(mover, branch) {
+            self.make_stale(concerned);
+        }
+        let before = self.locations[process];
+        if target == before {
+            return;
+        }
+        let is_committed =
+            |location| usize::from(program.spot(process, location).urgency == Urgency::Committed);
+        self.committed += is_committed(target);
+        self.committed -= is_committed(before);
+        self.locations[process] = target;
+        self.machine.enter(id, target);
+        for &follower in program.followers(id) {
+            self.make_stale(follower);
+        }
+    }
+
+    /// The branch that a mover takes: by weight.
+    pub(super) fn branch(
+        &mut self,
+        program: &Program<'a>,
+        mover: &Instance<'a>,
+    ) -> Result<u32, Failure> {
+        let branches = &mover.edge.branches;
+        let stand = self.stand(mover.process as usize);
+        let mut weights = Vec::with_capacity(branches.len());
+        for branch in 0..branches.len() {
+            let weight = match program.weight(mover, branch) {
+                Number::Known(weight) => weight,
+                Number::Computed(weight) => self.machine.real(weight, &mover.values)?,
+            };
+            if !(weight >= 0.0 && weight.is_finite()) {
+                return Err(Failure::Weight(stand, mover.id));
+            }
+            weights.push(weight);
+        }
+        let total: f64 = weights.iter().sum();
+        let mut rest = self.machine.stream().uniform() * total;
+        let mut chosen = None;
+        for (branch, weight) in weights.into_iter().enumerate() {
+            if weight > 0.0 {
+                // The last one takes what rounding leaves.
+                chosen = Some(branch as u32);
+                if rest < weight {
+                    break;
+                }
+                rest -= weight;
+            }
+        }
+        chosen.ok_or(Failure::NoWeight(stand, mover.id))
+    }
+
+    /// Gives the clocks their rates anew of which a stale process sets some, and finds whose plans
+    /// that concerns.
+    pub(super) fn renew_rates(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+        let network = self.network();
+        let clocks = &network.chances.clocks;
+        let before: Vec<f64> = clocks
+            .iter()
+            .map(|&clock| self.machine.clock(clock).1)
+            .collect();
+        for (place, &clock) in clocks.iter().enumerate() {
+            if self.rated_by[place].is_some() {
+                self.rated_by[place] = None;
+                self.machine.set_rate(clock, 1.0);
+            }
+        }
+        for process in 0..self.locations.len() {
+            self.set_rates(process)?;
+        }
+        self.find_flows(program);
+        for (&clock, before) in clocks.iter().zip(before) {
+            if !self.motion.flows(clock)
+                && self.machine.clock(clock).1.to_bits() != before.to_bits()
+                && let Some(readers) = program.rate_readers.get(&clock)
+            {
+                for &reader in readers {
+                    self.make_stale(reader);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the location of a process set the rates of clocks.
+    pub(super) fn set_rates(&mut self, process: usize) -> Result<(), Failure> {
+        let network = self.network();
+        let LocationId(location) = self.locations[process];
+        let chances = &network.processes[process].locations[location as usize].chances;
+        let Some(rates) = chances.rates else {
+            return Ok(());
+        };
+        let place = |clock: &u32| {
+            let place = network.chances.clocks.binary_search(clock);
+            place.expect("the clocks of the network are ascending, and all of them")
+        };
+        for clock in &chances.rated_clocks {
+            let rated_by = &mut self.rated_by[place(clock)];
+            if let Some(other) = *rated_by {
+                let (first, second) = (self.stand(other as usize), self.stand(process));
+                return Err(Failure::RatesConflict(first, second));
+            }
+            *rated_by = Some(process as u32);
+        }
+        self.machine.call(rates, &[])?;
+        for &clock in &chances.rated_clocks {
+            if !self.machine.clock(clock).1.is_finite() {
+                return Err(Failure::ClockRate(self.stand(process)));
+            }
+        }
+        Ok(())
+    }
+}
