@@ -13,6 +13,14 @@ use checker::stochastic::{Failure, Runner};
 use checker::syntax;
 
 mod flows;
+#[path = "../common/checks.rs"]
+#[allow(dead_code, reason = "this program asks in some of the ways only")]
+mod checks;
+mod networks;
+#[path = "../common/random.rs"]
+#[allow(dead_code, reason = "this program draws in some of the ways only")]
+mod random;
+mod random_networks;
 mod refusals;
 mod values;
 

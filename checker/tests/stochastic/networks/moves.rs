@@ -1,0 +1,258 @@
+//! What can happen in a state of a network, and how likely each outcome of a move is.
+//!
+//! A move is a process with one of its outputs; receivers and branches are chosen by their
+//! chances. Time is none of this module's: [`super::chain`] and [`super::grid`] bring it.
+
+use super::{Assignment, Atom, Compare, Condition, Edge, Net, Number, Path, Urgency};
+
+/// The most processes, variables and clocks of a network.
+pub(crate) const MOST: usize = 4;
+
+/// A state; clocks count steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub(crate) struct State {
+    pub(crate) locations: [u8; MOST],
+    pub(crate) variables: [u8; MOST],
+    pub(crate) clocks: [u16; MOST],
+}
+
+/// Why a network is none whose probabilities are computed: a run may fail.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unfit {
+    TimeLock,
+    InvariantBroken,
+    WeightsZero,
+    Zeno,
+}
+
+/// An output of a process: an edge, and what it selects.
+pub(crate) type Output = (usize, i32);
+
+/// A network with the number of steps that a unit of time has, and the step from which on clocks
+/// are alike.
+pub(crate) struct Game<'n> {
+    pub(crate) net: &'n Net,
+    pub(crate) steps_in_unit: i32,
+    pub(crate) last_step: u16,
+}
+
+impl Game<'_> {
+    pub(crate) fn number(number: Number, state: &State, selected: i32) -> i32 {
+        match number {
+            Number::Constant(constant) => constant,
+            Number::Plus(constant, variable) => constant + i32::from(state.variables[variable]),
+            Number::Selected => selected,
+        }
+    }
+
+    fn compare(left: i32, compare: Compare, right: i32) -> bool {
+        match compare {
+            Compare::AtLeast => left >= right,
+            Compare::AtMost => left <= right,
+            Compare::Equal => left == right,
+        }
+    }
+
+    pub(super) fn is_true(&self, atom: Atom, state: &State, selected: i32) -> bool {
+        match atom {
+            Atom::Variable(variable, compare, number) => {
+                let value = i32::from(state.variables[variable]);
+                Self::compare(value, compare, Self::number(number, state, selected))
+            }
+            Atom::Clock(clock, compare, constant) => {
+                let steps = i32::from(state.clocks[clock]);
+                Self::compare(steps, compare, constant * self.steps_in_unit)
+            }
+        }
+    }
+
+    pub(crate) fn holds(&self, condition: &Condition, state: &State) -> bool {
+        match condition {
+            Condition::At(process, location) => usize::from(state.locations[*process]) == *location,
+            Condition::Is(atom) => self.is_true(*atom, state, 0),
+            Condition::All(all) => all.iter().all(|one| self.holds(one, state)),
+            Condition::Any(any) => any.iter().any(|one| self.holds(one, state)),
+        }
+    }
+
+    /// Whether a state decides what a path asks.
+    pub(crate) fn decided(&self, path: &Path, state: &State) -> Option<bool> {
+        match path {
+            Path::Eventually(goal) => self.holds(goal, state).then_some(true),
+            Path::Always(keep) => (!self.holds(keep, state)).then_some(false),
+            Path::Until(keep, goal) => {
+                if self.holds(goal, state) {
+                    Some(true)
+                } else {
+                    (!self.holds(keep, state)).then_some(false)
+                }
+            }
+        }
+    }
+
+    fn urgency(&self, process: usize, state: &State) -> Urgency {
+        let location = usize::from(state.locations[process]);
+        self.net.processes[process].locations[location].urgency
+    }
+
+    pub(crate) fn is_frozen(&self, state: &State) -> bool {
+        (0..self.net.processes.len()).any(|one| self.urgency(one, state) != Urgency::Normal)
+    }
+
+    fn edges(&self, process: usize, state: &State) -> impl Iterator<Item = (usize, &Edge)> {
+        let location = usize::from(state.locations[process]);
+        let edges = self.net.processes[process].edges.iter().enumerate();
+        edges.filter(move |(_, edge)| edge.source == location)
+    }
+
+    /// The outputs of the location of a process, whatever their guards say.
+    pub(crate) fn all_outputs(&self, process: usize, state: &State) -> Vec<Output> {
+        self.edges(process, state)
+            .filter(|(_, edge)| edge.sync.is_none_or(|(_, sends)| sends))
+            .flat_map(|(number, edge)| (0..=edge.select.unwrap_or(0)).map(move |one| (number, one)))
+            .collect()
+    }
+
+    pub(crate) fn edge(&self, process: usize, (edge, _): Output) -> &Edge {
+        &self.net.processes[process].edges[edge]
+    }
+
+    pub(crate) fn is_urgent(&self, process: usize, output: Output) -> bool {
+        let sync = self.edge(process, output).sync;
+        sync.is_some_and(|(channel, _)| self.net.channels[channel])
+    }
+
+    fn is_enabled(&self, process: usize, output: Output, state: &State) -> bool {
+        let guard = &self.edge(process, output).guard;
+        guard
+            .iter()
+            .all(|&atom| self.is_true(atom, state, output.1))
+    }
+
+    fn receivers(&self, process: usize, channel: usize, state: &State) -> Vec<Output> {
+        self.edges(process, state)
+            .filter(|(_, edge)| edge.sync == Some((channel, false)))
+            .flat_map(|(number, edge)| (0..=edge.select.unwrap_or(0)).map(move |one| (number, one)))
+            .filter(|&one| self.is_enabled(process, one, state))
+            .collect()
+    }
+
+    /// The outputs that may be taken: if a process is in a committed location, only those in which
+    /// such a process takes part.
+    pub(crate) fn outputs(&self, process: usize, state: &State) -> Vec<Output> {
+        let processes = 0..self.net.processes.len();
+        let is_committed = |one| self.urgency(one, state) == Urgency::Committed;
+        let must_commit = processes.clone().any(is_committed);
+        let takes_part = |output: &Output| {
+            let sync = self.edge(process, *output).sync;
+            let Some((channel, _)) = sync else {
+                return false;
+            };
+            processes.clone().any(|other| {
+                other != process
+                    && is_committed(other)
+                    && !self.receivers(other, channel, state).is_empty()
+            })
+        };
+        let mut outputs = self.all_outputs(process, state);
+        outputs.retain(|&one| self.is_enabled(process, one, state));
+        if must_commit && !is_committed(process) {
+            outputs.retain(takes_part);
+        }
+        outputs
+    }
+
+    /// What a move of a process comes to, all its enabled outputs with the same chance. Guards see
+    /// one state, and updates change the other, which differs in the clocks only.
+    pub(crate) fn outcomes(
+        &self,
+        process: usize,
+        seen: &State,
+        changed: &State,
+    ) -> Result<Vec<(f64, State)>, Unfit> {
+        let outputs = self.outputs(process, seen);
+        let share = 1.0 / outputs.len() as f64;
+        let mut outcomes = Vec::new();
+        for output in outputs {
+            let mut movers = vec![(process, vec![output])];
+            if let Some((channel, _)) = self.edge(process, output).sync {
+                for other in (0..self.net.processes.len()).filter(|&one| one != process) {
+                    let ready = self.receivers(other, channel, seen);
+                    if !ready.is_empty() {
+                        movers.push((other, ready));
+                    }
+                }
+            }
+            self.add_outcomes(&movers, seen, (share, *changed, *changed), &mut outcomes)?;
+        }
+        Ok(outcomes)
+    }
+
+    /// Lets the first mover choose, then the others. `reached` holds the variables and clocks,
+    /// `targets` the locations.
+    fn add_outcomes(
+        &self,
+        movers: &[(usize, Vec<Output>)],
+        seen: &State,
+        (chance, reached, targets): (f64, State, State),
+        outcomes: &mut Vec<(f64, State)>,
+    ) -> Result<(), Unfit> {
+        let Some(((process, choices), others)) = movers.split_first() else {
+            let locations = targets.locations;
+            outcomes.push((
+                chance,
+                State {
+                    locations,
+                    ..reached
+                },
+            ));
+            return Ok(());
+        };
+        for &choice in choices {
+            let edge = self.edge(*process, choice);
+            let weights: Vec<f64> = edge
+                .branches
+                .iter()
+                .map(|branch| f64::from(Self::number(branch.weight, seen, 0)))
+                .collect();
+            let total: f64 = weights.iter().sum();
+            if edge.branches.len() > 1 && total == 0.0 {
+                return Err(Unfit::WeightsZero);
+            }
+            for (branch, weight) in edge.branches.iter().zip(weights) {
+                let part = if edge.branches.len() > 1 {
+                    weight / total
+                } else {
+                    1.0
+                };
+                if part == 0.0 {
+                    continue;
+                }
+                let mut state = reached;
+                for &update in edge.updates.iter().chain(&branch.updates) {
+                    self.assign(update, choice.1, &mut state);
+                }
+                let mut targets = targets;
+                targets.locations[*process] = branch.target as u8;
+                let chance = chance * part / choices.len() as f64;
+                self.add_outcomes(others, seen, (chance, state, targets), outcomes)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn assign(&self, update: Assignment, selected: i32, state: &mut State) {
+        let (variable, value) = match update {
+            Assignment::Set(variable, number) => (variable, Self::number(number, state, selected)),
+            Assignment::Add(variable, number) => (
+                variable,
+                i32::from(state.variables[variable]) + Self::number(number, state, selected),
+            ),
+            Assignment::Clock(clock, value) => {
+                state.clocks[clock] = (value * self.steps_in_unit) as u16;
+                return;
+            }
+        };
+        state.variables[variable] = (value % (self.net.greatest[variable] + 1)) as u8;
+    }
+}
