@@ -60,8 +60,10 @@ class Estimate:
         value: The share of the runs that are satisfied, or the mean of their values.
         lower: The lower end of the interval; ``None`` if too few runs give none.
         upper: The upper end of the interval; ``None`` if too few runs give none.
-        confidence: The confidence of the interval: for probabilities that of Clopper and Pearson,
-            for means Student's, which is asymptotic.
+        confidence: The confidence of the interval; the method says what it means.
+        method: What made the interval: ``Clopper-Pearson``, ``confidence sequence``,
+            ``Student (asymptotic)``, ``empirical Bernstein``,
+            ``empirical Bernstein confidence sequence`` or ``Dvoretzky-Kiefer-Wolfowitz``.
         runs: The number of runs.
         satisfied_runs: How many of them are satisfied; ``None`` for means.
     """
@@ -70,6 +72,7 @@ class Estimate:
     lower: float | None
     upper: float | None
     confidence: float
+    method: str
     runs: int
     satisfied_runs: int | None
 

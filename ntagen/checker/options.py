@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Concatenate, Literal, ParamSpec, TypeVar
@@ -24,6 +25,7 @@ CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "all"]
 StrategyWanted = Literal["winner", "controller"]
 TraceWanted = Literal["any", "shortest", "fastest"]
+MeanInterval = Literal["auto", "student", "bernstein", "dkw"]
 
 Progress = Callable[[int, int, int, int], object]
 """Is called with the numbers of explored, stored and waiting states, and of bytes."""
@@ -40,8 +42,8 @@ class Options:
     """How a query is to be answered.
 
     Raises:
-        ValueError: `threads` is negative, `max_plans` or `runs` less than 1, or a risk or `epsilon`
-            not between 0 and 1.
+        ValueError: A number has no meaning: `threads` is negative, `max_plans` or `runs` less than
+            1, a risk or a width not between 0 and 1, or a pair is in the wrong order.
     """
 
     search: SearchOrder = "bfs"
@@ -75,6 +77,38 @@ class Options:
 
     epsilon: float = 0.05
     """A probability is estimated until both ends of its interval are so near to the estimate."""
+
+    anytime: bool = False
+    """Whether the intervals of ``Pr`` and ``E`` hold all together, after every run: then you may
+    look at them whenever you want, and stop when you like what you see. They are wider."""
+
+    relative: float | None = None
+    """Runs are made until both ends of the interval are within this part of the estimate, instead
+    of `epsilon`; for ``E`` at most as many runs as the query says. The interval is one that holds
+    at any moment (see `anytime`). For a probability of 0 this never ends: `runs` or `timeout_s`
+    must end it."""
+
+    value_bounds: tuple[float, float] | None = None
+    """Between which numbers the value of ``E`` lies in every run. With them the interval of a mean
+    is right for any number of runs; a run with a value outside is an error. Without them the engine
+    looks for bounds in the declared ranges of integers."""
+
+    mean_interval: MeanInterval = "auto"
+    """What makes the interval of ``E``. ``student`` is right in the limit of many runs only. The
+    others need bounds of the value: ``bernstein`` is narrow where values vary little, ``dkw``
+    (Dvoretzky, Kiefer and Wolfowitz) where there are few runs. ``auto`` is ``bernstein`` where
+    bounds are known, and ``student`` where they are not."""
+
+    delta: float | tuple[float, float] = 0.01
+    """So near to ``p`` the test of ``Pr[…](…) >= p`` promises nothing: a number for both sides, or
+    one for below and one for above."""
+
+    odds_ratios: tuple[float, float] = (0.9, 1.1)
+    """``Pr[…](…) >= Pr[…](…)`` promises nothing if the ratio of the odds lies between these."""
+
+    discretisation: float | None = None
+    """The step with which equations of clocks are solved, in units of the model, instead of steps
+    that their errors choose."""
 
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""
@@ -167,10 +201,22 @@ class Options:
             raise ValueError(f"{self.threads} threads: there must be at least 1, or 'all'")
         if self.runs is not None and self.runs < 1:
             raise ValueError(f"{self.runs} runs: there must be at least 1")
-        for name in ("alpha", "beta", "epsilon"):
+        for name in ("alpha", "beta", "epsilon", "relative"):
             value = getattr(self, name)
-            if not 0 < value < 1:
+            if value is not None and not 0 < value < 1:
                 raise ValueError(f"{name} is {value}, but must lie between 0 and 1")
+        deltas = self.delta if isinstance(self.delta, tuple) else (self.delta,)
+        if not all(0 < delta < 1 for delta in deltas):
+            raise ValueError(f"delta is {self.delta}, but must lie between 0 and 1")
+        low, high = self.odds_ratios
+        if not 0 < low < 1 < high < math.inf:
+            raise ValueError(f"odds_ratios are {low} and {high}, but 1 must lie between them")
+        if self.value_bounds is not None:
+            least, greatest = self.value_bounds
+            if not -math.inf < least < greatest < math.inf:
+                raise ValueError(f"value_bounds are {least} and {greatest}: the first must be less")
+        if self.discretisation is not None and not 0 < self.discretisation < math.inf:
+            raise ValueError(f"discretisation is {self.discretisation}, but must be positive")
         if self.max_plans < 1:
             raise ValueError(f"max_plans is {self.max_plans}, but must be at least 1")
 

@@ -87,11 +87,17 @@ class Human:
         return lines if self._trace_is_written else [*lines, *_way_to_failure(answer)]
 
 
+_USUAL_METHODS: Final = ("Clopper-Pearson", "Student (asymptotic)")
+"""Methods of intervals that need no line of their own."""
+
+
 def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
     """What random runs say: the estimate with its interval, and what it took."""
     percent = f"{100 * estimate.confidence:g} %"
     between = f"in [{_number(estimate.lower)}, {_number(estimate.upper)}] at {percent} confidence"
     lines = [f"value: {_number(estimate.value)}, {between}"]
+    if estimate.method not in _USUAL_METHODS:
+        lines.append(f"interval: {estimate.method}")
     runs = f"{estimate.runs:,} run" + ("s" if estimate.runs != 1 else "")
     if estimate.satisfied_runs is not None:
         runs = f"{estimate.satisfied_runs:,} of {runs} satisfied"

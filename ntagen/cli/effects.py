@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.statistical_options import STATISTICAL
 from ntagen.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -91,8 +92,8 @@ def idle_options(
 def _without_statistics(given: Collection[str], values: Mapping[str, object]) -> list[str]:
     """A note for each option of statistical queries, if no query is one."""
     notes = [
-        f"--{name} has no effect here: no query is a statistical one"
-        for name in ("runs", "alpha", "beta", "epsilon")
+        f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
+        for name in STATISTICAL
         if name in given
     ]
     if "seed" in given and values["search"] != "random":

@@ -12,6 +12,7 @@ import click
 
 from ntagen.cli.limits import LIMITS
 from ntagen.cli.rules import Decorator, forced_rule, priority_rule
+from ntagen.cli.statistical_options import STATISTICAL
 
 
 class _Threads(click.ParamType[int]):
@@ -49,23 +50,6 @@ class _Heuristics(click.ParamType[tuple[str, ...]]):
                 known = "".join(f"\n  {one}: {does}" for one, does in checker.HEURISTICS.items())
                 self.fail(f"{name!r} is not a heuristic. The heuristics are:{known}", param, ctx)
         return names
-
-
-class _Share(click.ParamType[float]):
-    """A number between 0 and 1, neither of them included."""
-
-    name = "share"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        try:
-            number = float(str(value))
-        except ValueError:
-            number = 0.0
-        if not 0 < number < 1:
-            self.fail(f"{value!r} is not a number between 0 and 1", param, ctx)
-        return number
 
 
 class _Reductions(click.ParamType[str]):
@@ -137,36 +121,7 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         help="For --search random and statistical queries: the same seed gives the same search and "
         "the same runs.  [default: 0]",
     ),
-    "runs": click.option(
-        "--runs",
-        metavar="N",
-        type=click.IntRange(min=1),
-        help="For Pr and E: make N random runs.  [default: as many as the query says, or as "
-        "--epsilon needs]",
-    ),
-    "alpha": click.option(
-        "--alpha",
-        metavar="RISK",
-        type=_Share(),
-        default=0.05,
-        help="For Pr and E: the risk that the interval misses, or that Pr >= p is rejected "
-        "wrongly.  [default: 0.05]",
-    ),
-    "beta": click.option(
-        "--beta",
-        metavar="RISK",
-        type=_Share(),
-        default=0.05,
-        help="For Pr >= p: the risk that it is accepted wrongly.  [default: 0.05]",
-    ),
-    "epsilon": click.option(
-        "--epsilon",
-        metavar="WIDTH",
-        type=_Share(),
-        default=0.05,
-        help="For Pr: make runs until both ends of the interval are so near to the estimate.  "
-        "[default: 0.05]",
-    ),
+    **STATISTICAL,
     "reductions": click.option(
         "--reductions",
         metavar="all|none|LIST",

@@ -129,6 +129,7 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
     from ntagen.verifyta.output import estimate, summary, values, verdict
+    from ntagen.verifyta.statistical import statistical
 
     form = form_of(text)
     wants_trace = line.has("--diagnostic")
@@ -140,10 +141,7 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
         text,
         Options(
             search=_SEARCH.get(line.value("--search-order"), "bfs"),
-            seed=int(line.value("--seed", "0")),
-            alpha=float(line.value("--alpha", "0.05")),
-            beta=float(line.value("--beta", "0.05")),
-            epsilon=float(line.value("--epsilon", "0.05")),
+            **statistical(line.given),
             trace=wants_trace,
             wanted_trace=wanted if wants_trace else "any",
             strategy=form is not None

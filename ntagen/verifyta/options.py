@@ -10,6 +10,7 @@ refused. There is no fourth kind: an unknown option is an error.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final, Literal
 
@@ -45,7 +46,6 @@ class Option:
         return self.long or self.letter
 
 
-_STATISTICAL: Final = "ntagen solves clocks with constant rates exactly, without steps"
 _LEARNING: Final = "it is for learning, which ntagen does not do"
 
 
@@ -129,7 +129,11 @@ OPTIONS: Final = (
     Option("-E", "--epsilon", "0..1", "honoured", "Half the width of intervals."),
     Option("-a", "--alpha", "0..1", "honoured", "The risk that an interval misses."),
     Option("-B", "--beta", "0..1", "honoured", "The risk that Pr >= p is accepted wrongly."),
-    Option("-D", "--discretization", "N", "refused", _STATISTICAL),
+    Option("", "--delta", "0..1", "honoured", "So near to p the test of Pr >= p says nothing."),
+    Option("", "--u0", "0..1", "honoured", "Pr >= Pr: the least ratio of the odds that counts."),
+    Option("", "--u1", ">1", "honoured", "The greatest one."),
+    Option("-D", "--discretization", ">0", "honoured", "The step of equations of clocks."),
+    Option("", "--runs", "N>0", "honoured", "How many random runs are made."),
     *_refused(
         (
             "learning-method",
@@ -150,6 +154,13 @@ OPTIONS: Final = (
     ),
 )
 """The options that are known, in the order of the help."""
+
+_RANGES: Final = {
+    "0..1": (0.0, 1.0, "between 0 and 1"),
+    ">0": (0.0, math.inf, "greater than 0"),
+    ">1": (1.0, math.inf, "greater than 1"),
+}
+"""For the values that are such numbers: between which they lie, and how to say it."""
 
 _BY_LETTER: Final = {option.letter: option for option in OPTIONS if option.letter}
 _BY_LONG: Final = {option.long: option for option in OPTIONS if option.long}
@@ -247,18 +258,22 @@ def _take(option: Option, value: str | None, rest: list[str], given: dict[str, s
         raise InputError(f"{option.name} is {value!r}, but must be {_choices(option)}")
     if option.value == "N" and not value.lstrip("-").isdigit():
         raise InputError(f"{option.name} is {value!r}, but must be an integer")
-    if option.value == "0..1" and not _is_share(value):
-        raise InputError(f"{option.name} is {value!r}, but must be a number between 0 and 1")
+    if option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
+        raise InputError(f"{option.name} is {value!r}, but must be a positive integer")
+    if option.value in _RANGES:
+        low, high, words = _RANGES[option.value]
+        if not low < _number(value) < high:
+            raise InputError(f"{option.name} is {value!r}, but must be a number {words}")
     if option.value and not value:
         raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
     given[option.name] = value
 
 
-def _is_share(value: str) -> bool:
+def _number(value: str) -> float:
     try:
-        return 0 < float(value) < 1
+        return float(value)
     except ValueError:
-        return False
+        return math.nan
 
 
 def _choices(option: Option) -> str:

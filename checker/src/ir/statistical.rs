@@ -39,6 +39,8 @@ pub enum Statistical {
         maximum: bool,
         /// Leaves the value as a double.
         value: FunctionId,
+        /// Between which numbers the value always lies, if that is known.
+        range: Option<(f64, f64)>,
     },
     /// `simulate [bound; runs] {a, b} : k : p`
     Simulation(Simulation),

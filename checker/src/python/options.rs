@@ -9,7 +9,7 @@ use super::convert::{
 };
 use crate::engine::{Limits, Options, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
-use crate::stochastic::Precision;
+use crate::stochastic::{MeanMethod, Precision};
 use crate::tuning::Tuning;
 
 /// The options that a Python value holds.
@@ -50,10 +50,32 @@ fn precision(given: &Bound<'_, PyAny>) -> PyResult<Precision> {
         alpha: field(given, "alpha")?,
         beta: field(given, "beta")?,
         epsilon: field(given, "epsilon")?,
+        delta: either_side(given, "delta")?,
+        odds_ratios: field(given, "odds_ratios")?,
+        discretisation: field(given, "discretisation")?,
+        anytime: field(given, "anytime")?,
+        relative: field(given, "relative")?,
+        value_bounds: field(given, "value_bounds")?,
+        mean_method: mean_method(&field::<String>(given, "mean_interval")?)?,
         runs: field(given, "runs")?,
         seed: field(given, "seed")?,
         ..Precision::default()
     })
+}
+
+fn mean_method(name: &str) -> PyResult<MeanMethod> {
+    match name {
+        "auto" => Ok(MeanMethod::Auto),
+        "student" => Ok(MeanMethod::Student),
+        "bernstein" => Ok(MeanMethod::EmpiricalBernstein),
+        "dkw" => Ok(MeanMethod::DvoretzkyKieferWolfowitz),
+        other => Err(unknown("interval of means", other)),
+    }
+}
+
+/// A number for both sides of a threshold, or a number for each.
+fn either_side(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(f64, f64)> {
+    field(given, name).or_else(|_| field(given, name).map(|both: f64| (both, both)))
 }
 
 /// An attribute.

@@ -82,6 +82,8 @@ mod members;
 
 mod queries;
 
+mod value_ranges;
+
 mod statistical;
 
 use self::left_out::LeftOut;

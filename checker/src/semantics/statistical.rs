@@ -83,9 +83,11 @@ impl Checker<'_> {
                     );
                     return None;
                 }
+                let range = super::value_ranges::range(&value);
                 Statistical::Expectation {
                     bound,
                     maximum: *maximum,
+                    range,
                     value: self.make_real(value, &[], String::from("query"))?,
                 }
             }

@@ -1,11 +1,12 @@
 //! Answers to statistical queries: which results of runs are looked at, and until when.
 
+use super::collector::Collector;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::run::Trajectory;
-use super::statistics::{Decision, Expectation, FixedWidth, SequentialTest, clopper_pearson};
+use super::statistics::{Decision, Method, clopper_pearson};
 use crate::exec::Executor;
-use crate::ir::{Network, Path, RunBound, Simulation, Statistical};
+use crate::ir::{Network, Simulation, Statistical};
 
 /// What an estimate is to promise, and how it is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,8 +17,21 @@ pub struct Precision {
     pub beta: f64,
     /// Half the width of the interval of a probability.
     pub epsilon: f64,
-    /// So near to its threshold a test promises nothing.
-    pub delta: f64,
+    /// So far below and above its threshold a test promises nothing.
+    pub delta: (f64, f64),
+    /// A comparison of two probabilities promises nothing if the ratio of their odds lies between
+    /// these.
+    pub odds_ratios: (f64, f64),
+    /// The step with which equations of clocks are solved; `None` leaves it to their errors.
+    pub discretisation: Option<f64>,
+    /// Whether intervals hold at every moment, so that anyone may look and stop.
+    pub anytime: bool,
+    /// Runs are made until both ends of the interval are within this part of the estimate.
+    pub relative: Option<f64>,
+    /// Between which numbers the values lie whose mean is asked for, if the user says so.
+    pub value_bounds: Option<(f64, f64)>,
+    /// What makes the interval of a mean.
+    pub mean_method: MeanMethod,
     /// How many runs are made; `None` leaves it to the query and to the results.
     pub runs: Option<u64>,
     /// The seed of all random numbers.
@@ -26,13 +40,39 @@ pub struct Precision {
     pub threads: usize,
 }
 
+/// What makes the interval of a mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MeanMethod {
+    /// Empirical Bernstein intervals if bounds of the values are known, else Student's.
+    Auto,
+    /// Student's, which is right in the limit of many runs only.
+    Student,
+    /// Empirical Bernstein intervals; bounds of the values must be known.
+    EmpiricalBernstein,
+    /// By a band around the distribution; bounds of the values must be known.
+    DvoretzkyKieferWolfowitz,
+}
+
+impl Precision {
+    /// Whether the number of runs may depend on the results in any way.
+    pub(super) fn is_sequential(&self) -> bool {
+        self.anytime || self.relative.is_some()
+    }
+}
+
 impl Default for Precision {
     fn default() -> Precision {
         Precision {
             alpha: 0.05,
             beta: 0.05,
             epsilon: 0.05,
-            delta: 0.01,
+            delta: (0.01, 0.01),
+            odds_ratios: (0.9, 1.1),
+            discretisation: None,
+            anytime: false,
+            relative: None,
+            value_bounds: None,
+            mean_method: MeanMethod::Auto,
             runs: None,
             seed: 0,
             threads: 1,
@@ -49,8 +89,10 @@ pub struct Estimate {
     pub lower: f64,
     /// The greatest value of the interval.
     pub upper: f64,
-    /// The confidence of the interval, if the number of runs was not chosen by the results.
+    /// The confidence of the interval; the method says what it means.
     pub confidence: f64,
+    /// What made the interval.
+    pub method: Method,
     /// How many runs were made.
     pub runs: u64,
     /// How many of them are satisfied; `None` for expectations.
@@ -70,83 +112,46 @@ pub fn estimate(
     executor: &dyn Executor,
     query: &Statistical,
     precision: &Precision,
-    mut ends: impl FnMut(u64) -> bool,
+    ends: impl FnMut(u64) -> bool,
 ) -> Result<Estimate, Failure> {
     let program = (network, executor);
-    match query {
-        Statistical::Probability(bound, path) => {
-            probability(program, bound, path, precision, &mut ends)
+    let mut collector = Collector::new(query, precision);
+    let mut failure = None;
+    let mut push = |value: f64| match collector.push(value) {
+        Ok(is_last) => is_last,
+        Err(found) => {
+            failure = Some(found);
+            true
         }
-        Statistical::Hypothesis {
-            bound,
-            path,
-            at_least,
-            threshold,
-        } => {
-            // p <= t is "not p at least 1 - t" with satisfied runs counted as they are.
-            let mut test = SequentialTest::new(
-                if *at_least {
-                    *threshold
-                } else {
-                    1.0 - *threshold
-                },
-                precision.delta,
-                precision.alpha,
-                precision.beta,
-            );
-            let mut decision = None;
-            let mut counted = (0, 0);
-            let most = precision.runs.or(bound.runs).unwrap_or(u64::MAX);
+    };
+    let seed = precision.seed;
+    let is_complete = match query {
+        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
             in_order(
                 program,
                 precision.threads,
-                |runner, run| runner.path((precision.seed, run), bound, path),
-                |outcome| {
-                    counted = (counted.0 + 1, counted.1 + u64::from(outcome.satisfied));
-                    decision = test.push(outcome.satisfied == *at_least);
-                    decision.is_some() || counted.0 >= most
-                },
-                &mut ends,
-            )?;
-            let estimate = share(counted, precision.alpha, decision.is_some());
-            Ok(Estimate {
-                decision,
-                ..estimate
-            })
+                |runner, run| runner.path((seed, run), bound, path),
+                |outcome| push(f64::from(outcome.satisfied)),
+                ends,
+            )?
         }
-        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
         Statistical::Expectation {
             bound,
             maximum,
             value,
-        } => {
-            let wanted = precision.runs.or(bound.runs).unwrap_or(1);
-            let mut mean = Expectation::default();
-            let is_complete = in_order(
-                program,
-                precision.threads,
-                |runner, run| runner.extreme((precision.seed, run), bound, *value, *maximum),
-                |(value, _)| {
-                    mean.push(value);
-                    mean.count() >= wanted
-                },
-                &mut ends,
-            )?;
-            let interval = mean.student(precision.alpha);
-            let (lower, upper) = interval.map_or((f64::NEG_INFINITY, f64::INFINITY), |interval| {
-                (interval.lower, interval.upper)
-            });
-            Ok(Estimate {
-                value: mean.mean(),
-                lower,
-                upper,
-                confidence: 1.0 - precision.alpha,
-                runs: mean.count(),
-                satisfied_runs: None,
-                decision: None,
-                is_complete,
-            })
-        }
+            ..
+        } => in_order(
+            program,
+            precision.threads,
+            |runner, run| runner.extreme((seed, run), bound, *value, *maximum),
+            |(value, _)| push(value),
+            ends,
+        )?,
+        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
+    };
+    match failure {
+        Some(failure) => Err(failure),
+        None => Ok(collector.estimate(is_complete)),
     }
 }
 
@@ -202,32 +207,6 @@ pub fn simulate(
     })
 }
 
-fn probability(
-    program: (&Network, &dyn Executor),
-    bound: &RunBound,
-    path: &Path,
-    precision: &Precision,
-    ends: &mut dyn FnMut(u64) -> bool,
-) -> Result<Estimate, Failure> {
-    let wanted = precision.runs.or(bound.runs);
-    let mut rule = FixedWidth::new(precision.alpha, precision.epsilon);
-    let is_complete = in_order(
-        program,
-        precision.threads,
-        |runner, run| runner.path((precision.seed, run), bound, path),
-        |outcome| {
-            let is_narrow = rule.push(outcome.satisfied);
-            match wanted {
-                Some(wanted) => rule.runs() >= wanted,
-                None => is_narrow,
-            }
-        },
-        ends,
-    )?;
-    let counted = (rule.runs(), rule.satisfied());
-    Ok(share(counted, precision.alpha, is_complete))
-}
-
 /// The estimate of a probability from the numbers of runs and of satisfied ones.
 fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estimate {
     let interval = clopper_pearson(satisfied, runs, alpha);
@@ -236,6 +215,7 @@ fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estima
         lower: interval.lower,
         upper: interval.upper,
         confidence: 1.0 - alpha,
+        method: Method::ClopperPearson,
         runs,
         satisfied_runs: Some(satisfied),
         decision: None,

@@ -39,6 +39,8 @@ pub enum Failure {
     BoundNeverReached,
     /// The value of an expression is no finite number.
     NoNumber,
+    /// A value whose mean is asked for lies outside the bounds that the user gave.
+    ValueOutOfBounds(f64),
     /// A comparison changes more often than numbers can tell apart.
     NoProgress(Stand),
 }

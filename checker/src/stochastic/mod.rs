@@ -3,6 +3,7 @@
 //! Every run draws from a generator of its own, numbered by the run: run k of a seed is the same
 //! whatever the number of threads, and results count in the order of run numbers.
 
+mod collector;
 mod condition;
 mod estimate;
 mod extreme;
@@ -18,7 +19,7 @@ mod span;
 pub mod statistics;
 mod windows;
 
-pub use estimate::{Estimate, Precision, Simulated, estimate, simulate};
+pub use estimate::{Estimate, MeanMethod, Precision, Simulated, estimate, simulate};
 pub use failure::{Failure, Stand};
 pub use race::{ZENO_MOVES, ZENO_TIME};
 pub use run::{Outcome, Runner, Trajectory};

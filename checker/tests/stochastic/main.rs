@@ -12,10 +12,10 @@ use checker::semantics::{self, Reading};
 use checker::stochastic::{Failure, Runner};
 use checker::syntax;
 
-mod flows;
 #[path = "../common/checks.rs"]
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
+mod flows;
 mod networks;
 #[path = "../common/random.rs"]
 #[allow(dead_code, reason = "this program draws in some of the ways only")]

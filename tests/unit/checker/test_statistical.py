@@ -41,6 +41,7 @@ def test_a_probability_has_an_interval(model: Model) -> None:
     assert estimate.lower < estimate.value < estimate.upper
     assert estimate.value == pytest.approx(1 - math.exp(-1), abs=0.02)
     assert estimate.confidence == 0.95
+    assert estimate.method == "Clopper-Pearson"
     assert "20000 runs" in repr(answer)
 
 
@@ -82,6 +83,7 @@ def test_a_mean_has_an_interval(model: Model) -> None:
     assert estimate is not None
     assert (estimate.value, estimate.runs, estimate.satisfied_runs) == (3.0, 100, None)
     assert (estimate.lower, estimate.upper) == (3.0, 3.0)
+    assert estimate.method == "Student (asymptotic)"
 
 
 def test_a_run_without_result_is_refused_with_its_place(tmp_path: Path) -> None:
@@ -91,11 +93,103 @@ def test_a_run_without_result_is_refused_with_its_place(tmp_path: Path) -> None:
         load_file(path).check("Pr[<=1](<> P.B)")
 
 
-@pytest.mark.parametrize("option", ["alpha", "beta", "epsilon"])
+@pytest.mark.parametrize("option", ["alpha", "beta", "epsilon", "delta"])
 @pytest.mark.parametrize("value", [0.0, 1.0, -1.0, math.nan])
 def test_risks_lie_between_0_and_1(option: str, value: float, model: Model) -> None:
     with pytest.raises(ValueError, match=f"{option} is"):
         model.check(HALF, **{option: value})
+
+
+def test_deltas_may_differ(model: Model) -> None:
+    # The farther apart the two hypotheses are, the fewer runs tell them apart.
+    narrow = model.check(f"{HALF} >= 0.7").estimate
+    wide = model.check(f"{HALF} >= 0.7", delta=(0.15, 0.01)).estimate
+    assert narrow is not None
+    assert wide is not None
+    assert wide.runs < narrow.runs
+    assert model.check(f"{HALF} >= 0.7", delta=(0.01, 0.01)).estimate == narrow
+    for ratios in ((1.1, 1.2), (0.9, 1.0), (0.0, 2.0)):
+        with pytest.raises(ValueError, match="odds_ratios are"):
+            model.check(HALF, odds_ratios=ratios)
+    with pytest.raises(ValueError, match="discretisation is"):
+        model.check(HALF, discretisation=0.0)
+
+
+def test_an_interval_may_hold_at_any_moment(model: Model) -> None:
+    fixed = model.check(HALF, runs=1000).estimate
+    anytime = model.check(HALF, runs=1000, anytime=True).estimate
+    assert fixed is not None
+    assert anytime is not None
+    assert anytime.method == "confidence sequence"
+    assert (anytime.value, anytime.runs) == (fixed.value, fixed.runs)
+    assert anytime.lower is not None
+    assert anytime.upper is not None
+    assert fixed.lower is not None
+    assert fixed.upper is not None
+    assert anytime.lower < fixed.lower < fixed.upper < anytime.upper
+    # Without a number of runs it becomes as narrow as epsilon says.
+    narrow = model.check(HALF, anytime=True, epsilon=0.02).estimate
+    assert narrow is not None
+    assert narrow.lower is not None
+    assert narrow.upper is not None
+    assert narrow.value - 0.02 <= narrow.lower <= 0.5 <= narrow.upper <= narrow.value + 0.02
+
+
+def test_the_width_may_be_a_part_of_the_estimate(model: Model) -> None:
+    for query, probability in ((HALF, 0.5), ("Pr[<=0.2](<> P.B)", 1 - math.exp(-0.1))):
+        estimate = model.check(query, relative=0.1, seed=2).estimate
+        assert estimate is not None
+        assert estimate.lower is not None
+        assert estimate.upper is not None
+        assert 0.9 * estimate.value <= estimate.lower <= probability
+        assert probability <= estimate.upper <= 1.1 * estimate.value
+    never = model.check("Pr[<=1](<> Q.B)", relative=0.1, runs=2000).estimate
+    assert never is not None
+    assert (never.value, never.runs) == (0.0, 2000)
+
+
+@pytest.mark.parametrize(
+    ("options", "method"),
+    [
+        ({}, "Student (asymptotic)"),
+        ({"value_bounds": (0, 3)}, "empirical Bernstein"),
+        ({"value_bounds": (0, 3), "anytime": True}, "empirical Bernstein confidence sequence"),
+        ({"value_bounds": (0, 3), "mean_interval": "dkw"}, "Dvoretzky-Kiefer-Wolfowitz"),
+        ({"value_bounds": (0, 3), "mean_interval": "student"}, "Student (asymptotic)"),
+    ],
+)
+def test_a_mean_between_bounds_has_other_intervals(
+    options: dict[str, object], method: str, model: Model
+) -> None:
+    estimate = model.check("E[<=3; 500](max: Q.B ? 3.0 - x : 0.0)", **options).estimate  # type: ignore[arg-type]
+    assert estimate is not None
+    assert estimate.method == method
+    assert estimate.runs == 500
+    assert estimate.lower is not None
+    assert estimate.upper is not None
+    assert estimate.lower <= 0.25 <= estimate.upper
+
+
+def test_bounds_of_integers_are_known(model: Model) -> None:
+    for value, method in (
+        ("Q.B", "empirical Bernstein"),
+        ("2 * Q.B + 0.5", "empirical Bernstein"),
+        ("Q.B + x", "Student (asymptotic)"),
+    ):
+        estimate = model.check(f"E[<=3; 100](max: {value})").estimate
+        assert estimate is not None
+        assert estimate.method == method
+
+
+def test_intervals_that_cannot_be_made_are_refused(model: Model) -> None:
+    with pytest.raises(InputError, match="needs bounds of the value"):
+        model.check("E[<=3; 100](max: x)", anytime=True)
+    with pytest.raises(InputError, match="is for a fixed number of runs"):
+        model.check("E[<=3; 100](max: Q.B)", anytime=True, mean_interval="dkw")
+    with pytest.raises(InputError, match="the value is 3, which is not between the bounds"):
+        model.check("E[<=3; 100](max: x)", value_bounds=(0, 2))
+    with pytest.raises(ValueError, match="value_bounds are 2 and 1"):
+        model.check(HALF, value_bounds=(2, 1))
 
 
 def test_the_command_line_prints_the_interval(

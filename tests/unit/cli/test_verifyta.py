@@ -207,7 +207,7 @@ def test_a_strategy_is_shown_where_a_trace_is_asked_for(
             "o1.xml: [error] the trace o1.xml would replace the",
         ),
         (["--nope", "gate.xta"], "verifyta: [error] unknown option --nope; -h lists the options."),
-        (["-D", "0.1", "gate.xta"], "verifyta: [error] -D/--discretization is not supported: "),
+        (["-D", "0", "gate.xta"], "verifyta: [error] --discretization is '0', but must be a"),
         (["fails.xta", "fails.q"], "fails.xta:2: [error] value out of range: n + 1."),
         (["gate.xta", "smc.q"], "smc.q:1: [error] "),
     ],

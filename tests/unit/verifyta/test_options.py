@@ -7,6 +7,7 @@ import pytest
 from ntagen.errors import InputError
 from ntagen.verifyta.options import OPTIONS, parse
 from ntagen.verifyta.output import help_text
+from ntagen.verifyta.statistical import statistical
 
 
 @pytest.mark.parametrize(
@@ -64,7 +65,7 @@ def test_a_wrong_option_is_named(words: list[str], message: str) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [["-D0.1"], ["--good-runs", "50"], ["-A"], ["-Z"], ["-sZ"]],
+    [["--good-runs", "50"], ["-A"], ["-Z"], ["-sZ"]],
 )
 def test_what_would_change_a_verdict_is_not_supported(words: list[str]) -> None:
     with pytest.raises(InputError, match="is not supported: "):
@@ -84,4 +85,23 @@ def test_risks_of_statistical_queries_lie_between_0_and_1() -> None:
     assert parse(["-E", "0.1", "--alpha=0.01"]).value("--alpha") == "0.01"
     for words in (["-E", "0"], ["--alpha=1"], ["-B", "nan"], ["-E", "much"]):
         with pytest.raises(InputError, match="must be a number between 0 and 1"):
+            parse(words)
+
+
+def test_parameters_of_random_runs_become_options_of_queries() -> None:
+    risks = ["-E", "0.1", "-a0.01", "-B", "0.2", "--delta", "0.02", "--u1", "2"]
+    line = parse([*risks, "-r", "7", "-D", "0.5", "--runs", "9", "-s", "m.xml"])
+    assert statistical(line.given) == {
+        "epsilon": 0.1,
+        "alpha": 0.01,
+        "beta": 0.2,
+        "seed": 7,
+        "discretisation": 0.5,
+        "delta": 0.02,
+        "odds_ratios": (0.9, 2.0),
+        "runs": 9,
+    }
+    assert statistical(parse(["-s", "m.xml"]).given) == {}
+    for words in (["--runs", "0"], ["-D", "-1"], ["--u1", "0.5"], ["--u0", "2"]):
+        with pytest.raises(InputError, match="must be a"):
             parse(words)

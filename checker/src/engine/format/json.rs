@@ -116,6 +116,7 @@ pub fn estimate(estimate: &Estimate) -> Json {
         "lower": real(estimate.lower),
         "upper": real(estimate.upper),
         "confidence": real(estimate.confidence),
+        "method": estimate.method.name(),
         "runs": estimate.runs,
         "satisfied_runs": estimate.satisfied_runs,
     })

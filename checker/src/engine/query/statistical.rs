@@ -14,8 +14,10 @@ use crate::engine::rejection::Rejection;
 use crate::ir::{EdgeId, Network, Statistical};
 use crate::network;
 use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::statistics::Decision;
-use crate::stochastic::{Failure, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate, simulate};
+use crate::stochastic::statistics::{Decision, Method};
+use crate::stochastic::{
+    Failure, MeanMethod, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate, simulate,
+};
 use crate::syntax;
 use crate::syntax::ast;
 
@@ -65,6 +67,11 @@ impl LoadedModel {
             threads: options.thread_count(),
             ..options.precision
         };
+        if let Some((message, help)) = contradiction(&compiled.kind, &precision) {
+            let diagnostic = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message);
+            let rejection = Rejection::new(vec![diagnostic.help(help)], &self.sources);
+            return rejected(self, stochastic, rejection);
+        }
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
         let result = watch.bound(|watch| {
@@ -106,7 +113,8 @@ impl LoadedModel {
                     Some(Decision::AtLeast) | None => Verdict::Satisfied,
                 };
                 let mut answer = Answer::new(verdict, Counters::default());
-                if let Some(remark) = remark(&compiled.kind, verdict) {
+                let method = estimate.as_ref().map(|estimate| estimate.method);
+                if let Some(remark) = remark(&compiled.kind, verdict, method) {
                     answer.remark(remark);
                 }
                 answer.estimate = estimate;
@@ -197,6 +205,11 @@ impl LoadedModel {
                 ),
                 "widen its invariant, or give it an edge that is enabled in time",
             ),
+            Failure::ValueOutOfBounds(value) => (
+                query,
+                format!("in a random run the value is {value}, which is not between the bounds"),
+                "give wider ones: --value-bounds LOW,HIGH",
+            ),
             Failure::InvariantBroken(stand) => (
                 span(stand),
                 format!(
@@ -242,12 +255,41 @@ impl LoadedModel {
     }
 }
 
+/// Why an interval cannot be made as it is asked for, and what to do.
+fn contradiction(
+    query: &Statistical,
+    precision: &Precision,
+) -> Option<(&'static str, &'static str)> {
+    let Statistical::Expectation { range, .. } = query else {
+        return None;
+    };
+    let has_bounds = precision.value_bounds.or(*range).is_some();
+    let is_sequential = precision.anytime || precision.relative.is_some();
+    match precision.mean_method {
+        MeanMethod::DvoretzkyKieferWolfowitz if is_sequential => Some((
+            "an interval of Dvoretzky, Kiefer and Wolfowitz is for a fixed number of runs",
+            "leave the choice to empirical Bernstein intervals, which hold at any moment",
+        )),
+        MeanMethod::Student if is_sequential => Some((
+            "Student's interval is for a fixed number of runs",
+            "leave the choice to empirical Bernstein intervals, which hold at any moment",
+        )),
+        MeanMethod::Student => None,
+        MeanMethod::Auto if !is_sequential => None,
+        _ if !has_bounds => Some((
+            "such an interval of a mean needs bounds of the value, and none are known",
+            "give them: --value-bounds LOW,HIGH",
+        )),
+        _ => None,
+    }
+}
+
 fn is_test(query: &Statistical) -> bool {
     matches!(query, Statistical::Hypothesis { .. })
 }
 
 /// What the numbers do not say themselves.
-fn remark(query: &Statistical, verdict: Verdict) -> Option<&'static str> {
+fn remark(query: &Statistical, verdict: Verdict, method: Option<Method>) -> Option<&'static str> {
     match (query, verdict) {
         (_, Verdict::Unknown(_)) => Some("the estimate is that of the runs until then"),
         (Statistical::Hypothesis { .. }, Verdict::Maybe) => {
@@ -256,7 +298,7 @@ fn remark(query: &Statistical, verdict: Verdict) -> Option<&'static str> {
         (Statistical::Hypothesis { .. }, _) => {
             Some("decided by a sequential test; the interval is that of as many runs")
         }
-        (Statistical::Expectation { .. }, _) => {
+        (Statistical::Expectation { .. }, _) if method == Some(Method::Student) => {
             Some("the interval is Student's: asymptotic, for many runs")
         }
         _ => None,

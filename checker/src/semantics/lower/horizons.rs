@@ -98,9 +98,9 @@ impl Builder<'_> {
     fn leave_horizon(&mut self, shared: Option<Horizon>) {
         if let Some(shared) = shared {
             let Horizon {
-                horizon, signature, ..
+                least, signature, ..
             } = shared;
-            self.store(word_pair(chance_words::RESULT), horizon, &Type::Double);
+            self.store(word_pair(chance_words::RESULT), least, &Type::Double);
             self.store(word_pair(chance_words::SIGNATURE), signature, &Type::Double);
         }
     }

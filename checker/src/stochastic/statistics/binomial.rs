@@ -39,21 +39,23 @@ pub(super) fn at_most(most: u64, runs: u64, probability: f64) -> f64 {
     beta_reg((runs - most) as f64, (most + 1) as f64, 1.0 - probability)
 }
 
+/// Where between two numbers `is_below` ends to hold.
+pub(super) fn halved(mut low: f64, mut high: f64, is_below: &dyn Fn(f64) -> bool) -> f64 {
+    for _ in 0..HALVINGS {
+        let middle = f64::midpoint(low, high);
+        if is_below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    f64::midpoint(low, high)
+}
+
 /// The two-sided interval that misses the probability with a risk of at most `alpha`, whatever the
 /// probability is, if the number of runs was fixed before.
 pub fn clopper_pearson(successes: u64, runs: u64, alpha: f64) -> Interval {
     let estimate = successes as f64 / runs as f64;
-    let halved = |mut low: f64, mut high: f64, is_below: &dyn Fn(f64) -> bool| {
-        for _ in 0..HALVINGS {
-            let middle = f64::midpoint(low, high);
-            if is_below(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        f64::midpoint(low, high)
-    };
     let lower = if successes == 0 {
         0.0
     } else {

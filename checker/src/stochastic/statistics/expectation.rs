@@ -3,6 +3,10 @@
 //! The interval is Student's: it is right in the limit of many runs, and can be far too narrow for
 //! few runs of values that are rarely great.
 //!
+//! Of values that cannot be negative, the logarithm of the mean may have the interval instead: with
+//! the relative error r of the mean, it is the mean times exp(-r) and exp(r). In the limit that is
+//! the same; for values with a long tail it misses less often.
+//!
 //! Source: B. P. Welford, "Note on a method for calculating corrected sums of squares and
 //! products", Technometrics 4 (1962).
 
@@ -35,6 +39,17 @@ impl Expectation {
     /// Their mean; 0 without values.
     pub fn mean(&self) -> f64 {
         self.mean
+    }
+
+    /// Student's interval of the logarithm of the mean of values that are not negative; `None` for
+    /// fewer than two values, and if all are 0.
+    pub fn student_of_logarithm(&self, alpha: f64) -> Option<Interval> {
+        let interval = self.student(alpha)?;
+        let relative = (interval.upper - self.mean) / self.mean;
+        (self.mean > 0.0).then(|| Interval {
+            lower: self.mean * (-relative).exp(),
+            upper: self.mean * relative.exp(),
+        })
     }
 
     /// Student's interval, at a risk of `alpha` in the limit; `None` for fewer than two values.

@@ -2,8 +2,10 @@
 //! Clopper-Pearson interval are within epsilon of the estimate.
 //!
 //! The interval is that of a fixed number of runs, and stopping by what was seen is not corrected.
-//! The tests compute exactly how often it misses the probability nevertheless: at alpha = 0.05 and
-//! epsilon = 0.05 less often than alpha, for every probability of a fine grid.
+//! The tests compute exactly how often it misses the probability nevertheless: for alpha = 0.05 and
+//! 0.01 and epsilon = 0.05 less often than alpha, for every probability of a fine grid.
+
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::binomial::{Interval, at_least, at_most, clopper_pearson};
 
@@ -12,21 +14,19 @@ use super::binomial::{Interval, at_least, at_most, clopper_pearson};
 pub struct FixedWidth {
     alpha: f64,
     epsilon: f64,
+    /// How many standard deviations the normal distribution takes for half an interval.
+    quantile: f64,
     runs: u64,
     satisfied: u64,
 }
 
-/// From so many results of each kind on, the normal distribution says well enough when the interval
-/// is still far too wide.
+/// From so many results of each kind on, the interval is at least as wide as the normal
+/// distribution says, but for [`SAFETY`].
 const MANY: u64 = 1000;
 
 /// So much narrower than its normal approximation an interval with [`MANY`] results of each kind
 /// never is.
-const SAFETY: f64 = 0.9;
-
-/// A bound from below of how many standard deviations wide half an interval is: that at a risk of
-/// 0.3; no one takes a greater risk and many runs.
-const LEAST_QUANTILE: f64 = 1.0;
+const SAFETY: f64 = 0.99;
 
 impl FixedWidth {
     /// One without runs.
@@ -34,6 +34,7 @@ impl FixedWidth {
         FixedWidth {
             alpha,
             epsilon,
+            quantile: Normal::standard().inverse_cdf(1.0 - alpha / 2.0),
             runs: 0,
             satisfied: 0,
         }
@@ -47,14 +48,23 @@ impl FixedWidth {
     }
 
     fn is_narrow(&self) -> bool {
+        !self.is_far_too_wide() && self.is_exactly_narrow()
+    }
+
+    /// Whether the normal distribution is enough to say that the interval is too wide.
+    fn is_far_too_wide(&self) -> bool {
+        let (runs, successes) = (self.runs, self.satisfied);
+        if successes < MANY || runs - successes < MANY {
+            return false;
+        }
+        let estimate = successes as f64 / runs as f64;
+        let deviation = (estimate * (1.0 - estimate) / runs as f64).sqrt();
+        SAFETY * self.quantile * deviation > self.epsilon
+    }
+
+    fn is_exactly_narrow(&self) -> bool {
         let (runs, successes) = (self.runs, self.satisfied);
         let estimate = successes as f64 / runs as f64;
-        if successes >= MANY && runs - successes >= MANY {
-            let deviation = (estimate * (1.0 - estimate) / runs as f64).sqrt();
-            if SAFETY * LEAST_QUANTILE * deviation > self.epsilon {
-                return false;
-            }
-        }
         let (low, high) = (estimate - self.epsilon, estimate + self.epsilon);
         let risk = self.alpha / 2.0;
         (low <= 0.0 || at_least(successes, runs, low) <= risk)
@@ -79,17 +89,20 @@ impl FixedWidth {
 
 #[cfg(test)]
 mod tests {
+    use super::super::binomial::Interval;
     use super::FixedWidth;
+
+    fn state(alpha: f64, epsilon: f64, runs: u64, satisfied: u64) -> FixedWidth {
+        FixedWidth {
+            runs,
+            satisfied,
+            ..FixedWidth::new(alpha, epsilon)
+        }
+    }
 
     /// Whether the rule stops after this many runs, and what it has counted.
     fn stops(successes: u64, runs: u64, epsilon: f64) -> bool {
-        FixedWidth {
-            alpha: 0.05,
-            epsilon,
-            runs,
-            satisfied: successes,
-        }
-        .is_narrow()
+        state(0.05, epsilon, runs, successes).is_narrow()
     }
 
     #[test]
@@ -103,25 +116,52 @@ mod tests {
         assert!(stops(0, 36_887, 1e-4) && !stops(0, 36_886, 1e-4));
     }
 
-    /// The probability that the interval misses p, by dynamic programming over all results.
-    fn risk(p: f64) -> f64 {
-        let mut open = vec![1.0];
-        let mut missed = 0.0;
-        for runs in 1..=404_u64 {
-            let mut next = vec![0.0; open.len() + 1];
-            for (successes, weight) in open.iter().enumerate() {
-                next[successes] += weight * (1.0 - p);
-                next[successes + 1] += weight * p;
+    /// At which numbers of runs and of satisfied ones the rule stops, up to the number at which it
+    /// always does: of each the interval, or `None` where it goes on.
+    fn ends(alpha: f64, epsilon: f64) -> Vec<Vec<Option<Interval>>> {
+        const UNREACHED: Option<Interval> = Some(Interval {
+            lower: 0.0,
+            upper: 1.0,
+        });
+        let mut ends: Vec<Vec<Option<Interval>>> = Vec::new();
+        for runs in 1.. {
+            let before = ends.last();
+            let goes_on = |satisfied: usize| {
+                before.is_none_or(|row| matches!(row.get(satisfied), Some(None)))
+            };
+            let row: Vec<Option<Interval>> = (0..=runs)
+                .map(|satisfied| {
+                    let index = satisfied as usize;
+                    if !(goes_on(index) || index.checked_sub(1).is_some_and(goes_on)) {
+                        return UNREACHED;
+                    }
+                    let state = state(alpha, epsilon, runs, satisfied);
+                    state.is_narrow().then(|| state.interval())
+                })
+                .collect();
+            let is_last = row.iter().all(Option::is_some);
+            ends.push(row);
+            if is_last {
+                break;
             }
-            for (successes, weight) in next.iter_mut().enumerate() {
-                let state = FixedWidth {
-                    alpha: 0.05,
-                    epsilon: 0.05,
-                    runs,
-                    satisfied: successes as u64,
-                };
-                if *weight > 0.0 && state.is_narrow() {
-                    let interval = state.interval();
+        }
+        ends
+    }
+
+    /// The probability that the interval misses `p`, by dynamic programming over all results, and
+    /// the mean number of runs.
+    fn risk(ends: &[Vec<Option<Interval>>], p: f64) -> (f64, f64) {
+        let mut open = vec![1.0];
+        let (mut missed, mut runs) = (0.0, 0.0);
+        for row in ends {
+            let mut next = vec![0.0; row.len()];
+            for (satisfied, weight) in open.iter().enumerate() {
+                runs += weight;
+                next[satisfied] += weight * (1.0 - p);
+                next[satisfied + 1] += weight * p;
+            }
+            for (weight, end) in next.iter_mut().zip(row) {
+                if let Some(interval) = end {
                     if !(interval.lower <= p && p <= interval.upper) {
                         missed += *weight;
                     }
@@ -130,16 +170,62 @@ mod tests {
             }
             open = next;
         }
-        assert!(open.iter().all(|&weight| weight == 0.0), "no run is longer");
-        missed
+        (missed, runs)
+    }
+
+    /// Checks that the interval misses less often than `alpha`, for 499 probabilities; beyond 1/2
+    /// everything is the same the other way round.
+    #[track_caller]
+    fn check_risk(alpha: f64, epsilon: f64, most_runs: usize) {
+        let ends = ends(alpha, epsilon);
+        assert_eq!(ends.len(), most_runs, "the longest estimate");
+        let mut worst: f64 = 0.0;
+        for i in 1..500 {
+            let p = f64::from(i) / 1000.0;
+            let (risk, _) = risk(&ends, p);
+            assert!(risk <= alpha, "{p}: {risk}");
+            worst = worst.max(risk);
+        }
+        // It is not far too careful either.
+        assert!(worst > 0.9 * alpha, "{worst}");
     }
 
     #[test]
     fn the_interval_misses_less_often_than_alpha() {
-        for i in 1..25 {
-            let p = f64::from(i) / 50.0;
-            let risk = risk(p);
-            assert!(risk <= 0.05, "{p}: {risk}");
+        check_risk(0.05, 0.05, 404);
+    }
+
+    #[test]
+    fn the_interval_misses_less_often_than_a_smaller_alpha() {
+        check_risk(0.01, 0.05, 683);
+    }
+
+    #[test]
+    fn the_normal_distribution_never_says_too_wide_where_it_is_not() {
+        for alpha in [0.2, 0.05, 0.001] {
+            for runs in [2_000, 2_500, 10_000, 100_000, 3_000_000] {
+                for satisfied in [1_000, 1_001, runs / 4, runs / 2, runs - 1_000] {
+                    let interval = super::clopper_pearson(satisfied, runs, alpha);
+                    let share = satisfied as f64 / runs as f64;
+                    let half = (share - interval.lower).max(interval.upper - share);
+                    let narrow = state(alpha, half * (1.0 + 1e-9), runs, satisfied);
+                    assert!(narrow.is_exactly_narrow(), "{alpha} {satisfied}/{runs}");
+                    assert!(!narrow.is_far_too_wide(), "{alpha} {satisfied}/{runs}");
+                    let wide = state(alpha, half * 0.9, runs, satisfied);
+                    assert!(
+                        wide.is_far_too_wide() || satisfied < 1_000 || runs - satisfied < 1_000
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_mean_number_of_runs_is_that_of_an_independent_computation() {
+        let ends = ends(0.05, 0.05);
+        for (p, expected) in [(0.001, 74.0), (0.1, 199.0), (0.4, 397.0)] {
+            let (_, runs) = risk(&ends, p);
+            assert!((runs - expected).abs() < 1.0, "{p}: {runs}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Whether a probability is at least a threshold: Wald's sequential probability ratio test.
 //!
-//! Within delta of the threshold nothing is promised. Outside, the probability of a wrong answer is
+//! Within the deltas of the threshold nothing is promised. Outside, the probability of a wrong answer is
 //! alpha (for "below") or beta (for "at least") up to the overshoot, which Wald neglects.
 //!
 //! Source: A. Wald, "Sequential tests of statistical hypotheses", Annals of Mathematical Statistics
@@ -29,10 +29,11 @@ pub struct SequentialTest {
 const LEAST: f64 = 1e-12;
 
 impl SequentialTest {
-    /// A test at these risks, with an indifference region of `delta` on both sides.
-    pub fn new(threshold: f64, delta: f64, alpha: f64, beta: f64) -> SequentialTest {
-        let high = (threshold + delta).clamp(LEAST, 1.0 - LEAST);
-        let low = (threshold - delta).clamp(LEAST, 1.0 - LEAST);
+    /// A test at these risks, with an indifference region that begins the first of `deltas` below
+    /// the threshold and ends the second above.
+    pub fn new(threshold: f64, deltas: (f64, f64), alpha: f64, beta: f64) -> SequentialTest {
+        let high = (threshold + deltas.1).clamp(LEAST, 1.0 - LEAST);
+        let low = (threshold - deltas.0).clamp(LEAST, 1.0 - LEAST);
         SequentialTest {
             steps: ((low / high).ln(), ((1.0 - low) / (1.0 - high)).ln()),
             limits: ((beta / (1.0 - alpha)).ln(), ((1.0 - beta) / alpha).ln()),
@@ -63,7 +64,10 @@ mod tests {
 
     /// The probability that a test says this at a probability of `p`, by dynamic programming.
     fn says(decision: Decision, threshold: f64, p: f64) -> f64 {
-        let mut open = vec![(1.0, SequentialTest::new(threshold, 0.05, 0.05, 0.05))];
+        let mut open = vec![(
+            1.0,
+            SequentialTest::new(threshold, (0.05, 0.05), 0.05, 0.05),
+        )];
         let mut said = 0.0;
         for _ in 0..3000 {
             let mut next: Vec<(f64, SequentialTest)> = Vec::new();
