@@ -42,6 +42,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.picture": {"errors", "files"},
     "checker.charts": {"errors", "checker.picture"},
     "checker.winning": {"errors", "checker.picture"},
+    "checker.distribution": {"errors", "frames", "checker.picture"},
+    "checker.interrupted": {"checker.answer"},
+    "checker.trajectories": {"errors", "frames", "checker.picture"},
     "checker.queries": set(),
     "checker.expectation": {"checker.queries"},
     "checker.facts": {"checker.picture", "checker.queries"},
@@ -55,18 +58,20 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
     | {"checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
-    | {"checker.story", "checker.strategy", "_checker"},
+    | {"checker.story", "checker.strategy", "_checker"}
+    | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.query_form": {"_checker"},
     "checker.constants": set(),
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.constants"}
+    | {"checker.constants", "checker.interrupted"}
     | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
     | {"checker.expectation"}
-    | {"checker.options", "checker.query_form", "checker.states"},
+    | {"checker.options", "checker.query_form", "checker.states"}
+    | {"checker.distribution", "checker.interrupted", "checker.trajectories"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
@@ -97,7 +102,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
-    "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"},
+    "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"} | {"checker.picture"},
     "experiment": BASE
     | {"files", "frames", "grbl", "needle", "nsl", "plan", "drive", "lab", "system", "version"},
     "cli": BASE

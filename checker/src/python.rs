@@ -22,7 +22,7 @@ use crate::engine::format::explain;
 use crate::engine::query_form;
 use crate::tuning::PARTS;
 
-use answer::{Answer, check};
+use answer::{Answer, InterruptedError, check};
 use convert::{FailedError, RejectedError, rejected, until_signal};
 use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
@@ -74,6 +74,10 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<play::Play>()?;
     module.add_class::<plans::Plans>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
+    module.add(
+        "InterruptedError",
+        module.py().get_type::<InterruptedError>(),
+    )?;
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
     module.add("PARTS", PARTS.to_vec())?;
     module.add_function(wrap_pyfunction!(check, module)?)?;

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ntagen.checker.answer import Answer, Estimate, Extreme, Place, Trajectory, Value, Verdict
+from ntagen.checker.answer import Answer, Estimate, Extreme, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.expectation import Expected, expected_of, is_as_expected, remark_of
+from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.model import (
     HEURISTICS,
     Model,
@@ -30,6 +31,7 @@ from ntagen.checker.options import (
     Options,
     PlansWanted,
     Progress,
+    RunProgress,
     SearchOrder,
     StrategyWanted,
     TraceWanted,
@@ -37,7 +39,9 @@ from ntagen.checker.options import (
 from ntagen.checker.query_form import QueryForm, form_of
 
 if TYPE_CHECKING:
+    from ntagen.checker.distribution import Cumulative, Distribution, Histogram
     from ntagen.checker.states import Simulation, SymbolicState
+    from ntagen.checker.trajectories import OverTime, Trajectory
 
 __all__ = [
     "HEURISTICS",
@@ -45,20 +49,26 @@ __all__ = [
     "REDUCTIONS",
     "Answer",
     "CodeEngine",
+    "Cumulative",
+    "Distribution",
     "EngineEdge",
     "EnginePlan",
     "EngineStep",
     "Estimate",
     "Expected",
     "Extreme",
+    "Histogram",
+    "Interrupted",
     "Model",
     "Options",
+    "OverTime",
     "OverflowRule",
     "Place",
     "PlansWanted",
     "Progress",
     "QueryForm",
     "RejectedError",
+    "RunProgress",
     "SearchOrder",
     "Simulation",
     "StrategyWanted",
@@ -77,9 +87,21 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name not in ("Simulation", "SymbolicState"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from ntagen.checker import states
+_HOMES = {
+    "Cumulative": "distribution",
+    "Distribution": "distribution",
+    "Histogram": "distribution",
+    "OverTime": "trajectories",
+    "Simulation": "states",
+    "SymbolicState": "states",
+    "Trajectory": "trajectories",
+}
+"""Where the names are that only some answers need."""
 
-    return getattr(states, name)
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen import _checker
 from ntagen.checker.edges import EdgeEntry, EngineEdge, EnginePlan, EngineStep, step_of
 from ntagen.checker.errors import rejecting
+from ntagen.errors import InputError
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
+    from ntagen.checker.distribution import Distribution
     from ntagen.checker.machine import Machine
+    from ntagen.checker.picture.chart import Chart
     from ntagen.checker.runs import Run
     from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
+    from ntagen.checker.trajectories import OverTime, Trajectory
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
 
@@ -77,21 +81,6 @@ class Estimate:
     satisfied_runs: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class Trajectory:
-    """A random run that ``simulate`` shows.
-
-    Attributes:
-        run: The number of the run, from 0.
-        points: For each expression, by its text, the moments in units of the model, with its
-            values. Between two moments the value is linear in time; two values at one moment are
-            those before and after a move.
-    """
-
-    run: int
-    points: dict[str, list[tuple[float, float]]]
-
-
 class Answer:
     """The answer to a query.
 
@@ -110,7 +99,9 @@ class Answer:
         wrapped: The first place, in the order of the model, where a result of integer arithmetic
             did not fit into 32 bits and wrapped round. `Model.overflow` can make it an error.
         warnings: The warnings about the query, one text each.
-        stop: ``states``, ``memory``, ``time`` or ``clocks`` if a limit stopped the search.
+        stop: ``states``, ``memory``, ``time`` or ``clocks`` if a limit stopped the search;
+            ``interrupted`` if the user ended random runs, and this is the answer of those until
+            then.
         explored: The number of states whose successors were computed.
         stored: The number of states that are stored at the end; a state that was replaced by one
             with a larger zone does not count.
@@ -192,14 +183,98 @@ class Answer:
     @property
     def trajectories(self) -> tuple[Trajectory, ...]:
         """The runs that ``simulate`` shows; empty for other queries."""
+        from ntagen.checker.trajectories import Trajectory
+
         items, runs = self._raw.trajectories() or ([], [])
         return tuple(
-            Trajectory(number, dict(zip(items, points, strict=True))) for number, points in runs
+            Trajectory(number, self.query, dict(zip(items, points, strict=True)))
+            for number, points in runs
         )
 
     @property
+    def distribution(self) -> Distribution | None:
+        """How the values of random runs are distributed; ``None`` for other queries than these.
+
+        For ``Pr`` they say when runs reach what is asked, for ``E`` what is asked of each.
+        """
+        from ntagen.checker.distribution import Distribution
+
+        known = self._raw.distribution_json()
+        if known is None:
+            return None
+        return Distribution(json.loads(known), self._raw.distribution_points, self.query)
+
+    def frequency_over_time(
+        self,
+        times: Any = None,  # noqa: ANN401  any array will do
+        quantiles: tuple[float, float] = (0.05, 0.95),
+    ) -> OverTime:
+        """What the runs that ``simulate`` shows say of each moment: mean and quantiles over runs.
+
+        For an expression that is 0 or 1 the mean is the share of runs in which it holds then.
+
+        Args:
+            times: The moments; by default 201 from 0 to the end of the longest run.
+            quantiles: Which quantiles over runs are given beside the mean.
+
+        Raises:
+            InputError: No run is shown, or the quantiles do not lie between 0 and 1.
+        """
+        from ntagen.checker.trajectories import over_time
+
+        return over_time(self.trajectories, times, quantiles, self.query)
+
+    def to_frame(self) -> Any:  # noqa: ANN401  it depends on what is installed
+        """What random runs say, as a frame of pandas, or of polars if there is no pandas.
+
+        It has a row for each point of the runs of ``simulate``, and for ``Pr`` and ``E`` a row for
+        each value of `distribution`.
+
+        Raises:
+            InputError: Neither library is installed, or the query is not statistical.
+        """
+        from ntagen.checker.trajectories import frame_of_trajectories
+
+        if (distribution := self.distribution) is not None:
+            return distribution.to_frame()
+        if self._raw.trajectories() is None:
+            raise InputError(
+                f"{self.query.strip()} has no random runs to make a frame of\n"
+                "hint: ask for Pr[…](…), E[…](…) or simulate[…]{…}"
+            )
+        return frame_of_trajectories(self.trajectories)
+
+    def chart(self, buckets: int | None = None, width: float | None = None) -> Chart | None:
+        """What random runs say, as panels; ``None`` if there is nothing to draw.
+
+        Args:
+            buckets: The number of buckets of a histogram; see `Distribution.histogram`.
+            width: How wide they are, instead.
+
+        Raises:
+            InputError: The buckets cannot be made.
+        """
+        from ntagen.checker.trajectories import runs_chart
+
+        distribution, estimate = self.distribution, self.estimate
+        if distribution is not None and distribution.count > 0:
+            is_mean = distribution.of == "value" and estimate is not None
+            ends = (estimate.lower, estimate.upper) if is_mean and estimate else (None, None)
+            return distribution.chart(buckets, width, ends)
+        runs = self.trajectories
+        return runs_chart(runs, self.query) if runs else None
+
+    def _repr_svg_(self) -> str | None:
+        from ntagen.checker.picture.chart import svg
+
+        chart = self.chart()
+        return None if chart is None else svg(chart).text
+
+    @property
     def limit_text(self) -> str:
-        """The limit that stopped the search, in words, for example ``state limit``."""
+        """What stopped the search, in words, for example ``state limit``; or ``user``."""
+        if self.stop == "interrupted":
+            return "user"
         return f"{(self.stop or 'unknown').removesuffix('s')} limit"
 
     @property

@@ -14,6 +14,7 @@ from ntagen.checker.answer import Answer
 from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeEntry
 from ntagen.checker.errors import failing, rejecting
+from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.options import CodeEngine, Options, by_keywords
 from ntagen.checker.queries import Query, queries_from
 from ntagen.checker.query_form import form_of
@@ -227,15 +228,21 @@ class Model:
         Raises:
             ValueError: A keyword has a value that it cannot have.
             RejectedError: The query is wrong or of a kind that is not supported.
-            KeyboardInterrupt: The user interrupted.
+            KeyboardInterrupt: The user interrupted. If random runs were made until then, it is an
+                `Interrupted` with their answer.
         """
         return self.answer(query, options)
 
     def answer(self, query: str, options: Options) -> Answer:
         """Answers a query as `check` does, with all options as one value."""
-        with rejecting():
-            raw = _checker.check(self._raw, query, options)
-        return Answer(raw, query, self._edge_table(), (options.forced, options.priorities))
+        rules = (options.forced, options.priorities)
+        try:
+            with rejecting():
+                raw = _checker.check(self._raw, query, options)
+        except _checker.InterruptedError as interrupted:
+            answer = Answer(interrupted.args[0], query, self._edge_table(), rules)
+            raise Interrupted(answer) from None
+        return Answer(raw, query, self._edge_table(), rules)
 
     @by_keywords(Options)
     def synthesize(self, query: str, options: Options) -> Strategy:

@@ -30,6 +30,9 @@ MeanInterval = Literal["auto", "student", "bernstein", "dkw"]
 Progress = Callable[[int, int, int, int], object]
 """Is called with the numbers of explored, stored and waiting states, and of bytes."""
 
+RunProgress = Callable[[int, float | None, float | None, float | None], object]
+"""Is called with the number of random runs, their estimate, and the ends of its interval."""
+
 MAX_PLANS = 1_000_000
 """The default maximum of plans that are listed."""
 
@@ -195,6 +198,11 @@ class Options:
     progress: Progress | None = None
     """Is called about twenty times per second with the numbers of explored, stored and waiting
     states and of bytes."""
+
+    run_progress: RunProgress | None = None
+    """Is called about ten times per second while a statistical query makes random runs, with their
+    number, the estimate so far and the ends of its interval; each is ``None`` as long as it is not
+    known. The interval is that of as many runs, and was not chosen to be looked at before."""
 
     def __post_init__(self) -> None:
         if self.threads != "all" and self.threads < 0:

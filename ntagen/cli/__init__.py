@@ -27,7 +27,7 @@ import click
 
 from ntagen.cli.signals import TERMINATED, Terminated, termination
 from ntagen.cli.terminal import echo, echo_message
-from ntagen.errors import InputError, NtagenError
+from ntagen.errors import InputError, LimitError, NtagenError
 from ntagen.version import VERSION
 
 __all__ = ["main", "verifyta"]
@@ -145,7 +145,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         except BaseException as error:  # also KeyboardInterrupt and panics of the engine
             code = _report(error)
-    return TERMINATED if signalled.came and code == INTERRUPTED else code
+    # What is interrupted, or ends with what it has until then, was ended by the signal.
+    is_ended = code in (INTERRUPTED, LimitError.exit_code)
+    return TERMINATED if signalled.came and is_ended else code
 
 
 def verifyta() -> int:

@@ -7,6 +7,7 @@ there; a JUnit or SARIF report is one document at the end.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -18,7 +19,7 @@ from ntagen.cli.terminal import echo, safe
 from ntagen.version import VERSION
 
 if TYPE_CHECKING:
-    from ntagen.checker import Model
+    from ntagen.checker import Model, Trajectory
 
 FORMATS: Final = ("human", "json", "github", "junit", "sarif")
 """The formats of answers, by their names on the command line."""
@@ -80,14 +81,25 @@ def _record(outcome: Outcome) -> dict[str, object]:
     }
     if answer is not None and answer.estimate is not None:
         record |= asdict(answer.estimate)
+    if answer is not None and answer.distribution is not None:
+        record["distribution"] = answer.distribution.to_json()
     if answer is not None and outcome.shows_runs:
-        record["trajectories"] = [asdict(one) for one in answer.trajectories]
+        record["trajectories"] = [_trajectory(one) for one in answer.trajectories]
     if answer is None:
         place = f"{mistake.path}:{mistake.line}:{mistake.column}" if mistake else None
         record |= {"place": place, "code": mistake and mistake.code}
     if outcome.is_compared:
         record |= {"expected": outcome.is_as_expected, "expectation": outcome.expected}
     return record
+
+
+def _trajectory(trajectory: Trajectory) -> dict[str, object]:
+    """A run with its points; JSON has no infinite numbers."""
+    points = {
+        text: [(time, value if math.isfinite(value) else None) for time, value in line]
+        for text, line in trajectory.points.items()
+    }
+    return {"run": trajectory.run, "points": points}
 
 
 class GitHub:

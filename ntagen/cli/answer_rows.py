@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.models import pointer_to_page
 from ntagen.cli.outcomes import Outcome, summary
+from ntagen.cli.run_rows import distribution_line
 from ntagen.cli.terminal import Styled, echo, echo_message
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ class Human:
         if outcome.answer is not None:
             if outcome.shows_runs:
                 lines += _shown_runs(outcome.answer)
-            lines += self._facts(outcome.answer)
+            lines += self._facts(outcome.answer, shows_runs=outcome.shows_runs)
         for line in [*lines, *outcome.notes]:
             echo(f"          {line}")
 
@@ -69,9 +70,11 @@ class Human:
         if pointer := pointer_to_page(refusals):
             echo(pointer, err=True)
 
-    def _facts(self, answer: Answer) -> list[str]:
+    def _facts(self, answer: Answer, *, shows_runs: bool) -> list[str]:
         if answer.estimate is not None:
             return _estimated(answer, answer.estimate)
+        if shows_runs:
+            return _made(answer)
         explored = "1 state" if answer.explored == 1 else f"{answer.explored} states"
         facts = [f"{explored} explored", f"{answer.stored} stored"]
         facts.append(f"{1000 * answer.seconds:.1f} ms")
@@ -103,7 +106,18 @@ def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
         runs = f"{estimate.satisfied_runs:,} of {runs} satisfied"
     stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
+    values = answer.distribution
+    if values is not None and (shown := distribution_line(values)) is not None:
+        lines.append(shown)
     return [*lines, answer.message] if answer.message else lines
+
+
+def _made(answer: Answer) -> list[str]:
+    """How many runs `simulate` has made, and what it took."""
+    count = len(answer.trajectories)
+    facts = [f"stopped by the {answer.limit_text}"] if answer.stop else []
+    facts += [f"{count:,} run" + ("s" if count != 1 else ""), f"{1000 * answer.seconds:.1f} ms"]
+    return [", ".join(facts), *([answer.message] if answer.message else [])]
 
 
 RUNS_SHOWN: Final = 3

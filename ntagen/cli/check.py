@@ -28,9 +28,9 @@ from ntagen.cli.models import (
 )
 from ntagen.cli.options import engine_options
 from ntagen.cli.outcomes import Outcome, exit_code
-from ntagen.cli.progress import shown_progress
 from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
+from ntagen.cli.run_progress import progress_of, say_interrupted
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
@@ -63,8 +63,8 @@ class _CheckCommand(click.Command):
     epilog="Exit codes: 0 every query is satisfied (with --expect: as expected), 1 some are not, "
     "2 the input is rejected (the other queries are still answered), 3 stopped by a limit, or the "
     "verdict is maybe, 4 run-time error in the model, 70 internal error (also if a strategy or "
-    "trace fails its check), 130 interrupted (the counters so far are printed), 141 nobody reads "
-    "the output any more, 143 ended by SIGTERM.",
+    "trace fails its check), 130 interrupted (the counters so far are printed; random runs until "
+    "then are an answer, with 3), 141 nobody reads the output any more, 143 ended by SIGTERM.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
@@ -212,7 +212,7 @@ def command(
     state satisfies the condition. If a clock comes near the value but never reaches it, the message
     says so.
     """  # noqa: D301  click wants the control character
-    from ntagen.checker import Options
+    from ntagen.checker import Interrupted, Options
 
     if as_json and form not in (None, "json"):
         raise click.UsageError(f"--json and --format {form} exclude each other; give one")
@@ -266,8 +266,14 @@ def command(
         expected = _EXPECTED.get(expect, query.expected) if expect else None
         outcome = Outcome(query, None, is_compared=expect is not None, expected=expected)
         try:
-            with shown_progress(query.text, quiet=not is_human) as report:
-                answer, found = answered(loaded, query, replace(wanted, progress=report), overflow)
+            with progress_of(query.text, query.form, quiet=not is_human) as reports:
+                answer, found = answered(loaded, query, replace(wanted, **reports), overflow)
+        except Interrupted as interrupted:
+            # The runs until then say something, and that is what the user gets.
+            outcomes.append(replace(outcome, answer=interrupted.answer))
+            say_interrupted(query.text, len(todo) - number - 1)
+            shown.one(outcomes[-1])
+            break
         except InputError as error:
             # The other queries may be right, and the user wants their answers.
             outcomes.append(replace(outcome, refusal=_with_severity(str(error))))

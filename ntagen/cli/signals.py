@@ -59,3 +59,18 @@ def handled(handlers: dict[signal.Signals, Handler]) -> Iterator[None]:
     finally:
         for number, handler in old.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def ending_at_once_next_time() -> Iterator[None]:
+    """Lets the first Ctrl-C interrupt as always, and the second one end the program at once.
+
+    The engine ends its work in an orderly way after the first one, which may take a moment.
+    """
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        raise KeyboardInterrupt
+
+    with handled({signal.SIGINT: interrupt}):
+        yield

@@ -128,6 +128,7 @@ def _progress(line: CommandLine, after: str) -> None:
 def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
+    from ntagen.verifyta.histogram import histogram
     from ntagen.verifyta.output import estimate, summary, values, verdict
     from ntagen.verifyta.statistical import statistical
 
@@ -153,7 +154,7 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
         raise ModelError(answer.message or "the model has a run-time error")
     shown = verdict(answer)
     _progress(line, f"{shown}\n")
-    for value in [*values(answer), *estimate(answer)]:
+    for value in [*values(answer), *estimate(answer), *histogram(answer)]:
         echo(value)
     if wants_trace:
         _write_trace(line, model, answer, number, inputs)

@@ -10,7 +10,7 @@ use crate::ir::SiteId;
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
-use crate::stochastic::{Estimate, Simulated};
+use crate::stochastic::{Estimate, Simulated, ValuesOfRuns};
 use crate::verify;
 use crate::verify::certificate::States;
 use crate::verify::strategy::Outcome as StrategyCheck;
@@ -112,6 +112,8 @@ pub struct Answer {
     pub estimate: Option<Estimate>,
     /// The runs that `simulate` shows.
     pub simulated: Option<Arc<Simulated>>,
+    /// How the values of the runs of a statistical query are distributed.
+    pub values_of_runs: Option<Arc<ValuesOfRuns>>,
     /// A remark for the user.
     pub message: Option<String>,
     /// Warnings about the query, rendered.
@@ -139,6 +141,7 @@ impl Answer {
             value: None,
             estimate: None,
             simulated: None,
+            values_of_runs: None,
             message: None,
             warnings: Vec::new(),
             evidence: Evidence::default(),

@@ -1,12 +1,14 @@
 //! How a query is answered: every option with its meaning and its default.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
 use crate::stochastic::Precision;
+use crate::stochastic::statistics::Interval;
 use crate::tuning::Tuning;
 
 /// What runs the code of the model.
@@ -99,6 +101,27 @@ impl Default for Reductions {
     }
 }
 
+/// What the runs of a statistical query say until now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RunsSoFar {
+    /// How many there are.
+    pub runs: u64,
+    /// The share of satisfied ones, or the mean of their values; no number if it is not known.
+    pub estimate: f64,
+    /// The interval of as many runs; no numbers if too few give none.
+    pub interval: Interval,
+}
+
+/// Is shown now and then what runs say until now.
+#[derive(Clone)]
+pub struct RunObserver(pub Arc<dyn Fn(&RunsSoFar) + Send + Sync>);
+
+impl std::fmt::Debug for RunObserver {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("RunObserver")
+    }
+}
+
 /// How a query is answered.
 #[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent wish")]
@@ -147,6 +170,8 @@ pub struct Options {
     pub tuning: Tuning,
     /// What statistical queries promise; [`Options::threads`] counts for them too.
     pub precision: Precision,
+    /// Sees what the runs of a statistical query say while they are made.
+    pub run_observer: Option<RunObserver>,
 }
 
 impl Options {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
 use super::model::{BoundRow, Model, bound_rows};
@@ -11,7 +12,8 @@ use super::options;
 use super::plans::Plans;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{
-    decisions, json, machine_c, machine_json, strategy_c, strategy_json, strategy_text, text,
+    decisions, distribution_json, json, machine_c, machine_json, strategy_c, strategy_json,
+    strategy_text, text,
 };
 use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, LoadedModel, Options, Verdict};
@@ -39,14 +41,32 @@ pub(super) fn check(
         })
     });
     let answer = answer.map_err(rejected)?;
-    if answer.verdict == Verdict::Unknown(StopReason::Interrupted) {
+    let is_interrupted = answer.verdict == Verdict::Unknown(StopReason::Interrupted);
+    if is_interrupted && answer.estimate.is_none() && answer.simulated.is_none() {
         return Err(PyKeyboardInterrupt::new_err(()));
     }
-    Ok(Answer {
+    let answer = Answer {
         model: model.clone().unbind(),
         query: query.to_owned(),
         inner: answer,
-    })
+    };
+    if is_interrupted {
+        return Err(InterruptedError::new_err((answer,)));
+    }
+    Ok(answer)
+}
+
+pyo3::create_exception!(
+    _checker,
+    InterruptedError,
+    PyKeyboardInterrupt,
+    "The user interrupted random runs; `args[0]` is the answer of the runs until then."
+);
+
+/// Numbers as native doubles, one after the other.
+fn doubles(py: Python<'_>, numbers: impl Iterator<Item = f64>) -> Bound<'_, PyBytes> {
+    let bytes: Vec<u8> = numbers.flat_map(f64::to_ne_bytes).collect();
+    PyBytes::new(py, &bytes)
 }
 
 /// The answer to a query.
@@ -82,13 +102,42 @@ impl Answer {
     }
 
     /// The runs that `simulate` shows: the texts of the items, and of each run its number and, of
-    /// each item, the moments with its values; `None` for other queries.
+    /// each item, the moments, each with its value behind it, as native doubles; `None` for other
+    /// queries.
     #[expect(clippy::type_complexity, reason = "it is what Python gets")]
-    fn trajectories(&self) -> Option<(Vec<String>, Vec<(u64, Vec<Vec<(f64, f64)>>)>)> {
+    fn trajectories<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Option<(Vec<String>, Vec<(u64, Vec<Bound<'py, PyBytes>>)>)> {
         let simulated = self.inner.simulated.as_ref()?;
-        let runs = simulated.runs.iter();
-        let runs = runs.map(|one| (one.run, one.points.clone()));
+        let runs = simulated.runs.iter().map(|one| {
+            let items = one.points.iter().map(|points| {
+                let numbers = points.iter().flat_map(|&(time, value)| [time, value]);
+                doubles(py, numbers)
+            });
+            (one.run, items.collect())
+        });
         Some((simulated.items.clone(), runs.collect()))
+    }
+
+    /// How the values of runs are distributed, as JSON; `None` for queries whose runs have no
+    /// values.
+    fn distribution_json(&self) -> Option<String> {
+        let values = self.inner.values_of_runs.as_ref()?;
+        Some(distribution_json::write(values).to_string())
+    }
+
+    /// The values of runs in ascending order, and how often each came, as native doubles and as
+    /// native unsigned integers of 64 bits; `None` for queries whose runs have no values.
+    #[expect(clippy::type_complexity, reason = "it is what Python gets")]
+    fn distribution_points<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> Option<(Bound<'py, PyBytes>, Bound<'py, PyBytes>)> {
+        let points = &self.inner.values_of_runs.as_ref()?.distribution.points;
+        let counts: Vec<u8> = points.iter().flat_map(|one| one.1.to_ne_bytes()).collect();
+        let values = doubles(py, points.iter().map(|one| one.0));
+        Some((values, PyBytes::new(py, &counts)))
     }
 
     /// What a statistical query found out, as JSON; `None` for other queries.
@@ -97,10 +146,12 @@ impl Answer {
         Some(json::estimate(estimate).to_string())
     }
 
-    /// "states", "memory" or "time" if a limit stopped the search.
+    /// "states", "memory" or "time" if a limit stopped the search, "interrupted" if the user ended
+    /// random runs.
     #[getter]
     fn stop(&self) -> Option<&'static str> {
         match self.inner.verdict {
+            Verdict::Unknown(StopReason::Interrupted) => Some("interrupted"),
             Verdict::Unknown(reason) => stop_name(reason),
             _ => None,
         }

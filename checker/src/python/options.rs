@@ -1,5 +1,7 @@
 //! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
 
+use std::sync::Arc;
+
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -7,6 +9,7 @@ use pyo3::prelude::*;
 use super::convert::{
     code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
 };
+use crate::engine::options::RunObserver;
 use crate::engine::{Limits, Options, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
 use crate::stochastic::{MeanMethod, Precision};
@@ -40,8 +43,29 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         folder: field(given, "folder")?,
         allow_write: field(given, "allow_write")?,
         precision: precision(given)?,
+        run_observer: run_observer(field(given, "run_progress")?),
         ..Options::default()
     })
+}
+
+/// Shows what runs say until now to a Python function. What it raises is reported and ends nothing.
+fn run_observer(progress: Option<Py<PyAny>>) -> Option<RunObserver> {
+    let progress = progress?;
+    Some(RunObserver(Arc::new(move |so_far| {
+        let known = |value: f64| value.is_finite().then_some(value);
+        let (lower, upper) = (so_far.interval.lower, so_far.interval.upper);
+        let shown = (
+            so_far.runs,
+            known(so_far.estimate),
+            known(lower),
+            known(upper),
+        );
+        Python::attach(|py| {
+            if let Err(error) = progress.call1(py, shown) {
+                error.write_unraisable(py, None);
+            }
+        });
+    })))
 }
 
 /// What statistical queries promise.

@@ -4,6 +4,7 @@ use super::collector::Collector;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::run::Trajectory;
+use super::run_watch::{Ends, RunWatch};
 use super::statistics::{Decision, Method, clopper_pearson};
 use crate::exec::Executor;
 use crate::ir::{Network, Simulation, Statistical};
@@ -114,6 +115,20 @@ pub fn estimate(
     precision: &Precision,
     ends: impl FnMut(u64) -> bool,
 ) -> Result<Estimate, Failure> {
+    estimate_watched(network, executor, query, precision, &mut Ends(ends))
+}
+
+/// Answers a statistical query whose runs are watched.
+///
+/// # Errors
+/// A run failed: the one with the least number.
+pub fn estimate_watched(
+    network: &Network,
+    executor: &dyn Executor,
+    query: &Statistical,
+    precision: &Precision,
+    ends: &mut dyn RunWatch,
+) -> Result<Estimate, Failure> {
     let program = (network, executor);
     let mut collector = Collector::new(query, precision);
     let mut failure = None;
@@ -196,7 +211,7 @@ pub fn simulate(
             }
             made >= wanted || shown.len() as u64 >= most || points >= MOST_POINTS
         },
-        ends,
+        &mut Ends(ends),
     )?;
     let counted = (made, shown.len() as u64);
     let estimate = share(counted, precision.alpha, is_complete);

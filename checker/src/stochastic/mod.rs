@@ -15,11 +15,19 @@ mod motion;
 mod program;
 mod race;
 mod run;
+mod run_watch;
+mod samples;
 mod span;
 pub mod statistics;
+mod values_of_runs;
 mod windows;
 
-pub use estimate::{Estimate, MeanMethod, Precision, Simulated, estimate, simulate};
+pub use estimate::{
+    Estimate, MeanMethod, Precision, Simulated, estimate, estimate_watched, simulate,
+};
 pub use failure::{Failure, Stand};
 pub use race::{ZENO_MOVES, ZENO_TIME};
 pub use run::{Outcome, Runner, Trajectory};
+pub use run_watch::{RunWatch, Shown};
+pub use samples::{Distribution, Histogram, MOST_BINS, MOST_VALUES, Samples};
+pub use values_of_runs::{Measured, ValuesOfRuns};

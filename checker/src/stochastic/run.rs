@@ -32,6 +32,8 @@ pub struct Outcome {
     pub time: f64,
     /// How many moves it took.
     pub moves: u64,
+    /// What bounds the run, when that was decided: its time, the value of a clock, or its moves.
+    pub at: f64,
 }
 
 /// The values of expressions during a run.
@@ -131,6 +133,7 @@ impl<'a> Runner<'a> {
             satisfied,
             time: self.race.time + ahead,
             moves: self.race.moves,
+            at: position(&self.race, bound, ahead),
         })
     }
 
@@ -257,6 +260,18 @@ impl<'a> Runner<'a> {
             race.wait(delay)?;
             race.take(program, winner)?;
             cancellation::work(UNITS_FOR_MOVE);
+        }
+    }
+}
+
+/// What bounds a run, so much later than the time of the race: time, a clock, or moves.
+fn position(race: &Race<'_>, bound: &RunBound, ahead: f64) -> f64 {
+    match bound.limit {
+        RunLimit::Time => race.time + ahead,
+        RunLimit::Moves => race.moves as f64,
+        RunLimit::Clock(clock) => {
+            let (value, rate) = race.machine.clock(clock);
+            value + rate * ahead
         }
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod decision_table;
 pub mod decisions;
+pub mod distribution_json;
 pub mod explain;
 pub mod json;
 pub mod json_reader;

@@ -16,4 +16,5 @@ mod statistical;
 pub(crate) mod subject;
 pub mod time_clock;
 pub(super) mod time_optimal;
+mod watched_runs;
 pub(super) mod witnesses;

@@ -10,13 +10,15 @@ use crate::engine::codes;
 use crate::engine::limits::LimitWatch;
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
+use crate::engine::query::watched_runs::WatchedRuns;
 use crate::engine::rejection::Rejection;
 use crate::ir::{EdgeId, Network, Statistical};
 use crate::network;
-use crate::search::limits::{Counters, Watch as _};
+use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Failure, MeanMethod, Precision, Stand, ZENO_MOVES, ZENO_TIME, estimate, simulate,
+    Failure, MeanMethod, Precision, RunWatch as _, Stand, ZENO_MOVES, ZENO_TIME, estimate_watched,
+    simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -74,20 +76,19 @@ impl LoadedModel {
         }
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
+        let observer = options.run_observer.clone();
         let result = watch.bound(|watch| {
-            let counters = |runs| Counters {
-                explored: runs,
-                ..Counters::default()
-            };
-            let ends = |runs| watch.look(&counters(runs)).is_some();
+            let mut runs = WatchedRuns::new(&compiled.kind, precision.alpha, watch, observer);
             match &compiled.kind {
                 Statistical::Simulation(asked) => {
+                    let ends = |number| runs.ends(number);
                     let simulated = simulate(network, executor, asked, &precision, ends)?;
-                    Ok((simulated.estimate.clone(), Some(Arc::new(simulated))))
+                    Ok((simulated.estimate.clone(), Some(Arc::new(simulated)), None))
                 }
                 kind => {
-                    let estimate = estimate(network, executor, kind, &precision, ends)?;
-                    Ok((Some(estimate), None))
+                    let estimate =
+                        estimate_watched(network, executor, kind, &precision, &mut runs)?;
+                    Ok((Some(estimate), None, runs.values(kind)))
                 }
             }
         });
@@ -104,7 +105,7 @@ impl LoadedModel {
                 }
             }
             Ok(Err(failure)) => Err(self.run_fails(network, &failure, query.span)),
-            Ok(Ok((estimate, simulated))) => {
+            Ok(Ok((estimate, simulated, values))) => {
                 let decision = estimate.as_ref().and_then(|estimate| estimate.decision);
                 let verdict = match decision {
                     Some(Decision::Below) => Verdict::NotSatisfied,
@@ -119,6 +120,7 @@ impl LoadedModel {
                 }
                 answer.estimate = estimate;
                 answer.simulated = simulated;
+                answer.values_of_runs = values;
                 Ok(answer)
             }
         };
