@@ -169,6 +169,11 @@ _OPTIONS: Final[dict[str, Decorator]] = {
 }
 """The options on the command line, by their fields of `ntagen.checker.Options`."""
 
+STATISTICAL: Final[dict[str, Decorator]] = {
+    name: _OPTIONS[name] for name in ("runs", "alpha", "epsilon", "seed", "threads")
+}
+"""Those of random runs that a picture depends on, or that make it faster."""
+
 
 def engine_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
     """Adds these options; the command gets their values as `given`, by the names of the fields."""

@@ -13,6 +13,7 @@ from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limits
 from ntagen.cli.models import include_option, rank_option
 from ntagen.cli.plot_models import KINDS, LIMITED, MODELS, Wish, plot_model
+from ntagen.cli.plot_runs import NAMES, RunWish, run_options
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -28,7 +29,7 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
 @click.command(
     "plot",
     epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
-    "3 the engine reached a limit.",
+    "3 the engine reached a limit; what random runs say until then is drawn.",
 )
 @click.argument("source", metavar="ENV.nsl|RUN.mcap|MODEL", type=click.Path(path_type=Path))
 @click.option(
@@ -61,13 +62,14 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     "kind",
     type=click.Choice(list(KINDS)),
     help="Of a model: " + "; ".join(f"{kind}: {what}" for kind, what in KINDS.items()) + ".  "
-    "[default for a UPPAAL model: gantt]",
+    "[default for a UPPAAL model: runs if the query is Pr, E or simulate, else gantt]",
 )
 @click.option(
     "--query",
     "asked",
     metavar="TEXT|NAME",
-    help="Of a model: the query whose trace is drawn.  [default: the model's only query]",
+    help="Of a model: the query whose trace or random runs are drawn.  [default: the model's only "
+    "query]",
 )
 @click.option(
     "--at",
@@ -82,6 +84,7 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     help="With --as zones: the clocks of the two axes.  [default: the first on which decisions "
     "depend]",
 )
+@run_options
 @_LIMITS["timeout_s"]
 @_LIMITS["memory_bytes"]
 @include_option()
@@ -98,7 +101,8 @@ def command(
     timeout_s: float | None,
     memory_bytes: int | None,
     include: tuple[Path, ...],
-) -> None:
+    run_wish: RunWish,
+) -> int:
     """Draw a scene with its plans, a run from its log, or what a query of a model finds.
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
@@ -113,6 +117,8 @@ def command(
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
     of a query, what the strategy of a game does over two clocks (--as zones), the templates
     (--as templates), or the states of a small model (--as states), in a file that ends in .svg.
+    For Pr and E it draws a histogram and the cumulative distribution with its band, for simulate
+    the runs over time, in a file that ends in .svg, .png or .pdf.
 
     \b
     Examples:
@@ -122,6 +128,8 @@ def command(
       ntagen plot run.mcap -o run.gif
       ntagen plot model.xml --query "E<> Gate.Open" -o trace.svg
       ntagen plot model.xml --query "E<> Gate.Open" --as sequence -o trace.svg
+      ntagen plot model.xml --query "Pr[<=10](<> Gate.Open)" -o reached.png
+      ntagen plot model.xml --query "simulate[<=10; 5]{Gate.Open, x}" -o runs.svg
       ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
       ntagen plot model.xml --as states -o states.svg
     """  # noqa: D301  click wants the control character
@@ -130,16 +138,15 @@ def command(
 
     if kind is not None or source.suffix.lower() in MODELS:
         _without_scene()
-        path = Path(f"{source.stem}.svg") if output is None else output
-        require_apart({"-o": path}, {"source": source})
-        wish = Wish(kind or "gantt", asked, at, clocks, timeout_s, memory_bytes)
-        plot_model(source, path, wish, include)
+        wish = Wish(kind, asked, at, clocks, timeout_s, memory_bytes)
+        path, code = plot_model(source, output, wish, include, run_wish)
         echo(f"wrote {path}")
-        return
+        return code
     say_idle(
         {"asked": "--query", "at": "--at", "clocks": "--clocks"},
         "without --as: the scene is drawn, not its model",
     )
+    say_idle(NAMES, "here: no random runs are drawn")
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
@@ -158,6 +165,7 @@ def command(
     )
     write_picture(picture, path)
     echo(f"wrote {path}")
+    return 0
 
 
 def _without_scene() -> None:

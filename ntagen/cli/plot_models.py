@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.asked import Asked, queries_of
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
+from ntagen.cli.plot_runs import NAMES, RunWish, plot_runs
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.run_progress import STATISTICAL
 from ntagen.errors import InputError, LimitError, ModelError
+from ntagen.files import require_apart
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -24,6 +28,7 @@ MODELS: Final = (".xml", ".xta", ".ta")
 """The endings of UPPAAL models."""
 
 KINDS: Final = {
+    "runs": "what the random runs of Pr, E or simulate say (.svg, .png or .pdf)",
     "gantt": "the trace of a query as a chart, where each process is when",
     "sequence": "the trace, and what passes between the processes",
     "zones": "what the strategy of a game does over two clocks, in one state",
@@ -44,8 +49,8 @@ GRAPHS: Final = ("states", "discrete")
 class Wish:
     """What is to be drawn of a model."""
 
-    kind: str
-    """One of `KINDS`."""
+    kind: str | None
+    """One of `KINDS`; ``None`` leaves it to the query."""
 
     asked: str | None
     """The text or name of a query."""
@@ -60,14 +65,52 @@ class Wish:
     memory_bytes: int | None
 
 
-def plot_model(source: Path, path: Path, wish: Wish, include: Sequence[Path]) -> None:
-    """Writes a picture of a model.
+def plot_model(
+    source: Path, path: Path | None, wish: Wish, include: Sequence[Path], runs: RunWish
+) -> tuple[Path, int]:
+    """Writes a picture of a model; returns which file it is, and the exit code.
 
     Raises:
         InputError: The model, the query or the name of the picture is wrong, or there is nothing
             to draw.
         LimitError: The search reached a limit.
     """
+    with pointing_to_explanations(True):
+        model = load_model(source, include).model
+        if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
+            say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
+            path = path or Path(f"{source.stem}.svg")
+            require_apart({"-o": path}, {"source": source})
+            limits = {"timeout_s": wish.timeout_s, "memory_bytes": wish.memory_bytes}
+            return path, plot_runs(model, asked, path, runs, limits)
+        say_idle(NAMES, "here: no random runs are drawn")
+        path = path or Path(f"{source.stem}.svg")
+        require_apart({"-o": path}, {"source": source})
+        _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
+        return path, 0
+
+
+def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
+    """The query that is answered by random runs, if it is one.
+
+    Raises:
+        InputError: Random runs are wanted, and the query has none.
+    """
+    if wish.kind is None and wish.asked is None and len(model.queries) != 1:
+        return None
+    query = _query(model, wish)
+    if query.form is not None and query.form.kind in STATISTICAL:
+        return query
+    if wish.kind == "runs":
+        raise InputError(
+            f"{query.text} is not answered by random runs\n"
+            "hint: ask for Pr[…](…), E[…](…) or simulate[…]{…}"
+        )
+    return None
+
+
+def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
+    """Writes a picture of a model that does not show random runs."""
     is_graph = wish.kind in GRAPHS
     endings = (".svg", ".dot") if is_graph else (".svg",)
     if path.suffix.lower() not in endings:
@@ -78,20 +121,18 @@ def plot_model(source: Path, path: Path, wish: Wish, include: Sequence[Path]) ->
         )
     if wish.kind != "zones":
         say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
-    with pointing_to_explanations(True):
-        model = load_model(source, include).model
-        if is_graph or wish.kind == "templates":
-            drawn = "templates" if wish.kind == "templates" else "states"
-            say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
-        if is_graph:
-            space = model.state_space(timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes)
-            space.save(path, clocks=wish.kind == "states")
-            return
-        if wish.kind == "templates":
-            say_idle(LIMITED, "with --as templates: nothing is searched for")
-            _templates(model).save(path)
-            return
-        _drawn(model, wish).save(path)
+    if is_graph or wish.kind == "templates":
+        drawn = "templates" if wish.kind == "templates" else "states"
+        say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
+    if is_graph:
+        space = model.state_space(timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes)
+        space.save(path, clocks=wish.kind == "states")
+        return
+    if wish.kind == "templates":
+        say_idle(LIMITED, "with --as templates: nothing is searched for")
+        _templates(model).save(path)
+        return
+    _drawn(model, wish).save(path)
 
 
 def _templates(model: Model) -> Svg:

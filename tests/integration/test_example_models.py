@@ -21,10 +21,11 @@ def test_answers_are_as_expected(model: Path, capsys: pytest.CaptureFixture[str]
     assert f"; {expected} as expected, 0 not as expected" in capsys.readouterr().out
 
 
-def test_there_are_four() -> None:
+def test_there_are_five() -> None:
     assert [model.stem for model in MODELS] == [
         "fischer",
         "four_states",
         "light_switch",
+        "service",
         "train_gate",
     ]
