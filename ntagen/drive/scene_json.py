@@ -52,7 +52,7 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
             del entries[kind]
     if scene.breath is None:
         del entries["breath"]
-    if not scene.tissue.is_adversarial:
+    if scene.tissue.kind == "static":
         # As logs have it that were written before there was another.
         entries["tissue"] = {"kind": scene.tissue.kind}
     document: dict[str, object] = {"version": VERSION, "scene": entries}

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Final, Literal, cast
+from typing import Any, Final, Literal, cast
 
 from ntagen import rules
 from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
@@ -25,6 +25,7 @@ from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
 from ntagen.parameters import Given
 from ntagen.scene import (
     DEFAULT_LENGTH_MM,
+    MEASURED_TISSUE,
     Limits,
     NamedQuery,
     Needle,
@@ -83,7 +84,7 @@ _TISSUE_RULES: Final[dict[str, tuple[str, Callable[[float], rules.Breach | None]
     "roll": ("roll_rad", rules.roll_error),
     "tip": ("tip_mm", lambda value: rules.not_negative(value, "the tip error")),
 }
-"""The bounds of an adversarial tissue: their fields, and the rules for them."""
+"""The bounds or spreads of a tissue: their fields, and the rules for them."""
 
 
 class _Builder:
@@ -301,16 +302,19 @@ class _Builder:
 
     def _tissue(self) -> Tissue:
         """How the tissue behaves; static after a mistake."""
-        if self._draft.choices.get("tissue") != "adversarial":
+        kind = self._draft.choices.get("tissue", "static")
+        if kind == "static":
             return Tissue()
-        values = {}
+        # What is not given of a stochastic tissue is as it was measured.
+        tissue = MEASURED_TISSUE if kind == "stochastic" else Tissue("adversarial")
+        values: dict[str, Any] = {}
         for word, (field_name, rule) in _TISSUE_RULES.items():
             placed = self._draft.tissue.get(word)
             if placed is None or placed.value is None:
                 continue
             if self._reporter.obeys(rule(placed.value), placed.span):
                 values[field_name] = placed.value
-        return Tissue("adversarial", **values)
+        return replace(tissue, **values)
 
     def _resolution(self) -> int | None:
         """Fixed-point units in a mm."""
@@ -329,7 +333,8 @@ class _Builder:
         """Something is left of each target when the tip may be off."""
         for one in spheres:
             depth_mm = one.region.shape.depth_mm
-            if one.region.kind == "target" and 0.0 < depth_mm <= tissue.tip_mm:
+            is_left = tissue.is_stochastic or depth_mm > tissue.tip_mm
+            if one.region.kind == "target" and depth_mm > 0.0 and not is_left:
                 self._report(
                     "tip-error-too-large",
                     self._draft.tissue["tip"].span,

@@ -46,7 +46,8 @@ TISSUE: Final = {
     "roll": (ANGLE, "the roll error"),
     "tip": (LENGTH, "the tip error"),
 }
-"""The bounds of an adversarial tissue: their dimension, and what they are."""
+"""The bounds of an adversarial tissue, or the spreads of a stochastic one: their dimension, and
+what they are."""
 
 FREE: Final = "free"
 """The word for a bevel whose direction the strategy chooses; older files may use it as a name."""
@@ -265,7 +266,7 @@ class ContentResolver:
             self._tissue(statement, scope, draft)
 
     def _tissue(self, statement: tree.Tissue, scope: Scope, draft: Draft) -> None:
-        """How the tissue behaves, with the bounds of an adversarial one."""
+        """How the tissue behaves, with its bounds or spreads."""
         if not is_choice(statement.word, "tissue", self._reporter):
             draft.has_gaps = True
             return
@@ -275,7 +276,7 @@ class ContentResolver:
                 "tissue-bound-misused",
                 statement.bounds[0].word.span,
                 "static tissue has no bounds: it changes nothing",
-                hint="remove them, or write `tissue adversarial`",
+                hint="remove them, or write `tissue adversarial` or `tissue stochastic`",
             )
         if statement.word.text == "adversarial" and not statement.bounds:
             self._reporter.report(

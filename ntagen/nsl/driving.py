@@ -37,7 +37,7 @@ _DIMENSIONS: Final[dict[Kind, Dimension]] = {
 }
 
 CHOICES: Final = {
-    "tissue": ("static", "adversarial"),
+    "tissue": ("static", "adversarial", "stochastic"),
     "safety": ("sampled", "swept"),
     "device": ("grbl",),
     "tracker": ("openigtlink",),

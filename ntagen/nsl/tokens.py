@@ -71,7 +71,7 @@ _MOVES_WORDS: Final = frozenset({"moves", "along", "every", "phase", "through", 
 _MOTION_WORDS: Final = _LATER_MOTION | {"only", "while", "phase", "between", "and"}
 
 TISSUE_BOUNDS: Final = ("curvature", "roll", "tip")
-"""The bounds of an adversarial tissue."""
+"""The bounds of an adversarial tissue, and the spreads of a stochastic one."""
 
 RESERVED: Final = (KEYWORDS | _OTHER_WORDS) - _LATER_MOTION
 """All words that cannot be names because of the grammar."""

@@ -277,7 +277,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class TissueBound:
-    """A bound of an adversarial tissue: ``curvature 10 %``."""
+    """A bound of an adversarial tissue, a spread of a stochastic one: ``curvature 10 %``."""
 
     word: Identifier
     value: Expression

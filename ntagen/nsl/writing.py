@@ -98,7 +98,8 @@ def _lines(task: Task, mistakes: list[str]) -> Iterator[_Line]:
         f" curvature {number(tissue.curvature_ratio)} roll {angle(tissue.roll_rad)}"
         f" tip {number(tissue.tip_mm)} mm"
     )
-    is_bounded = tissue.is_adversarial or any(
+    # Without its spreads, a stochastic tissue has those that were measured.
+    is_bounded = tissue.kind != "static" or any(
         (tissue.curvature_ratio, tissue.roll_rad, tissue.tip_mm)
     )
     yield f"tissue {tissue.kind}{bounds if is_bounded else ''}", "tissue"

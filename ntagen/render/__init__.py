@@ -11,12 +11,15 @@ the paper.
 
 from __future__ import annotations
 
-from ntagen.render.queries import model_queries, render_queries
+from collections.abc import Sequence
+
+from ntagen.errors import InputError
+from ntagen.render.queries import model_queries, plan_queries, render_queries
 from ntagen.render.values import model_values
 from ntagen.render.writing import escaped_text
 from ntagen.scene import Scene
 
-__all__ = ["render", "render_queries"]
+__all__ = ["render", "render_plan", "render_queries"]
 
 
 def render(scene: Scene, source: str | None = None, *, only_plans: bool = False) -> str:
@@ -42,3 +45,30 @@ def render(scene: Scene, source: str | None = None, *, only_plans: bool = False)
     name = None if source is None else " ".join(source.split())
     declaration = generated.declaration(values, name)
     return generated.document(values, escaped_text(declaration), model_queries(scene))
+
+
+def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
+    """The model of one plan in a tissue with chance, as UPPAAL's XML.
+
+    What is planned is done, whatever comes: nothing is decided, so only statistical queries make
+    sense.
+
+    Args:
+        scene: The scene, with a stochastic tissue.
+        plan: What is done one after the other: 0 is a push, else a roll by so many degrees.
+        runs: So many runs give the expected clearance.
+
+    Returns:
+        The XML document; its queries are `ntagen.render.queries.questions`.
+
+    Raises:
+        InputError: The tissue is another one, or a value does not fit the model's numbers.
+    """
+    from ntagen.render import generated
+
+    if not scene.tissue.is_stochastic:
+        raise InputError("the tissue has no chance\nhint: write `tissue stochastic`")
+    values = model_values(scene, plan=plan)
+    declaration = generated.declaration(values, None)
+    queries = plan_queries(scene, sum(1 for action in plan if not action), runs)
+    return generated.plan_document(values, escaped_text(declaration), queries)

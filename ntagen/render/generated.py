@@ -1705,6 +1705,208 @@ def declaration(model: Any, source: Any) -> str:
         '    path_valid = is_negative_y_motion && is_needle_long_enough;\n'
         '    return path_valid;\n'
         '}\n')
+    if model.chance:
+        put('\n')
+        put('/****************************************** The tissue with chance ******************************************/\n'
+            '// Everything above is what is expected: decisions rest on it. The true tip deviates from it by chance. It is kept in doubles,\n'
+            '// which random runs know, and which queries without probabilities leave out: nothing that is decided depends on them.\n'
+            '//\n'
+            '// * A segment is what the tip travels from the entry, or from a roll, to the next roll. In each the needle bends by a factor\n'
+            '//   more than expected, and the roll before it turned the tip by an error more. The logarithm of the factor and the error are\n'
+            '//   normal, and independent of each other and of other segments.\n'
+            '// * At the end of each push the tip lies off its circle by a vector whose coordinates are normal and independent. Between two\n'
+            '//   ends of pushes it goes from one to the other in a straight line, and it starts with none.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const double CURVATURE_SPREAD = ', model.chance.curvature_spread, ';',))),))))
+        put(' // Of the logarithm of the factor: its standard deviation.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const double ROLL_SPREAD = ', model.chance.roll_spread_rad, ';',))),))))
+        put(' // That of the error of a roll, in rad.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const double TIP_SPREAD = ', model.chance.tip_spread_mm, ';',))),))))
+        put(' // That of each coordinate of the vector, in mm.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const double CHANCE_RADIUS = ', model.chance.radius_mm, ';',))),))))
+        put(' // The radius of the motion circle that is expected, in mm.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const double PUSH_LENGTH = ', model.chance.push_mm, ';',))),))))
+        put(' // What a push inserts, in mm.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const int PUSH_PARTS = ', model.chance.parts, ';',))),))))
+        put(' // The way of a push is looked at after each of so many parts.\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('const int DRAWN_COUNT = ', model.chance.segments, ';',))),))))
+        put(' // Segments on one path, at most.\n'
+            'double drawn_factor[DRAWN_COUNT];                     // What was drawn for each segment: factors of the curvature,\n'
+            'double drawn_error[DRAWN_COUNT];                      //   and errors of the roll before it, in rad.\n'
+            'bool is_drawn = false;\n'
+            'bool is_pushing = false;                              // Whether the action of the moment is a push.\n'
+            'int drawn_segment = 0;                                // The segment of the moment: so many rolls were made.\n'
+            'int push_count = 0;                                   // Pushes so far.\n'
+            '\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('double true_pos[3] = ', model.chance.position, ';',))),))))
+        put(' // The true tip on its circle, in mm,\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('double true_heading[3] = ', model.chance.heading, ';',))),))))
+        put(' //   the direction in which it travels,\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('double true_bevel[3] = ', model.chance.bevel, ';',))),))))
+        put(' //   and that away from the centre of its circle.\n'
+            'double tip_offset[3] = {0.0, 0.0, 0.0};               // How far the tip is off its circle.\n'
+            'double true_place[3];                                 // Where it passes, off its circle.\n'
+            '// How far the targets are, in mm; negative inside. See tip_miss.\n'
+            'double target_away[TR_COUNT] = {')
+        put(shown(', '.join(map(shown, model.chance.targets_unseen))))
+        put('};\n'
+            '\n')
+        if model.chance.has_unsafe:
+            put("// The least distance of the tip's whole way from critical and unexplored regions, in mm. Not greater than 0: it touched one.\n"
+                'double tip_clearance = ')
+            put(shown(model.chance.unseen))
+            put(';\n')
+        put('// By how much the tip misses the targets, in mm. The last one counts at the end of the last push, the others where the way is\n'
+            '// nearest to them; the worst of them counts. Not greater than 0: all were reached.\n'
+            'double tip_miss = ')
+        put(shown(model.chance.unseen))
+        put(';\n'
+            '\n'
+            '// What the tissue does in all segments is drawn at its first reaction. So runs with the same random numbers have the same\n'
+            '// tissue, whatever the plan.\n'
+            'void draw_tissue() {\n'
+            '    int i;\n'
+            '    for (i=0; i<DRAWN_COUNT; i++) {\n'
+            '        drawn_factor[i] = exp(CURVATURE_SPREAD*random_normal(0.0, 1.0));\n'
+            '        drawn_error[i] = ROLL_SPREAD*random_normal(0.0, 1.0);\n'
+            '    }\n'
+            '    is_drawn = true;\n'
+            '}\n'
+            '\n'
+            '// The distance of a sphere of the tables above from a place.\n'
+            'double ball_distance(fixed_t center_x, fixed_t center_y, fixed_t center_z, fixed_t radius, double x, double y, double z) {\n'
+            '    double _S_ = _SI_*1.0;\n'
+            '    return sqrt(squared(center_x/_S_ - x) + squared(center_y/_S_ - y) + squared(center_z/_S_ - z)) - radius/_S_;\n'
+            '}\n'
+            '\n'
+            '// The distance of a target from a place.\n'
+            'double target_distance(int TR_index, double x, double y, double z) {')
+        for is_last_1, (kind, form) in with_last(model.chance.target_forms):
+            put('\n'
+                '    if (TR_form[TR_index] == ')
+            put(shown(form))
+            put(') {\n'
+                '        return ')
+            put(shown(kind))
+            put('_distance(TR_place[TR_index], x, y, z);\n'
+                '    }')
+        put('\n'
+            '    return ball_distance(TR_center[TR_index][0], TR_center[TR_index][1], TR_center[TR_index][2], TR_radius[TR_index], x, y, z);\n'
+            '}\n'
+            '\n'
+            '// The tip passes true_place.\n'
+            'void pass_place() {\n'
+            '    int i;')
+        if model.criticals.count:
+            put('\n'
+                '    for (i=0; i<CR_COUNT; i++) {\n'
+                '        tip_clearance = fmin(tip_clearance, ball_distance(CR_center[i][0], CR_center[i][1], CR_center[i][2], CR_radius[i],\n'
+                '                                                          true_place[0], true_place[1], true_place[2]));\n'
+                '    }')
+        if model.unexplored.count:
+            put('\n'
+                '    for (i=0; i<UR_COUNT; i++) {\n'
+                '        tip_clearance = fmin(tip_clearance, ball_distance(UR_center[i][0], UR_center[i][1], UR_center[i][2], UR_radius[i],\n'
+                '                                                          true_place[0], true_place[1], true_place[2]));\n'
+                '    }')
+        for is_last_1, (kind, first, last) in with_last(model.chance.unsafe_solids):
+            put('\n'
+                '    for (i=')
+            put(shown(first))
+            put('; i<=')
+            put(shown(last))
+            put('; i++) {\n'
+                '        tip_clearance = fmin(tip_clearance, ')
+            put(shown(kind))
+            put('_distance(i, true_place[0], true_place[1], true_place[2]));\n'
+                '    }')
+        put('\n'
+            '    for (i=0; i<TR_COUNT-1; i++) {\n'
+            '        target_away[i] = fmin(target_away[i], target_distance(i, true_place[0], true_place[1], true_place[2]));\n'
+            '    }\n'
+            '}\n'
+            '\n'
+            '// A push, as the tissue lets the needle go: on a circle of its own, about the same axis.\n'
+            'void push_truly() {\n'
+            '    double from_offset[3], heading[3], bevel[3];\n'
+            '    double radius, turn, part;\n'
+            '    int i, k;\n'
+            '\n'
+            '    radius = CHANCE_RADIUS / drawn_factor[drawn_segment];\n'
+            '    for (i=0; i<3; i++) {\n'
+            '        from_offset[i] = tip_offset[i];\n'
+            '        tip_offset[i] = TIP_SPREAD*random_normal(0.0, 1.0);\n'
+            '        heading[i] = true_heading[i];\n'
+            '        bevel[i] = true_bevel[i];\n'
+            '    }\n'
+            '    for (k=push_count == 0 ? 0 : 1; k<=PUSH_PARTS; k++) {\n'
+            '        part = k*1.0/PUSH_PARTS;\n'
+            '        turn = part*PUSH_LENGTH/radius;\n'
+            '        for (i=0; i<3; i++) {\n'
+            '            true_place[i] = true_pos[i] + radius*(sin(turn)*heading[i] - (1.0 - cos(turn))*bevel[i]) +\n'
+            '                            (1.0 - part)*from_offset[i] + part*tip_offset[i];\n'
+            '        }\n'
+            '        pass_place();\n'
+            '    }\n'
+            '    turn = PUSH_LENGTH/radius;\n'
+            '    for (i=0; i<3; i++) {\n'
+            '        true_pos[i] = true_place[i] - tip_offset[i];\n'
+            '        true_heading[i] = cos(turn)*heading[i] - sin(turn)*bevel[i];\n'
+            '        true_bevel[i] = cos(turn)*bevel[i] + sin(turn)*heading[i];\n'
+            '    }\n'
+            '    target_away[TR_COUNT-1] = target_distance(TR_COUNT-1, true_place[0], true_place[1], true_place[2]);\n'
+            '    tip_miss = target_away[0];\n'
+            '    for (i=1; i<TR_COUNT; i++) {\n'
+            '        tip_miss = fmax(tip_miss, target_away[i]);\n'
+            '    }\n'
+            '    push_count++;\n'
+            '}\n'
+            '\n'
+            '// A roll by an angle in rad, and its error.')
+        if model.free_bevel:
+            put(' Before the entry the bevel is seen, and a roll does not err.')
+        put('\n'
+            'void roll_truly(double angle) {\n'
+            '    double aside[3];\n'
+            '    double turn;\n'
+            '    int i;\n'
+            '\n'
+            '    drawn_segment++;\n'
+            '    turn = angle + ')
+        if model.free_bevel:
+            put('(push_count == 0 ? 0.0 : 1.0)*')
+        put('drawn_error[drawn_segment];\n'
+            '    aside[0] = true_heading[1]*true_bevel[2] - true_heading[2]*true_bevel[1];\n'
+            '    aside[1] = true_heading[2]*true_bevel[0] - true_heading[0]*true_bevel[2];\n'
+            '    aside[2] = true_heading[0]*true_bevel[1] - true_heading[1]*true_bevel[0];\n'
+            '    for (i=0; i<3; i++) {\n'
+            '        true_bevel[i] = cos(turn)*true_bevel[i] + sin(turn)*aside[i];\n'
+            '    }\n'
+            '}\n'
+            '\n'
+            '// What the Tissue does after each action.\n'
+            'void react() {\n'
+            '    if (!is_drawn) {\n'
+            '        draw_tissue();\n'
+            '    }\n'
+            '    if (is_pushing) {\n'
+            '        push_truly();\n'
+            '    } else {\n'
+            '        roll_truly(sel_rot_angle/180.0 * PI);\n'
+            '    }\n'
+            '    is_pushing = false;\n'
+            '}')
+        if model.chance.plan:
+            put('\n'
+                '\n'
+                '/** The plan: what is done, one action after the other **/\n'
+                'const int ACTION_COUNT = ')
+            put(shown(len(model.chance.plan)))
+            put(';\n'
+                'const int PLAN[ACTION_COUNT] = {')
+            put(shown(', '.join(map(shown, model.chance.plan))))
+            put('};     // 0: a push; else: a roll by so many degrees.\n'
+                'int next_action = 0;')
+        put('\n')
     return "".join(out)
 
 
@@ -1798,7 +2000,7 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
         '\t<declaration>// The decision maker. Its choice in Idle (push, or roll by which angle) is what a strategy decides.</declaration>')
     put(escaped(location('user_init', 'Init', (0, 0, ), ((-16), (-40), ), committed=True)))
     put(escaped(location('user_wait_for_check', 'Wait_For_Check', (272, 0, ), (214, (-40), ))))
-    put(escaped(location('user_idle', 'Idle', (544, 0, ), (528, (-40), ), color='#a0d0ff', urgent=(not (model.moving is None)))))
+    put(escaped(location('user_idle', 'Idle', (544, 0, ), (528, (-40), ), color='#a0d0ff', urgent=((not (model.moving is None)) or (not (model.chance is None))))))
     put(escaped(location('user_perform_action', 'Perform_Action', (544, 204, ), (568, 208, ))))
     put(escaped(location('user_request_check', 'Request_Check', (544, 340, ), (564, 344, ), committed=True)))
     put(escaped(location('user_end', 'End', (272, 136, ), (260, 152, ))))
@@ -1833,7 +2035,7 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
     put('\n'
         '\t<init ref="needle_idle"/>')
     put(escaped(transition('needle_idle', 'needle_push', [('guard', (-240), (-125), ''.join(map(shown, (push, ' >= 0',))), ), ('synchronisation', (-240), (-108), 'do_push?', ), ('assignment', (-240), (-91), 'ti = 0', ), ], nails=[((-85), (-68), ), ((-255), (-68), ), ])))
-    put(escaped(transition('needle_push', 'needle_idle', [('guard', (-240), 75, ''.join(map(shown, ('ti >= ', push,))), ), ('synchronisation', (-240), 92, 'do_tissue_action!', ), ('assignment', (-240), 109, ('is_pushing = true' if model.adversary else ''.join(map(shown, ('step()', (',\nend_push()' if model.moving else ''),)))), ), ], nails=[((-255), 68, ), ((-85), 68, ), ])))
+    put(escaped(transition('needle_push', 'needle_idle', [('guard', (-240), 75, ''.join(map(shown, ('ti >= ', push,))), ), ('synchronisation', (-240), 92, 'do_tissue_action!', ), ('assignment', (-240), 109, ('is_pushing = true' if model.adversary else ''.join(map(shown, ('step()', (',\nend_push()' if model.moving else ''), (',\nis_pushing = true' if model.chance else ''),)))), ), ], nails=[((-255), 68, ), ((-85), 68, ), ])))
     if model.moving:
         put(escaped(transition('needle_idle', 'needle_wait', [('guard', (-160), 150, 'WAIT_TIME >= 0', ), ('synchronisation', (-160), 167, 'do_wait?', ), ('assignment', (-160), 184, 'ti = 0', ), ], nails=[((-34), 85, ), ((-34), 255, ), ])))
         put(escaped(transition('needle_wait', 'needle_idle', [('guard', 46, 150, 'ti >= WAIT_TIME', ), ('synchronisation', 46, 167, 'do_tissue_action!', ), ('assignment', 46, 184, 'end_wait()', ), ], nails=[(34, 255, ), (34, 85, ), ])))
@@ -1847,6 +2049,9 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
     if model.adversary:
         put('\n'
             '\t<declaration>// The environment, the opponent in the game: it picks how the needle bends, and the error of each roll.</declaration>')
+    elif model.chance:
+        put('\n'
+            '\t<declaration>// The environment, the opponent in the game. Its answer moves the true tip, which decisions do not see.</declaration>')
     else:
         put('\n'
             '\t<declaration>// The environment, the opponent in the game. Static tissue: the answer changes nothing.</declaration>')
@@ -1859,6 +2064,8 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
         put(escaped(transition('tissue_react', 'tissue_idle', [('guard', 68, 58, '!is_pushing', ), ('synchronisation', 68, 75, 'finished_tissue_action!', ), ], nails=[(238, 68, ), (68, 68, ), ], controllable=False)))
         put(escaped(transition('tissue_react', 'tissue_idle', [('guard', 68, 143, 'is_pushing && is_picked', ), ('synchronisation', 68, 160, 'finished_tissue_action!', ), ('assignment', 68, 177, 'step()', ), ], nails=[(238, 153, ), (68, 153, ), ], controllable=False)))
         put(escaped(transition('tissue_react', 'tissue_idle', [('select', 68, 228, 'bend : int[0, BEND_COUNT - 1], twist : int[0, TWIST_COUNT - 1]', ), ('guard', 68, 245, 'is_pushing && !is_picked && (ROT_counter > 0 || twist == NOMINAL_TWIST)', ), ('synchronisation', 68, 262, 'finished_tissue_action!', ), ('assignment', 68, 279, 'pick(bend, twist),\nstep()', ), ], nails=[(238, 238, ), (68, 238, ), ], controllable=False)))
+    elif model.chance:
+        put(escaped(transition('tissue_react', 'tissue_idle', [('synchronisation', 68, 75, 'finished_tissue_action!', ), ('assignment', 68, 92, 'react()', ), ], nails=[(238, 68, ), (68, 68, ), ], controllable=False)))
     else:
         put(escaped(transition('tissue_react', 'tissue_idle', [('synchronisation', 68, 75, 'finished_tissue_action!', ), ], nails=[(238, 68, ), (68, 68, ), ], controllable=False)))
     put('\n'
@@ -1896,6 +2103,125 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
     put('\n'
         "<system>// One process of each template, under the template's own name.\n"
         'system User, Needle, Tissue, Checker;</system>\n'
+        '<queries>')
+    for is_last_1, query in with_last(queries):
+        put('\n'
+            '\t<query>\n'
+            '\t\t<formula>')
+        put(escaped(query.formula))
+        put('</formula>\n'
+            '\t\t<comment>')
+        put(escaped(query.comment))
+        put('</comment>\n'
+            '\t</query>')
+    put('\n'
+        '</queries>\n'
+        '</nta>\n')
+    return "".join(out)
+
+
+def plan_document(model: Any, declaration: Any, queries: Any) -> str:
+    out = []
+    put = out.append
+    put('<?xml version="1.0" encoding="utf-8"?>\n'
+        "<!DOCTYPE nta PUBLIC '-//Uppaal Team//DTD Flat System 1.1//EN' 'http://www.it.uu.se/research/group/darts/uppaal/flat-1_2.dtd'>")
+    def location(id, name, at, name_at, invariant=None, committed=False, color=None, urgent=False):
+        out = []
+        put = out.append
+        put('\n'
+            '\t<location id="')
+        put(escaped(id))
+        put('" x="')
+        put(escaped(at[0]))
+        put('" y="')
+        put(escaped(at[1]))
+        put('"')
+        if color:
+            put(' color="')
+            put(escaped(color))
+            put('"')
+        put('>\n'
+            '\t\t<name x="')
+        put(escaped(name_at[0]))
+        put('" y="')
+        put(escaped(name_at[1]))
+        put('">')
+        put(escaped(name))
+        put('</name>')
+        if invariant:
+            put('\n'
+                '\t\t<label kind="invariant" x="')
+            put(escaped(invariant[1]))
+            put('" y="')
+            put(escaped(invariant[2]))
+            put('">')
+            put(escaped(invariant[0]))
+            put('</label>')
+        if committed:
+            put('\n'
+                '\t\t<committed/>')
+        if urgent:
+            put('\n'
+                '\t\t<urgent/>')
+        put('\n'
+            '\t</location>')
+        return Safe("".join(out))
+    def transition(source, target, labels, nails=[], controllable=True):
+        out = []
+        put = out.append
+        put('\n'
+            '\t<transition')
+        if (not controllable):
+            put(' controllable="false"')
+        put('>\n'
+            '\t\t<source ref="')
+        put(escaped(source))
+        put('"/>\n'
+            '\t\t<target ref="')
+        put(escaped(target))
+        put('"/>')
+        for is_last_1, (kind, x, y, text) in with_last(labels):
+            put('\n'
+                '\t\t<label kind="')
+            put(escaped(kind))
+            put('" x="')
+            put(escaped(x))
+            put('" y="')
+            put(escaped(y))
+            put('">')
+            put(escaped(text))
+            put('</label>')
+        for is_last_1, (x, y) in with_last(nails):
+            put('\n'
+                '\t\t<nail x="')
+            put(escaped(x))
+            put('" y="')
+            put(escaped(y))
+            put('"/>')
+        put('\n'
+            '\t</transition>')
+        return Safe("".join(out))
+    put('\n'
+        '<nta>\n'
+        '<declaration>')
+    put(escaped(declaration))
+    put('</declaration>\n'
+        '<template>\n'
+        '\t<name>Insertion</name>\n'
+        '\t<declaration>// The needle that follows the plan. A push takes dt, a roll takes no time.\n'
+        'clock ti;   // Time since the push began.</declaration>')
+    put(escaped(location('insertion_next', 'Next', (0, 0, ), ((-16), (-44), ), committed=True)))
+    put(escaped(location('insertion_push', 'Push', ((-340), 0, ), ((-400), (-24), ), invariant=('ti <= dt', (-432), 8, ), color='#a0d0ff')))
+    put(escaped(location('insertion_done', 'Done', (340, 0, ), (360, (-8), ), color='#90d090')))
+    put('\n'
+        '\t<init ref="insertion_next"/>')
+    put(escaped(transition('insertion_next', 'insertion_push', [('guard', (-240), (-125), 'next_action < ACTION_COUNT && PLAN[next_action] == 0', ), ('assignment', (-240), (-108), 'ti = 0,\nis_pushing = true', ), ], nails=[((-85), (-68), ), ((-255), (-68), ), ])))
+    put(escaped(transition('insertion_push', 'insertion_next', [('guard', (-240), 75, 'ti >= dt', ), ('assignment', (-240), 92, 'react(),\nnext_action++', ), ], nails=[((-255), 68, ), ((-85), 68, ), ], controllable=False)))
+    put(escaped(transition('insertion_next', 'insertion_next', [('guard', 34, 119, 'next_action < ACTION_COUNT && PLAN[next_action] != 0', ), ('assignment', 34, 136, 'sel_rot_angle = PLAN[next_action],\nreact(),\nnext_action++', ), ], nails=[((-34), 119, ), (34, 119, ), ], controllable=False)))
+    put(escaped(transition('insertion_next', 'insertion_done', [('guard', 85, (-25), 'next_action >= ACTION_COUNT', ), ])))
+    put('\n'
+        '</template>\n'
+        '<system>system Insertion;</system>\n'
         '<queries>')
     for is_last_1, query in with_last(queries):
         put('\n'

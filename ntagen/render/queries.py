@@ -6,6 +6,7 @@ from typing import Final
 
 from ntagen import rules
 from ntagen.errors import InputError
+from ntagen.render.chance import has_unsafe
 from ntagen.scene import Scene
 from ntagen.values import dataclass
 
@@ -66,6 +67,51 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
                 f"there are two queries with the name {named.name}\nhint: rename the query `{text}`"
             )
     return tuple(queries.values())
+
+
+def plan_queries(scene: Scene, push_count: int, runs: int) -> tuple[Query, ...]:
+    """The questions about a plan that has so many pushes, from so many runs."""
+    dt, _, _ = rules.time_units(scene.limits.step_s, scene.needle.speed_mm_per_s)
+    return questions(scene, dt * (push_count + 1), "Insertion.Done", runs)
+
+
+def questions(scene: Scene, most_time: int, end: str, runs: int) -> tuple[Query, ...]:
+    """The questions about what is done in a tissue with chance.
+
+    Without critical and unexplored regions, nothing can be touched: then there is only the first.
+
+    Args:
+        scene: The scene.
+        most_time: It ends before so many units of time.
+        end: The location in which it ends.
+        runs: So many runs give a mean.
+    """
+    reach = f"Pr[<={most_time}](<> {end} && tip_miss <= 0"
+    if not has_unsafe(scene):
+        return (
+            Query(
+                "ReachProbability",
+                f"{reach})",
+                "ReachProbability\nHow likely does the true tip reach the target",
+            ),
+        )
+    return (
+        Query(
+            "ReachProbability",
+            f"{reach} && tip_clearance > 0)",
+            "ReachProbability\nHow likely does the true tip reach the target, and touch nothing",
+        ),
+        Query(
+            "TouchProbability",
+            f"Pr[<={most_time}](<> tip_clearance <= 0)",
+            "TouchProbability\nHow likely does it touch a critical region",
+        ),
+        Query(
+            "ExpectedClearance",
+            f"E[<={most_time}; {runs}](min: tip_clearance)",
+            "ExpectedClearance\nHow near does it come to one, in mm, in the mean",
+        ),
+    )
 
 
 def render_queries(scene: Scene) -> str:

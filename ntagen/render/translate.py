@@ -25,6 +25,7 @@ RESULT: Final = Path(__file__).with_name("generated.py")
 DOCUMENTS: Final = {
     "declaration": ("uppaal/declarations.c.jinja", ("model", "source"), "shown"),
     "document": ("model.xml.jinja", ("model", "declaration", "queries"), "escaped"),
+    "plan_document": ("plan.xml.jinja", ("model", "declaration", "queries"), "escaped"),
 }
 """The functions of the result: the template of each, its parameters, and what values go through."""
 

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 from ntagen import rules
 from ntagen.errors import InputError
+from ntagen.render.chance import Chance, chance
 from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
 from ntagen.render.moving import Moving, moving, still
@@ -97,6 +98,7 @@ class ModelValues:
     solids: Solids
     moving: Moving | None
     adversary: Adversary | None
+    chance: Chance | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,12 +137,15 @@ class _Writer:
         return Spheres(len(regions), centers, radii)
 
 
-def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
+def model_values(
+    scene: Scene, *, only_plans: bool = False, plan: Sequence[int] | None = None
+) -> ModelValues:
     """The values of a scene for the templates.
 
     Args:
         scene: The scene.
         only_plans: As in `ntagen.render.render`.
+        plan: As in `ntagen.render.render_plan`.
 
     Raises:
         InputError: A value does not fit the model's numbers, or the model would not move.
@@ -193,6 +198,7 @@ def model_values(scene: Scene, *, only_plans: bool = False) -> ModelValues:
         solids=tables,
         moving=breathing,
         adversary=_adversary(scene, writer),
+        chance=chance(scene, tables, frame, plan),
     )
 
 

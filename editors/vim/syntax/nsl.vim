@@ -13,7 +13,7 @@ syntax keyword nslWord every grid halfspace in label least margin markups mesh m
 syntax keyword nslWord radii segment segmentation size sphere through times to towards turned while
 
 " Values.
-syntax keyword nslChoice adversarial free grbl off on openigtlink pi sampled static swept
+syntax keyword nslChoice adversarial free grbl off on openigtlink pi sampled static stochastic swept
 syntax keyword nslFunction sin cos sqrt abs min max
 syntax match nslNumber /\<\d\+\(\.\d\+\)\?\([eE][+-]\?\d\+\)\?/
 syntax match nslUnit /\(\d\|\s\|)\)\@<=\(um\|mm\|cm\|m\|deg\|rad\|mrad\|ms\|s\|min\|mN\|N\|B\|KiB\|MiB\|GiB\)\>/

@@ -42,7 +42,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.viewing import quaternion
 from ntagen.errors import InputError
 from ntagen.needle.kinematics import bending_axis
-from ntagen.scene import Pose, Scene
+from ntagen.scene import MEASURED_TISSUE, Pose, Scene
 from tests.scenes import poses
 from tests.steering import PAPER, scene
 
@@ -78,7 +78,7 @@ def test_a_record_survives_its_message(record: Record, sequence: int) -> None:
     assert decode(name, encode(record, sequence)) == (sequence, record)
 
 
-@pytest.mark.parametrize("of", [PAPER, scene()])
+@pytest.mark.parametrize("of", [PAPER, scene(), dataclasses.replace(PAPER, tissue=MEASURED_TISSUE)])
 def test_a_scene_survives_json(of: Scene) -> None:
     assert scene_from_json(scene_to_json(of)) == of
 

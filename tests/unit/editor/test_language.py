@@ -58,7 +58,7 @@ def test_every_keyword_has_a_row_in_the_page_of_the_language() -> None:
     [
         ("", {"environment", "include", "let"}),
         ("environment e { needle { ra", {"radius", "speed", "tip", "heading", "bevel", "length"}),
-        ("environment e { tissue ", {"static", "adversarial"}),
+        ("environment e { tissue ", {"static", "adversarial", "stochastic"}),
         ("environment e { drive { ranking ", {"clearance", "reserve", "rolls", "length", "target"}),
         ("environment e { critical A sphere (0, 0, 0) mm ", {"radius"}),
         ('environment e { device grbl "x" { ', {"insert", "roll"}),

@@ -113,7 +113,7 @@ def drawn(draw: st.DrawFn) -> Scene:
         axis=pose.heading,
         criticals=(*scene.criticals, region),
         detections=(*scene.detections, shell),
-        tissue=draw(st.sampled_from((Tissue(), tissue))),
+        tissue=draw(st.sampled_from((Tissue(), tissue, replace(tissue, kind="stochastic")))),
         breath=None if motion is None else Breath(4.0, 0.5, 2, gate),
         queries=(NamedQuery("Reach", "E<> Checker.Final_TR_Reached"),),
     )
