@@ -97,14 +97,15 @@ def _options() -> list[Callable[..., Any]]:
 def say_idle_options(scene: Scene, configuration: Configuration) -> None:
     """Tells which of the options have no effect."""
     if not scene.tissue.is_adversarial:
-        say_idle(_OPTIONS, "in a tissue that is static")
+        say_idle(_OPTIONS, f"in a tissue that is {scene.tissue.kind}")
     elif configuration.needle.name != "virtual":
         say_idle({"tissue": "--tissue"}, "on this needle, whose tissue does what it does")
 
 
 def picks_at_random(wanted: Wanted, scene: Scene) -> bool:
     """Whether a simulated tissue picks by the seed."""
-    return scene.tissue.is_adversarial and wanted.tissue not in ("worst", "expected")
+    is_chosen = scene.tissue.is_adversarial and wanted.tissue not in ("worst", "expected")
+    return is_chosen or scene.tissue.is_stochastic
 
 
 def course_of(
@@ -176,7 +177,7 @@ def maker(
     """
     needle = configuration.needle
     if needle.name != "virtual" or not scene.tissue.is_adversarial:
-        return needle.make
+        return needle.made_in(scene)
     from ntagen.drive.simulate import answering
 
     tree = None if course is None else course.tree
@@ -184,7 +185,7 @@ def maker(
 
 
 def guarantee_of(result: Driven, scene: Scene, course: Course | None) -> dict[str, Any] | None:
-    """What was guaranteed in a run, for --json; None in a tissue that is static."""
+    """What was guaranteed in a run, for --json; None in a tissue that does not answer."""
     if not scene.tissue.is_adversarial:
         return None
     followed = result.guaranteed

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.models import include_option, rank_option
+from ntagen.cli.models import include_option
+from ntagen.cli.odds import Wanted, odds_lines, odds_options, rate, with_odds
 from ntagen.cli.quantities import TIME
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
@@ -18,6 +19,7 @@ from ntagen.files import require_apart, write_files
 if TYPE_CHECKING:
     from ntagen.drive.settings import Settings
     from ntagen.plan.anytime import Best
+    from ntagen.plan.chance import Rated
     from ntagen.scene import Scene
 
 STOPPED: Final = 3
@@ -48,7 +50,17 @@ STOPPED: Final = 3
     type=TIME,
     help="The search ends after about this time. It ends sooner if no plan can be better.",
 )
-@rank_option()
+@click.option(
+    "--rank",
+    "ranking",
+    metavar="CRITERION,…",
+    default=None,
+    help="How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
+    "length, target.  [default: as drive { … } says, else clearance,rolls,length] With "
+    "tissue stochastic, `probability` may come first: the best plans by the other criteria (or by "
+    "reserve,length,rolls) are ranked by how likely they reach the target.",
+)
+@odds_options
 @click.option(
     "-o",
     "--output",
@@ -68,6 +80,7 @@ def command(
     count: int,
     budget_s: float,
     ranking: str | None,
+    wanted: Wanted,
     output: Path | None,
     as_json: bool,
     include: tuple[Path, ...],
@@ -83,52 +96,74 @@ def command(
       ntagen plan examples/paper.nsl
       ntagen plan examples/paper.nsl --best 10 --within 5s -o plans.json
       ntagen plan examples/paper.nsl --rank length,clearance
+      ntagen plan examples/chance/chance.nsl --rank probability --best 5
+
+    \b
+    In a tissue with chance (tissue stochastic), random runs say of the best plans how likely the
+    tip reaches the target with nothing touched, how likely it touches a critical region, and how
+    near it comes to one in the mean, each with its interval. The plan is done open loop.
 
     \b
     Each JSON object has verdict (found, none, unknown), seconds, engine_seconds, looked_at (plans),
     limits (of each criterion: no plan is better), is_complete (no plan that is not listed is as
-    good as the last one), plans (as in the file of -o), is_final.
+    good as the last one), plans (as in the file of -o), is_final. Where runs were made, each of the
+    last plans has chance: reach, touch, clearance_mm (value, lower, upper, confidence, runs), and
+    is_apart (whether it is less probable than the best one).
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
     from ntagen.nsl import load_task
     from ntagen.plan.anytime import best_plans
-    from ntagen.plan.rank import parse_ranking
+    from ntagen.plan.rank import split_ranking
 
     if output is not None:
         require_apart({"-o": output}, {"source": source})
-    criteria = None if ranking is None else parse_ranking(ranking)
+    by_odds, criteria = (False, None) if ranking is None else split_ranking(ranking)
     task = load_task(source, include=include)
+    wanted = wanted.checked(task.scene, count, by_odds=by_odds)
     for warning in task.warnings:
         echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
     settings = settings if criteria is None else replace(settings, ranking=criteria)
     engine = replace(engine_for(settings), ranking=settings.ranking)
     shown: Best | None = None
+    found: tuple[Rated, ...] = ()
     for best in best_plans(
-        task.scene, engine, clock=time.monotonic, count=count, budget_s=budget_s
+        task.scene, engine, clock=time.monotonic, count=wanted.looked_for, budget_s=budget_s
     ):
-        if as_json:
-            echo(json.dumps(_record(best, task.scene, settings)))
-        else:
+        if not as_json:
             _show_better(best, shown)
         shown = best
+        if best.is_final:
+            found = rate(best.candidates, task.scene, wanted)
+            kept = [one.candidate for one in found] or best.candidates
+            shown = replace(best, candidates=tuple(kept[:count]))
+        if as_json:
+            echo(json.dumps(_record(shown, task.scene, settings, found)))
     if shown is None:
         raise AssertionError("the last value is always given")
     if output is not None and shown.candidates:
-        write_files({output: json.dumps(_document(shown, task.scene, settings), indent=1) + "\n"})
+        document = _document(shown, task.scene, settings, found)
+        write_files({output: json.dumps(document, indent=1) + "\n"})
     if not as_json:
-        _show_final(shown, task.scene, settings, count, output)
+        _show_final(shown, task.scene, settings, count, (found, wanted))
+        if output is not None and shown.candidates:
+            echo(f"plans written to {output}")
     return {"found": 0, "none": 1, "unknown": STOPPED}[shown.verdict]
 
 
-def _document(best: Best, scene: Scene, settings: Settings) -> dict[str, object]:
+def _document(
+    best: Best, scene: Scene, settings: Settings, found: tuple[Rated, ...]
+) -> dict[str, object]:
     from ntagen.plan.document import document
 
-    return document(scene, best.candidates, settings.ranking, settings.margins)
+    plans = document(scene, best.candidates, settings.ranking, settings.margins)
+    return with_odds(plans, found[: len(best.candidates)])
 
 
-def _record(best: Best, scene: Scene, settings: Settings) -> dict[str, object]:
+def _record(
+    best: Best, scene: Scene, settings: Settings, found: tuple[Rated, ...]
+) -> dict[str, object]:
     from ntagen.plan.anytime import goodness
 
     return {
@@ -138,7 +173,7 @@ def _record(best: Best, scene: Scene, settings: Settings) -> dict[str, object]:
         "looked_at": best.looked_at,
         "limits": {name: goodness(name, limit) for name, limit in best.limits.items()},
         "is_complete": best.is_complete,
-        "plans": _document(best, scene, settings)["plans"],
+        "plans": _document(best, scene, settings, found)["plans"],
         "is_final": best.is_final,
     }
 
@@ -158,10 +193,16 @@ def _show_better(best: Best, before: Best | None) -> None:
 
 
 def _show_final(
-    best: Best, scene: Scene, settings: Settings, count: int, output: Path | None
+    best: Best,
+    scene: Scene,
+    settings: Settings,
+    count: int,
+    by_odds: tuple[tuple[Rated, ...], Wanted],
 ) -> None:
     """Prints the best plans, and how good plans can be."""
     from ntagen.plan.wording import bounded, judged, ranked_by, required
+
+    found, wanted = by_odds
 
     spent = f"{best.seconds:.2f} s, {1000 * best.engine_seconds:.0f} ms of it in the engine"
     if best.verdict == "none":
@@ -172,16 +213,20 @@ def _show_final(
         echo(f"unknown: the budget ended before a plan was found, or proved not to exist ({spent})")
         echo("hint: give more time with --within")
         return
-    for line in bounded(best, settings.ranking, scene):
-        echo(line)
-    if count > 1:
+    if wanted.by_odds:
+        order = ranked_by(settings.ranking).removeprefix("best first: ")
+        echo(f"compared: the {len(found)} best plans {order}")
+    else:
+        for line in bounded(best, settings.ranking, scene):
+            echo(line)
+    if count > 1 and not wanted.by_odds:
         echo(f"{ranked_by(settings.ranking)}:")
         for place, candidate in enumerate(best.candidates, start=1):
             verdict = judged(candidate.certificate, settings.margins)
             echo(f"  {place:>3}. {verdict}  {candidate.plan}")
         if not best.is_complete:
             echo("there may be others that are as good as the last of them")
+    for line in odds_lines(found, count, by_odds=wanted.by_odds):
+        echo(line)
     plans = "1 plan" if best.looked_at == 1 else f"{best.looked_at} plans"
     echo(f"{plans} looked at in {spent}")
-    if output is not None:
-        echo(f"plans written to {output}")

@@ -223,7 +223,7 @@ def _of_scene(
     if shown == 0:
         return picture_of_plans(task.scene, None, shown)
     if not task.scene.tissue.is_adversarial:
-        say_idle({"tree_path": "--strategy"}, "in a tissue that is static")
+        say_idle({"tree_path": "--strategy"}, f"in a tissue that is {task.scene.tissue.kind}")
     elif (found := _of_strategy(task.scene, configuration, tree_path)) is not None:
         say_idle({"ranking": "--rank"}, "here: a strategy against the tissue is drawn, not plans")
         return found

@@ -43,7 +43,7 @@ def overrun_mm(
 def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -> Settings:
     """The settings that fit the virtual needle and the scene, as after a calibration.
 
-    The priors are at least the needle's errors, and the bounds of a tissue that answers. The
+    The priors are at least the needle's errors, and the bounds or spreads of the tissue. The
     sensing margin is that of the thinnest shell in the scene. If the driver does not know all
     regions, pushes become so short that it feels a region before it can pierce it.
 
@@ -55,7 +55,7 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
         roll_rad=max(settings.priors.roll_rad, errors.roll_rad),
         noise_mm=max(settings.priors.noise_mm, errors.noise_mm or 0.0),
     )
-    if scene.tissue.is_adversarial:
+    if scene.tissue.kind != "static":
         priors = _expecting(priors, scene.tissue)
     otherwise_mm = settings.sensing_margin_mm
     margins_mm = (
@@ -69,7 +69,7 @@ def settings_for(settings: Settings, errors: Errors, scene: Scene, known: str) -
 
 
 def _expecting(priors: Priors, tissue: Tissue) -> Priors:
-    """The priors of an estimator in a tissue that answers: what it may do is no surprise."""
+    """The priors of an estimator in such a tissue: what it may do is no surprise."""
     x, y = tissue.curvature_ratio, tissue.roll_rad
     return replace(
         priors,

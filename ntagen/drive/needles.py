@@ -102,6 +102,14 @@ class Chosen:
         make = phantom(self.parameters)
         return make if self.name == "phantom" else stepped(make)
 
+    def made_in(self, scene: Scene) -> Maker | None:
+        """As `make`; a virtual needle in a tissue with chance deviates as the tissue says."""
+        if self.name != "virtual" or not scene.tissue.is_stochastic:
+            return self.make
+        from ntagen.drive.simulate import answering
+
+        return answering(self.errors, scene, "drawn")
+
     def usual(self, settings: Settings, scene: Scene) -> Settings:
         """The settings with which this needle is driven if nobody says otherwise."""
         if self.is_real or self.name == LAB:

@@ -21,7 +21,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
-from ntagen.needle.answering import Answers, Between, Corners, Given
+from ntagen.needle.answering import Answers, Between, Corners, Drawn, Given
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -75,7 +75,8 @@ def answering(errors: Errors, scene: Scene, kind: str, tree: Segment | None = No
         errors: Their other errors.
         scene: The scene, with the bounds of the tissue.
         kind: What the tissue does: ``corners`` picks corners or the middle of its bounds at random,
-            ``between`` any values; ``worst`` is worst for the strategy; ``expected`` picks nothing.
+            ``between`` any values; ``worst`` is worst for the strategy; ``expected`` picks nothing;
+            ``drawn`` is a tissue with chance.
         tree: The strategy for which ``worst`` is worst.
 
     Raises:
@@ -93,6 +94,8 @@ def answering(errors: Errors, scene: Scene, kind: str, tree: Segment | None = No
                 return Corners(scene.tissue, seed)
             case "between":
                 return Between(scene.tissue, seed)
+            case "drawn":
+                return Drawn(scene.tissue, seed)
             case "worst" if tree is not None:
                 way = worst_path(tree, scene)
                 return Given([(one.branch.factor, one.branch.roll_error_rad) for one in way])

@@ -151,7 +151,7 @@ def _driven(
             Journals(*logs, observer),
             known=row.known,
             errors=configuration.errors,
-            make=configuration.needle.make,
+            make=configuration.needle.made_in(task.scene),
             seed=seed,
         )
     except (OSError, MemoryError):

@@ -2,11 +2,12 @@
 
 A segment is what the tip travels from the entry, or from a roll, to the next roll. The tissue picks
 a factor of the curvature for it, and the error of the roll before it, within the bounds of
-`ntagen.scene.Tissue`.
+`ntagen.scene.Tissue`, or draws them with its spreads.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Final, Protocol
 
@@ -67,6 +68,27 @@ class Between:
         x, y = self._tissue.curvature_ratio, self._tissue.roll_rad
         factor = 1.0 + float(self._random.uniform(-x, x))
         error = float(self._random.uniform(-y, y))
+        return factor, error if rolls_err else 0.0
+
+
+class Drawn:
+    """A tissue with chance: the logarithm of the factor and the error are normal.
+
+    The model of a plan draws the same (`templates/uppaal/chance.c.jinja`), with other numbers.
+
+    Args:
+        tissue: Its spreads.
+        seed: The seed of what it draws.
+    """
+
+    def __init__(self, tissue: Tissue, seed: int) -> None:
+        self._tissue = tissue
+        self._random = np.random.default_rng([seed, 3])
+
+    def pick(self, *, rolls_err: bool) -> Pick:
+        """See `Answers`."""
+        factor = math.exp(self._random.normal(0.0, self._tissue.curvature_ratio))
+        error = float(self._random.normal(0.0, self._tissue.roll_rad))
         return factor, error if rolls_err else 0.0
 
 

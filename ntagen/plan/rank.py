@@ -49,6 +49,9 @@ are looked at after each page."""
 
 DEFAULT_RANKING: Final = ("clearance", "rolls", "length")
 
+PROBABILITY: Final = "probability"
+"""The criterion that random runs estimate, in a tissue with chance (`ntagen.plan.chance`)."""
+
 ROBUST_RANKING: Final = ("reserve", "length", "rolls")
 """The usual ranking for needles that do not bend exactly as planned."""
 
@@ -110,11 +113,30 @@ def parse_ranking(text: str) -> tuple[str, ...]:
     names = tuple(name.strip() for name in text.split(","))
     known = ", ".join(CRITERIA)
     for name in names:
+        if name == PROBABILITY:
+            raise InputError(
+                "plans are ranked by probability by `ntagen plan` only, and before all else\n"
+                f"hint: `ntagen plan TASK --rank {PROBABILITY}`, or choose from {known}"
+            )
         if name not in CRITERIA:
             raise InputError(f"unknown ranking criterion '{name}'\nhint: choose from {known}")
         if names.count(name) > 1:
             raise InputError(f"ranking criterion '{name}' is given twice\nhint: name each once")
     return names
+
+
+def split_ranking(text: str) -> tuple[bool, tuple[str, ...]]:
+    """Whether a ranking begins with `PROBABILITY`, and its other criteria.
+
+    Without others, the plans whose probability is estimated are those with the most reserve.
+
+    Raises:
+        InputError: A criterion is unknown or given twice, or there is none.
+    """
+    first, _, rest = text.partition(",")
+    if first.strip() != PROBABILITY:
+        return False, parse_ranking(text)
+    return True, parse_ranking(rest) if rest.strip() else ROBUST_RANKING
 
 
 def certified(

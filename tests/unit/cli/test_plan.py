@@ -11,6 +11,7 @@ from ntagen import cli
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 PAPER = str(EXAMPLES / "paper.nsl")
+CHANCE = str(EXAMPLES / "chance" / "chance.nsl")
 LARGE = str(EXAMPLES / "scenarios" / "large_mid_cr.nsl")
 
 
@@ -67,3 +68,57 @@ def test_wrong_options_are_refused(
     out, err = capsys.readouterr()
     assert out == ""
     assert words in err
+
+
+def test_runs_say_how_likely_the_best_plan_arrives(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", CHANCE, "--within", "1min", "--runs", "300"]) == 0
+    out = capsys.readouterr().out
+    assert "clearance: " in out
+    assert "300 random runs of the plan, open loop; each interval holds at 0.95 confidence" in out
+    for words in ("reaches the target, and touches nothing: ", "touches a critical region: "):
+        assert words in out
+    assert "distinguishable" not in out
+
+
+def test_plans_are_ranked_by_probability(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "plans.json"
+    arguments = ["--within", "1min", "--runs", "300", "--best", "2", "--among", "3"]
+    assert cli.main(["plan", CHANCE, "--rank", "probability", *arguments, "-o", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "compared: the 3 best plans by reserve" in out
+    assert "300 random runs of each of 3 plans" in out
+    assert out.count("reaches the target") == 2
+    plans = json.loads(path.read_text("utf-8"))["plans"]
+    values = [plan["chance"]["reach"]["value"] for plan in plans]
+    assert len(values) == 2
+    assert values == sorted(values, reverse=True)
+    best = plans[0]["chance"]
+    assert best["is_apart"] is False
+    assert best["reach"]["lower"] <= best["reach"]["value"] <= best["reach"]["upper"]
+    assert best["reach"]["runs"] == 300
+    assert best["clearance_mm"]["value"] < plans[0]["certificate"]["critical_clearance_mm"]
+
+
+def test_the_last_line_of_json_has_the_probabilities(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--json", "--rank", "probability", "--within", "1min", "--runs", "50"]
+    assert cli.main(["plan", CHANCE, *arguments]) == 0
+    *before, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert last["is_final"]
+    assert [set(plan["chance"]) for plan in last["plans"]] == [
+        {"reach", "touch", "clearance_mm", "is_apart"}
+    ]
+    assert not any("chance" in plan for line in before for plan in line["plans"])
+
+
+def test_static_tissue_has_no_probabilities(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["plan", PAPER, "--rank", "probability"]) == 2
+    assert "no probability in a tissue that is static" in capsys.readouterr().err
+    assert cli.main(["plan", PAPER, "--runs", "9", "--within", "1min"]) == 0
+    assert "--runs has no effect in a tissue that is static" in capsys.readouterr().err
+
+
+def test_other_commands_do_not_rank_by_probability(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["check", CHANCE, "--plans", "-", "--rank", "probability"]) == 2
+    assert "by `ntagen plan` only" in capsys.readouterr().err
