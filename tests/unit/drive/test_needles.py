@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from ntagen.drive.configure import configure
 from ntagen.drive.needles import NAMES, choose
 from ntagen.drive.records import Measured
+from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
 from ntagen.errors import InputError
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.virtual import Errors
 from ntagen.parameters import BY_FIELD, BY_WORDS, Given
 from ntagen.plan.rank import ROBUST_RANKING
+from ntagen.scene import Scene, Tissue, Vector
 from tests.drive.runs import Diary
 from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import scene, sphere
@@ -56,6 +59,31 @@ def test_the_phantom_is_driven_with_settings_for_its_errors() -> None:
     uncompensated = configure([off], OPEN, needle="phantom").settings
     assert uncompensated.compensated_lag_rad == 0.0
     assert 0.0 < settings.priors.lag_rad < 0.5 * uncompensated.priors.lag_rad
+
+
+def test_only_the_virtual_needle_deviates_by_the_chances_of_the_tissue() -> None:
+    chance = replace(OPEN, tissue=Tissue("stochastic", 0.1, 0.2, 0.3))
+
+    def ends(of: Scene, name: str) -> set[Vector]:
+        make = choose(name, Errors()).made_in(of)
+        assert make is not None
+        found = set()
+        for seed in range(3):
+            needle = make(of.needle, (), seed)
+            needle.push(20.0)
+            found.add(needle.true_tip.position_mm)
+        return found
+
+    assert len(ends(OPEN, "virtual")) == 1
+    assert len(ends(chance, "virtual")) == 3
+    assert ends(chance, "phantom") == ends(OPEN, "phantom")
+
+
+def test_the_estimator_expects_the_spreads_of_the_tissue() -> None:
+    chance = replace(OPEN, tissue=Tissue("stochastic", 0.3, 0.4, 0.3))
+    settings = choose("virtual", Errors()).fitting(Settings(), chance, "all")
+    assert settings.priors.curvature_ratio >= 0.3
+    assert settings.priors.roll_rad >= 0.4
 
 
 def test_the_virtual_needle_needs_no_compensation() -> None:

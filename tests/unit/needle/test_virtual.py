@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import statistics
 
 import numpy as np
 import pytest
 
 from ntagen.errors import DeviceError
+from ntagen.needle.answering import Drawn
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
-from ntagen.scene import Needle
+from ntagen.scene import Needle, Tissue
 from tests.steering import ENTRY, sphere
 
 AHEAD = Obstacle(sphere("C1", "critical", (0.0, -10.0, 0.0), 2.0), margin_mm=3.0)
@@ -107,3 +109,15 @@ def test_impossible_commands_are_refused(value: float) -> None:
         needle.pull(value)
     with pytest.raises(DeviceError):
         needle.roll(math.nan)
+
+
+def test_a_tissue_with_chance_draws_by_its_spreads() -> None:
+    tissue = Tissue("stochastic", 0.1, 0.2, 0.3)
+    drawn = [Drawn(tissue, seed).pick(rolls_err=True) for seed in range(4000)]
+    factors = [math.log(factor) for factor, _ in drawn]
+    errors = [error for _, error in drawn]
+    for values, spread in ((factors, 0.1), (errors, 0.2)):
+        # Five standard deviations of each, for normal numbers.
+        assert abs(statistics.fmean(values)) < 5.0 * spread / math.sqrt(4000.0)
+        assert abs(statistics.pstdev(values) - spread) < 5.0 * spread / math.sqrt(8000.0)
+    assert all(Drawn(tissue, seed).pick(rolls_err=False)[1] == 0.0 for seed in range(5))
