@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _OPTIONS: Final = {"among": "--among", "runs": "--runs", "seed": "--seed"}
 
 _AMONG: Final = 10
-"""So many plans are ranked by their probability, if no number is given."""
+"""How many plans are ranked by their probability, if no number is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +30,12 @@ class Wanted:
     """What is to be known of plans.
 
     Attributes:
-        among: So many plans are compared; None if no number is given.
-        runs: So many for each.
+        among: How many plans are compared; None if no number is given.
+        runs: How many are made of each.
         seed: That of the runs.
         by_odds: Whether plans are ranked by their probability.
         is_random: Whether runs are made.
-        shown: So many plans are shown.
+        shown: How many plans are shown.
     """
 
     among: int | None
@@ -51,7 +51,7 @@ class Wanted:
         return max(self.shown, self.among or _AMONG) if self.by_odds else self.shown
 
     def checked(self, scene: Scene, count: int, *, by_odds: bool) -> Wanted:
-        """The same for a scene, of which so many plans are to be shown.
+        """The same for a scene, of which `count` plans are to be shown.
 
         Raises:
             InputError: Plans are to be ranked by probability, and the tissue has no chance.
@@ -89,7 +89,7 @@ def _options() -> list[Callable[..., Any]]:
             "--among",
             metavar="N",
             type=click.IntRange(min=1),
-            help="For --rank probability: so many plans are compared.  [default: 10]",
+            help="For --rank probability: how many plans are compared.  [default: 10]",
         ),
         click.option(
             "--runs",
@@ -97,7 +97,7 @@ def _options() -> list[Callable[..., Any]]:
             default=2000,
             show_default=True,
             type=click.IntRange(min=2),
-            help="With tissue stochastic: so many random runs are made of each plan.",
+            help="With tissue stochastic: how many random runs are made of each plan.",
         ),
         click.option(
             "--seed",

@@ -35,7 +35,7 @@ class Sampling:
     """How runs are made.
 
     Attributes:
-        runs: So many for each plan.
+        runs: How many for each plan.
         seed: The same seed gives the same runs.
         risk: The risk that any of the intervals misses.
         threads: They share the runs; results do not depend on their number.
@@ -120,7 +120,7 @@ def rated(
 
 
 def actions_of(plan: Plan, scene: Scene) -> tuple[int, ...]:
-    """A plan as its model has it: 0 is a push of one step, else a roll by so many degrees.
+    """A plan as its model has it: 0 is a push of one step, else a roll by that number of degrees.
 
     Raises:
         InputError: It has a wait, a part of a step, or a part of a degree.
@@ -145,7 +145,7 @@ def actions_of(plan: Plan, scene: Scene) -> tuple[int, ...]:
 
 
 def _asked(plan: Plan, scene: Scene, sampling: Sampling, together: int) -> Odds:
-    """What runs say of one of so many plans; all intervals of a kind hold together."""
+    """What runs say of one of `together` plans; all intervals of a kind hold together."""
     from ntagen import checker
     from ntagen.render import render_plan
 

@@ -55,8 +55,8 @@ def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
 
     Args:
         scene: The scene, with a stochastic tissue.
-        plan: What is done one after the other: 0 is a push, else a roll by so many degrees.
-        runs: So many runs give the expected clearance.
+        plan: What is done one after the other: 0 is a push, else a roll by that number of degrees.
+        runs: The number of runs that give the expected clearance.
 
     Returns:
         The XML document; its queries are `ntagen.render.queries.questions`.

@@ -33,7 +33,7 @@ class Chance:
         tip_spread_mm: That of each coordinate of the tip.
         radius_mm: The radius of the motion circle that is expected.
         push_mm: What a push inserts.
-        parts: The way of a push is looked at after each of so many parts.
+        parts: The way of a push is looked at in this number of parts, at the end of each.
         segments: Segments on one path, at most.
         position: The tip at the start, in the model's frame.
         heading: Its direction of travel.
@@ -44,8 +44,8 @@ class Chance:
         unsafe_solids: Shapes besides spheres that must not be touched: the kind, and the first and
             last row in its tables.
         target_forms: The kinds of targets that are no spheres, and their numbers.
-        plan: What is done one after the other: 0 is a push, else a roll by so many degrees; empty
-            in a game.
+        plan: What is done one after the other: 0 is a push, else a roll by that number of
+            degrees; empty in a game.
     """
 
     curvature_spread: str

@@ -1727,14 +1727,14 @@ def declaration(model: Any, source: Any) -> str:
         put(shown(('%-53s' % (''.join(map(shown, ('const double PUSH_LENGTH = ', model.chance.push_mm, ';',))),))))
         put(' // What a push inserts, in mm.\n')
         put(shown(('%-53s' % (''.join(map(shown, ('const int PUSH_PARTS = ', model.chance.parts, ';',))),))))
-        put(' // The way of a push is looked at after each of so many parts.\n')
+        put(' // The way of a push is looked at after each of these parts.\n')
         put(shown(('%-53s' % (''.join(map(shown, ('const int DRAWN_COUNT = ', model.chance.segments, ';',))),))))
         put(' // Segments on one path, at most.\n'
             'double drawn_factor[DRAWN_COUNT];                     // What was drawn for each segment: factors of the curvature,\n'
             'double drawn_error[DRAWN_COUNT];                      //   and errors of the roll before it, in rad.\n'
             'bool is_drawn = false;\n'
             'bool is_pushing = false;                              // Whether the action of the moment is a push.\n'
-            'int drawn_segment = 0;                                // The segment of the moment: so many rolls were made.\n'
+            'int drawn_segment = 0;                                // The segment of the moment: the number of rolls so far.\n'
             'int push_count = 0;                                   // Pushes so far.\n'
             '\n')
         put(shown(('%-53s' % (''.join(map(shown, ('double true_pos[3] = ', model.chance.position, ';',))),))))
@@ -1904,7 +1904,7 @@ def declaration(model: Any, source: Any) -> str:
             put(';\n'
                 'const int PLAN[ACTION_COUNT] = {')
             put(shown(', '.join(map(shown, model.chance.plan))))
-            put('};     // 0: a push; else: a roll by so many degrees.\n'
+            put('};     // 0: a push; else: a roll, in degrees.\n'
                 'int next_action = 0;')
         put('\n')
     return "".join(out)

@@ -42,7 +42,7 @@ class Result:
 
 
 def runs(plan: Plan, scene: Scene, count: int, seed: int) -> list[Result]:
-    """The results of so many runs."""
+    """The results of `count` runs."""
     return [_run(plan, scene, 1_000_003 * seed + number) for number in range(count)]
 
 
