@@ -179,10 +179,14 @@ pub struct Simulated {
     pub runs: Vec<Trajectory>,
     /// How likely it is that a run reaches what it must, if it must.
     pub estimate: Option<Estimate>,
+    /// Whether runs were left out because there was no more room.
+    pub is_cut: bool,
 }
 
-/// All runs that are shown have at most so many points together: each takes 16 bytes.
+/// All runs that are shown have at most this number of points together: each takes 16 bytes.
 const MOST_POINTS: usize = 10_000_000;
+/// A run takes as much memory beside its points as this number of points.
+const POINTS_OF_A_RUN: usize = 16;
 
 /// Answers `simulate`; `ends` is asked now and then, with the number of runs so far.
 ///
@@ -198,7 +202,7 @@ pub fn simulate(
     let wanted = precision.runs.or(query.bound.runs).unwrap_or(1);
     let most = query.filter.as_ref().map_or(u64::MAX, |(_, most)| *most);
     let mut shown = Vec::new();
-    let (mut made, mut points) = (0, 0);
+    let (mut made, mut points, mut is_cut) = (0, 0, false);
     let is_complete = in_order(
         (network, executor),
         precision.threads,
@@ -206,10 +210,13 @@ pub fn simulate(
         |trajectory| {
             made += 1;
             if trajectory.satisfied {
+                points += POINTS_OF_A_RUN;
                 points += trajectory.points.iter().map(Vec::len).sum::<usize>();
                 shown.push(trajectory);
             }
-            made >= wanted || shown.len() as u64 >= most || points >= MOST_POINTS
+            let is_enough = made >= wanted || shown.len() as u64 >= most;
+            is_cut = !is_enough && points >= MOST_POINTS;
+            is_enough || is_cut
         },
         &mut Ends(ends),
     )?;
@@ -219,6 +226,7 @@ pub fn simulate(
         items: query.items.iter().map(|item| item.text.clone()).collect(),
         runs: shown,
         estimate: query.filter.is_some().then_some(estimate),
+        is_cut,
     })
 }
 

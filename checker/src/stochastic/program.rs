@@ -85,7 +85,6 @@ pub(super) struct Program<'a> {
     pub(super) has_rates: bool,
     /// Whether the rate of some clock may change as time passes.
     pub(super) has_flows: bool,
-    pub(super) has_binary_channels: bool,
 }
 
 impl<'a> Program<'a> {
@@ -105,7 +104,6 @@ impl<'a> Program<'a> {
             followers: Vec::new(),
             has_rates: false,
             has_flows: false,
-            has_binary_channels: network.channels.iter().any(|channel| !channel.broadcast),
         };
         for process in 0..network.processes.len() {
             program.add_process(process, &mut machine);

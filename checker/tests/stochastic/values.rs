@@ -449,3 +449,13 @@ fn a_value_that_is_no_number_is_an_error() {
     let failed = runner.extreme((1, 0), bound_of(&query), value, true);
     assert_eq!(failed, Err(Failure::NoNumber));
 }
+
+#[test]
+fn a_committed_receiver_may_be_left_by_a_broadcast_of_others() {
+    let model = "
+        broadcast chan go;
+        process P() { state a { ; 1 }, b; init a; trans a -> b { sync go!; }; }
+        process Q() { state c, d; commit c; init c; trans c -> d { sync go?; }; }
+        system P, Q;";
+    expect(model, "Pr[<=1](<> P.b && Q.d)", 1.0);
+}

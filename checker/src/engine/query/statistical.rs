@@ -93,7 +93,11 @@ impl LoadedModel {
             }
         });
         let answer = match result {
-            Err((reason, counters)) => Ok(Answer::new(Verdict::Unknown(reason), counters)),
+            Err((reason, counters)) => {
+                let mut answer = Answer::new(Verdict::Unknown(reason), counters);
+                answer.remark(NO_RUN);
+                Ok(answer)
+            }
             Ok(Err(Failure::RunTime(error))) => {
                 let failure = network::Failure::from(error);
                 match failure {
@@ -117,6 +121,11 @@ impl LoadedModel {
                 let method = estimate.as_ref().map(|estimate| estimate.method);
                 if let Some(remark) = remark(&compiled.kind, verdict, method) {
                     answer.remark(remark);
+                }
+                if simulated.as_ref().is_some_and(|simulated| simulated.is_cut) {
+                    answer.remark(
+                        "there is room for these runs only: ask for fewer, or for shorter ones",
+                    );
                 }
                 answer.estimate = estimate;
                 answer.simulated = simulated;
@@ -285,6 +294,9 @@ fn contradiction(
         _ => None,
     }
 }
+
+/// What is said if the first run takes too long.
+const NO_RUN: &str = "no run has ended until then: bound runs by less, and see that the clock that bounds them is not set back";
 
 fn is_test(query: &Statistical) -> bool {
     matches!(query, Statistical::Hypothesis { .. })

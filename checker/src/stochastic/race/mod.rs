@@ -2,11 +2,11 @@
 //!
 //! A process competes with its *outputs*: internal edges and sending edges. Its delay is drawn
 //! among the times at which one of them is enabled: uniformly if its invariant bounds them, else by
-//! the exponential distribution with the rate of its location, of which only those times count.
-//! Where time stands still (urgent and committed locations), and at the first moment at which an
-//! urgent channel can be used, the delay is 0. The winner takes one of its outputs, all with the
-//! same chance; a sender on a binary channel competes while a receiver is ready, and takes one of
-//! them.
+//! the exponential distribution with the rate of its location, of which only those times count. In
+//! an urgent or committed location, and from the first moment at which an urgent channel can be
+//! used, its delay is 0. So where time stands still, only those move who have drawn 0; if there are
+//! none, all who have an output. The winner takes one of its outputs, all with the same chance; a
+//! sender on a binary channel competes while a receiver is ready, and takes one of them.
 //!
 //! What a process has drawn is its *plan*. It stays as it is until something changes on which it
 //! depends. Drawing anew at any other moment would give the same law: both distributions,
@@ -296,7 +296,8 @@ impl<'a> Race<'a> {
         let committed: Vec<usize> = all.clone().filter(|&one| is_committed(self, one)).collect();
         let by = committed[0];
         let mut winner = self.one_with_outputs(program, committed)?;
-        if winner.is_none() && program.has_binary_channels {
+        if winner.is_none() {
+            // Somebody else may send to a committed location.
             winner = self.one_with_outputs(program, all)?;
         }
         Ok(Next {

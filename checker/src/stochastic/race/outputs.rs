@@ -194,10 +194,12 @@ impl<'a> Race<'a> {
         let spot = program.spot(process, self.locations[process]);
         let leaves_committed = self.committed == 0 || spot.urgency == Urgency::Committed;
         if spot.is_plain && !self.is_stale[process] {
-            if leaves_committed {
-                self.choices.extend_from_slice(&self.enabled[process]);
+            for index in 0..self.enabled[process].len() {
+                let number = self.enabled[process][index];
+                if leaves_committed || self.partner_commits(program, program.instance(number))? {
+                    self.choices.push(number);
+                }
             }
-            // None is on a binary channel, so that no partner can commit.
             return Ok(!self.choices.is_empty());
         }
         for number in spot.outputs.0..spot.outputs.1 {
