@@ -129,7 +129,6 @@ impl Answer {
 
     /// The values of runs in ascending order, and how often each came, as native doubles and as
     /// native unsigned integers of 64 bits; `None` for queries whose runs have no values.
-    #[expect(clippy::type_complexity, reason = "it is what Python gets")]
     fn distribution_points<'py>(
         &self,
         py: Python<'py>,

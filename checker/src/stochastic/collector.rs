@@ -2,8 +2,8 @@
 //!
 //! Results come in the order of run numbers, so what is said does not depend on threads.
 
-use super::estimate::{Estimate, MeanMethod, Precision};
 use super::failure::Failure;
+use super::precision::{Estimate, MeanMethod, Precision};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,
     ProbabilitySequence, SequentialTest, clopper_pearson,

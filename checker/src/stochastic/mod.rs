@@ -12,6 +12,7 @@ mod in_order;
 mod integrator;
 mod machine;
 mod motion;
+mod precision;
 mod program;
 mod race;
 mod run;
@@ -22,10 +23,9 @@ pub mod statistics;
 mod values_of_runs;
 mod windows;
 
-pub use estimate::{
-    Estimate, MeanMethod, Precision, Simulated, estimate, estimate_watched, simulate,
-};
+pub use estimate::{Simulated, estimate, estimate_watched, simulate};
 pub use failure::{Failure, Stand};
+pub use precision::{Estimate, MeanMethod, Precision};
 pub use race::{ZENO_MOVES, ZENO_TIME};
 pub use run::{Outcome, Runner, Trajectory};
 pub use run_watch::{RunWatch, Shown};

@@ -79,8 +79,8 @@ pub(in crate::stochastic) struct Race<'a> {
     committed: usize,
     windows: Windows,
     pub(in crate::stochastic) motion: Motion,
-    /// By process: whether its plan was found by looking along the motion of clocks. It reaches only
-    /// until somebody moves.
+    /// By process: whether its plan was found by looking along the motion of clocks. It reaches
+    /// only until somebody moves.
     is_stepped: Vec<bool>,
     /// How long the run may still last.
     rest: f64,

@@ -122,8 +122,8 @@ impl<'a> Race<'a> {
     }
 
     /// How long a process may stay where it is, if that is found by looking along the motion of
-    /// clocks: not beyond the end of the run, but where a process without a rate needs to know, which
-    /// is far beyond it.
+    /// clocks: not beyond the end of the run, but far beyond it where a process has no rate and so
+    /// needs to know.
     pub(super) fn stepped_bound(
         &mut self,
         program: &Program<'a>,
