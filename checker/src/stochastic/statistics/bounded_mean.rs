@@ -1,8 +1,8 @@
 //! The mean of values between two known bounds: empirical Bernstein intervals, which are narrow
 //! where the values vary little.
 //!
-//! For values X in \[0, 1\], numbers w (the *weights*) in \[0, 1) that are chosen before each value,
-//! and the mean m of the values before it (at first 1/2),
+//! For values X in \[0, 1\], numbers w (the *weights*) in \[0, 1) that are chosen before each
+//! value, and the mean m of the values before it (at first 1/2),
 //!
 //! ```text
 //! sum(w X) / sum(w)  ±  (ln(2 / alpha) + sum(4 (X - m)² psi(w))) / sum(w)

@@ -1,9 +1,9 @@
 //! The mean of values between two known bounds, by a band around their distribution.
 //!
 //! With a risk of alpha at most, the share of values below any number is nowhere farther from the
-//! probability than sqrt(ln(2 / alpha) / 2n). The least mean of a distribution in this band moves so
-//! much of the greatest values to the lower bound, the greatest mean moves the least values to the
-//! upper one. The number of values is chosen before.
+//! probability than sqrt(ln(2 / alpha) / 2n). The least mean of a distribution in this band moves
+//! so much of the greatest values to the lower bound, the greatest mean moves the least values to
+//! the upper one. The number of values is chosen before.
 //!
 //! Values are kept by cells of equal width, so memory does not grow with their number; where a
 //! value lies in its cell counts for neither end, which makes the interval wider by the part

@@ -1,7 +1,7 @@
 //! Whether a probability is at least a threshold: Wald's sequential probability ratio test.
 //!
-//! Within the deltas of the threshold nothing is promised. Outside, the probability of a wrong answer is
-//! alpha (for "below") or beta (for "at least") up to the overshoot, which Wald neglects.
+//! Within the deltas of the threshold nothing is promised. Outside, the probability of a wrong
+//! answer is alpha (for "below") or beta (for "at least") up to the overshoot, which Wald neglects.
 //!
 //! Source: A. Wald, "Sequential tests of statistical hypotheses", Annals of Mathematical Statistics
 //! 16 (1945).
