@@ -16,6 +16,7 @@ use checker::syntax;
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
 mod flows;
+mod known;
 mod networks;
 #[path = "../common/random.rs"]
 #[allow(dead_code, reason = "this program draws in some of the ways only")]
