@@ -12,6 +12,7 @@ use checker::semantics::{self, Reading};
 use checker::stochastic::{Failure, Runner};
 use checker::syntax;
 
+mod bad_input;
 mod certainties;
 #[path = "../common/checks.rs"]
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
