@@ -59,26 +59,6 @@ pub(crate) fn probability(net: &Net, query: &Query) -> Result<f64, Unfit> {
 }
 
 impl Game<'_> {
-    /// The processes that move before any time passes; they are equally likely.
-    fn at_once(&self, state: &State) -> Result<Vec<usize>, Unfit> {
-        let processes = 0..self.net.processes.len();
-        if self.is_frozen(state) {
-            let moving: Vec<usize> = processes
-                .filter(|&one| !self.outputs(one, state).is_empty())
-                .collect();
-            return if moving.is_empty() {
-                Err(Unfit::TimeLock)
-            } else {
-                Ok(moving)
-            };
-        }
-        let is_urgent = |&one: &usize| {
-            let outputs = self.outputs(one, state);
-            outputs.iter().any(|&output| self.is_urgent(one, output))
-        };
-        Ok(processes.filter(is_urgent).collect())
-    }
-
     /// The processes that wait for a move, with their rates.
     fn rates(&self, state: &State) -> Vec<(usize, f64)> {
         let mut rates = Vec::new();
@@ -113,7 +93,7 @@ fn settle(
                 decided.add(satisfied, chance);
                 continue;
             }
-            let movers = game.at_once(&state)?;
+            let movers = game.at_once(&state, &|_| false)?;
             if movers.is_empty() {
                 *settled.entry(state).or_default() += chance;
             }
@@ -153,7 +133,7 @@ fn by_moves(game: &Game<'_>, path: &Path, moves: u32) -> Result<f64, Unfit> {
             if left == 0 {
                 continue;
             }
-            let movers = game.at_once(&state)?;
+            let movers = game.at_once(&state, &|_| false)?;
             let movers = if movers.is_empty() {
                 game.rates(&state)
             } else {

@@ -129,31 +129,13 @@ fn settle(
 
 /// The processes that move at this point of the grid; they are equally likely.
 fn at_once(game: &Game<'_>, state: &State) -> Result<Vec<usize>, Unfit> {
-    let processes = 0..game.net.processes.len();
-    let chances: Vec<Chances> = processes
-        .clone()
-        .map(|process| chances(game, process, state))
-        .collect();
-    if game.is_frozen(state) {
-        let moving: Vec<usize> = processes
-            .filter(|&one| !game.outputs(one, state).is_empty())
-            .collect();
-        return if moving.is_empty() {
-            Err(Unfit::TimeLock)
-        } else {
-            Ok(moving)
-        };
-    }
-    let mut moving = Vec::new();
-    for (process, chances) in chances.iter().enumerate() {
-        let outputs = game.outputs(process, state);
-        let is_urgent = outputs.iter().any(|&one| game.is_urgent(process, one));
-        let is_forced = chances.bound.is_some() && chances.length == Some(0) && chances.is_open.0;
-        if is_urgent || is_forced {
-            moving.push(process);
-        }
-    }
-    if moving.is_empty() && chances.iter().any(|one| one.bound == Some(0)) {
+    let is_forced = |process| {
+        let chances = chances(game, process, state);
+        chances.bound.is_some() && chances.length == Some(0) && chances.is_open.0
+    };
+    let moving = game.at_once(state, &is_forced)?;
+    let mut processes = 0..game.net.processes.len();
+    if moving.is_empty() && processes.any(|one| bound(game, one, state) == Some(0)) {
         return Err(Unfit::TimeLock);
     }
     Ok(moving)

@@ -309,7 +309,8 @@ impl Atom {
 }
 
 impl Condition {
-    fn text(&self) -> String {
+    /// The condition in the language.
+    pub(crate) fn text(&self) -> String {
         let joined = |all: &[Condition], word: &str| {
             let texts: Vec<String> = all.iter().map(Condition::text).collect();
             format!("({})", texts.join(word))

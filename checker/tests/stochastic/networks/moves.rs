@@ -95,10 +95,6 @@ impl Game<'_> {
         self.net.processes[process].locations[location].urgency
     }
 
-    pub(crate) fn is_frozen(&self, state: &State) -> bool {
-        (0..self.net.processes.len()).any(|one| self.urgency(one, state) != Urgency::Normal)
-    }
-
     fn edges(&self, process: usize, state: &State) -> impl Iterator<Item = (usize, &Edge)> {
         let location = usize::from(state.locations[process]);
         let edges = self.net.processes[process].edges.iter().enumerate();
@@ -137,29 +133,45 @@ impl Game<'_> {
             .collect()
     }
 
-    /// The outputs that may be taken: if a process is in a committed location, only those in which
-    /// such a process takes part.
+    /// The outputs that are enabled.
     pub(crate) fn outputs(&self, process: usize, state: &State) -> Vec<Output> {
-        let processes = 0..self.net.processes.len();
-        let is_committed = |one| self.urgency(one, state) == Urgency::Committed;
-        let must_commit = processes.clone().any(is_committed);
-        let takes_part = |output: &Output| {
-            let sync = self.edge(process, *output).sync;
-            let Some((channel, _)) = sync else {
-                return false;
-            };
-            processes.clone().any(|other| {
-                other != process
-                    && is_committed(other)
-                    && !self.receivers(other, channel, state).is_empty()
-            })
-        };
         let mut outputs = self.all_outputs(process, state);
         outputs.retain(|&one| self.is_enabled(process, one, state));
-        if must_commit && !is_committed(process) {
-            outputs.retain(takes_part);
-        }
         outputs
+    }
+
+    /// The processes that move before any time passes; they are equally likely. Those in committed
+    /// locations come first, then those whose delay is 0: in urgent locations, with an output on an
+    /// urgent channel, or forced otherwise. If time stands still and there are none, all that can.
+    pub(crate) fn at_once(
+        &self,
+        state: &State,
+        is_forced: &dyn Fn(usize) -> bool,
+    ) -> Result<Vec<usize>, Unfit> {
+        let processes = 0..self.net.processes.len();
+        let able: Vec<usize> = processes
+            .clone()
+            .filter(|&one| !self.outputs(one, state).is_empty())
+            .collect();
+        let is = |urgency| move |one: &usize| self.urgency(*one, state) == urgency;
+        let mut moving = able.clone();
+        if processes.clone().any(|one| is(Urgency::Committed)(&one)) {
+            moving.retain(is(Urgency::Committed));
+        } else {
+            moving.retain(|&one| {
+                let outputs = self.outputs(one, state);
+                let is_urgent = outputs.iter().any(|&output| self.is_urgent(one, output));
+                is_urgent || is(Urgency::Urgent)(&one) || is_forced(one)
+            });
+            if moving.is_empty() && processes.clone().any(|one| is(Urgency::Urgent)(&one)) {
+                moving = able;
+            }
+        }
+        let is_frozen = processes.into_iter().any(|one| !is(Urgency::Normal)(&one));
+        if is_frozen && moving.is_empty() {
+            return Err(Unfit::TimeLock);
+        }
+        Ok(moving)
     }
 
     /// What a move of a process comes to, all its enabled outputs with the same chance. Guards see
