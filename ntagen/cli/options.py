@@ -169,7 +169,7 @@ _OPTIONS: Final[dict[str, Decorator]] = {
 }
 """The options on the command line, by their fields of `ntagen.checker.Options`."""
 
-STATISTICAL: Final[dict[str, Decorator]] = {
+PICTURED: Final[dict[str, Decorator]] = {
     name: _OPTIONS[name] for name in ("runs", "alpha", "epsilon", "seed", "threads")
 }
 """Those of random runs that a picture depends on, or that make it faster."""

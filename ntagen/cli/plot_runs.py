@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.asked import Asked
-from ntagen.cli.options import STATISTICAL
+from ntagen.cli.options import PICTURED
 from ntagen.cli.rules import Decorator
 from ntagen.cli.run_progress import progress_of, say_interrupted
 from ntagen.cli.terminal import echo
@@ -68,11 +68,11 @@ def run_options(command: Callable[..., int | None]) -> Callable[..., int | None]
     @functools.wraps(command)
     def with_wish(**values: Any) -> int | None:  # noqa: ANN401  click's values
         buckets, width = values.pop("buckets"), values.pop("width")
-        given = {name: values.pop(name) for name in STATISTICAL}
+        given = {name: values.pop(name) for name in PICTURED}
         return command(run_wish=RunWish(given, buckets, width), **values)
 
     decorated: Callable[..., int | None] = with_wish
-    for option in reversed([*STATISTICAL.values(), *_OPTIONS.values()]):
+    for option in reversed([*PICTURED.values(), *_OPTIONS.values()]):
         decorated = option(decorated)
     return decorated
 
