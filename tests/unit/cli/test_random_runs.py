@@ -163,7 +163,7 @@ def test_python_gets_the_result_so_far(path: str) -> None:
 def test_progress_shows_the_interval_so_far(path: str) -> None:
     seen: list[tuple[int, float | None, float | None, float | None]] = []
     model = checker.load_file(Path(path))
-    model.check("Pr[<=3](<> Q.B)", epsilon=0.005, run_progress=lambda *one: seen.append(one))
+    model.check("Pr[<=3](<> Q.B)", epsilon=0.001, run_progress=lambda *one: seen.append(one))
     assert seen
     for runs, estimate, lower, upper in seen:
         assert runs > 0
