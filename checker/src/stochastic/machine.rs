@@ -141,13 +141,12 @@ impl<'a> Machine<'a> {
     /// Lets time pass.
     #[inline]
     pub(super) fn advance(&mut self, time: f64) {
-        if time == 0.0 {
-            return;
-        }
         let network = self.network;
         for &offset in &network.chances.clocks {
-            let (value, rate) = self.clock(offset);
-            self.set_double(offset, value + rate * time);
+            let words = &mut self.words[offset as usize..offset as usize + 4];
+            let rate = double_of_words(words[2], words[3]);
+            let value = double_of_words(words[0], words[1]) + rate * time;
+            words[..2].copy_from_slice(&double_words(value));
         }
     }
 

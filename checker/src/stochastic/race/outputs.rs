@@ -23,11 +23,10 @@ impl<'a> Race<'a> {
         for instance in program.range(spot.outputs) {
             if instance.may_be_urgent && self.is_urgent(instance)? {
                 // It is taken as soon as it can be, so no time is drawn for it.
-                let mut all = Windows::default();
-                let first = self.instance_windows(program, instance, bound, &mut all)?;
+                let first = self.instance_windows(program, instance, bound, None)?;
                 urgent = urgent.min(first);
             } else {
-                self.instance_windows(program, instance, bound, windows)?;
+                self.instance_windows(program, instance, bound, Some(windows))?;
             }
         }
         Ok(urgent)
@@ -39,17 +38,23 @@ impl<'a> Race<'a> {
         program: &Program<'a>,
         instance: &Instance<'a>,
         bound: f64,
-        windows: &mut Windows,
+        mut windows: Option<&mut Windows>,
     ) -> Result<f64, Failure> {
+        let mut add = |low: f64, high: f64| {
+            if let Some(windows) = &mut windows {
+                windows.add(low, high);
+            }
+        };
         let steps = self.steps(program, instance.guard);
         self.is_stepped[instance.process as usize] |= steps;
-        if matches!(instance.guard, Condition::Compared(_)) && !instance.is_binary && !steps {
+        let is_span = !matches!(instance.guard, Condition::Timed(_) | Condition::Curved(_));
+        if is_span && !instance.is_binary && !steps {
             let span = self.span(program, instance.guard, &instance.values)?;
             let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
             let Some(span) = span.filter(|span| span.low <= latest) else {
                 return Ok(f64::INFINITY);
             };
-            windows.add(span.low, span.high.min(bound).max(span.low));
+            add(span.low, span.high.min(bound).max(span.low));
             return Ok(span.low);
         }
         let (mut ahead, mut before) = (0.0, false);
@@ -58,10 +63,10 @@ impl<'a> Race<'a> {
             let mask = self.output(program, instance, ahead)?;
             let end = (ahead + mask.horizon).min(bound);
             if mask.behind && ahead < bound {
-                windows.add(ahead, end);
+                add(ahead, end);
                 first = first.min(ahead);
             } else if mask.now && !before {
-                windows.add(ahead, ahead);
+                add(ahead, ahead);
                 first = first.min(ahead);
             }
             let next = ahead + mask.horizon;
@@ -128,7 +133,7 @@ impl<'a> Race<'a> {
         Ok(channel.is_some_and(|channel| self.network().channels[channel as usize].urgent))
     }
 
-    /// When a conjunction of comparisons holds; `None` if never.
+    /// When a condition holds that does so in one interval; `None` if never.
     #[inline]
     pub(super) fn span(
         &mut self,
@@ -137,7 +142,8 @@ impl<'a> Race<'a> {
         values: &[i32],
     ) -> Result<Option<Span>, Failure> {
         let Condition::Compared(place) = condition else {
-            unreachable!("only comparisons are taken apart");
+            let holds = self.machine.holds(condition, values)?;
+            return Ok(holds.then_some(Span::ALL));
         };
         let comparisons = program.comparisons(place);
         if !self.machine.holds(comparisons.on_words, values)? {
