@@ -22,7 +22,7 @@ use crate::engine::format::explain;
 use crate::engine::query_form;
 use crate::tuning::PARTS;
 
-use answer::{Answer, InterruptedError, check};
+use answer::{Answer, InterruptedError, check, check_jointly};
 use convert::{FailedError, RejectedError, rejected, until_signal};
 use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
@@ -81,6 +81,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("RejectedError", module.py().get_type::<RejectedError>())?;
     module.add("PARTS", PARTS.to_vec())?;
     module.add_function(wrap_pyfunction!(check, module)?)?;
+    module.add_function(wrap_pyfunction!(check_jointly, module)?)?;
     module.add_function(wrap_pyfunction!(simulate, module)?)?;
     module.add_function(wrap_pyfunction!(walk_exactly, module)?)?;
     module.add_function(wrap_pyfunction!(form_of_query, module)?)?;

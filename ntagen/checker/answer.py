@@ -67,9 +67,10 @@ class Estimate:
         confidence: The confidence of the interval; the method says what it means.
         method: What made the interval: ``Clopper-Pearson``, ``confidence sequence``,
             ``Student (asymptotic)``, ``empirical Bernstein``,
-            ``empirical Bernstein confidence sequence`` or ``Dvoretzky-Kiefer-Wolfowitz``.
-        runs: The number of runs.
-        satisfied_runs: How many of them are satisfied; ``None`` for means.
+            ``empirical Bernstein confidence sequence``, ``Dvoretzky-Kiefer-Wolfowitz`` or
+            ``importance splitting, Student (asymptotic)``.
+        runs: The number of runs; with importance splitting, of parts of runs.
+        satisfied_runs: How many of them are satisfied; ``None`` for means and with splitting.
     """
 
     value: float

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from ntagen import _checker
 from ntagen.checker.answer import Answer
@@ -243,6 +243,32 @@ class Model:
             answer = Answer(interrupted.args[0], query, self._edge_table(), rules)
             raise Interrupted(answer) from None
         return Answer(raw, query, self._edge_table(), rules)
+
+    def check_jointly(self, queries: Iterable[str | Query], **keywords: Any) -> list[Answer]:  # noqa: ANN401
+        """Answers statistical queries so that all their intervals hold together.
+
+        Queries with the same bound share their runs: each run is made once, and watched for all of
+        them. Each of k intervals has the risk ``alpha / k`` (Bonferroni's correction), so all hold
+        together but for a risk of `alpha`, whatever the queries have to do with each other.
+
+        Args:
+            queries: Queries ``Pr[…](…)``, also compared with a number, and ``E[…](…)``.
+            keywords: The fields of `Options`.
+
+        Returns:
+            The answers, in the order of the queries.
+
+        Raises:
+            RejectedError: A query is wrong, or of another kind.
+        """
+        return self.answer_jointly([str(query) for query in queries], Options(**keywords))
+
+    def answer_jointly(self, texts: Sequence[str], options: Options) -> list[Answer]:
+        """Answers queries as `check_jointly` does, with all options as one value."""
+        with rejecting():
+            answers = _checker.check_jointly(self._raw, texts, options)
+        edges, rules = self._edge_table(), (options.forced, options.priorities)
+        return [Answer(raw, text, edges, rules) for raw, text in zip(answers, texts, strict=True)]
 
     @by_keywords(Options)
     def synthesize(self, query: str, options: Options) -> Strategy:

@@ -36,6 +36,12 @@ RunProgress = Callable[[int, float | None, float | None, float | None], object]
 MAX_PLANS = 1_000_000
 """The default maximum of plans that are listed."""
 
+MAX_EFFORT = 1_000_000
+"""The greatest effort of importance splitting: each part may keep a state."""
+
+MAX_REPETITIONS = 1_000_000
+"""The greatest number of repetitions of importance splitting."""
+
 REDUCTIONS = ("symmetry", "partial-order", "live-variables")
 """The reductions that a search may make."""
 
@@ -101,6 +107,18 @@ class Options:
     others need bounds of the value: ``bernstein`` is narrow where values vary little, ``dkw``
     (Dvoretzky, Kiefer and Wolfowitz) where there are few runs. ``auto`` is ``bernstein`` where
     bounds are known, and ``student`` where they are not."""
+
+    levels: str | None = None
+    """For ``Pr`` of a rare event, an expression that says how near a state is to it: the estimate
+    is made by importance splitting. The greater the value, the more likely the event should be;
+    what it says besides decides only how wide the interval is."""
+
+    effort: int = 1000
+    """How many parts of runs each stage between two levels has."""
+
+    repetitions: int = 40
+    """How many times the splitting is repeated; the interval comes from what differs. It is right
+    in the limit of many."""
 
     delta: float | tuple[float, float] = 0.01
     """So near to ``p`` the test of ``Pr[…](…) >= p`` promises nothing: a number for both sides, or
@@ -207,6 +225,12 @@ class Options:
     def __post_init__(self) -> None:
         if self.threads != "all" and self.threads < 0:
             raise ValueError(f"{self.threads} threads: there must be at least 1, or 'all'")
+        if self.max_plans < 1:
+            raise ValueError(f"max_plans is {self.max_plans}, but must be at least 1")
+        self._require_statistics()
+
+    def _require_statistics(self) -> None:
+        """Raises an error if an option of statistical queries has no meaning."""
         if self.runs is not None and self.runs < 1:
             raise ValueError(f"{self.runs} runs: there must be at least 1")
         for name in ("alpha", "beta", "epsilon", "relative"):
@@ -219,14 +243,18 @@ class Options:
         low, high = self.odds_ratios
         if not 0 < low < 1 < high < math.inf:
             raise ValueError(f"odds_ratios are {low} and {high}, but 1 must lie between them")
+        if not 0 < self.effort <= MAX_EFFORT:
+            raise ValueError(f"effort is {self.effort}, but must be 1 to {MAX_EFFORT}")
+        if not 2 <= self.repetitions <= MAX_REPETITIONS:
+            raise ValueError(
+                f"repetitions is {self.repetitions}, but must be 2 to {MAX_REPETITIONS}"
+            )
         if self.value_bounds is not None:
             least, greatest = self.value_bounds
             if not -math.inf < least < greatest < math.inf:
                 raise ValueError(f"value_bounds are {least} and {greatest}: the first must be less")
         if self.discretisation is not None and not 0 < self.discretisation < math.inf:
             raise ValueError(f"discretisation is {self.discretisation}, but must be positive")
-        if self.max_plans < 1:
-            raise ValueError(f"max_plans is {self.max_plans}, but must be at least 1")
 
 
 Keywords = ParamSpec("Keywords")

@@ -18,6 +18,7 @@ from ntagen.cli.answer_rows import Human
 from ntagen.cli.asked import is_used_by, queries_of
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
+from ntagen.cli.joint import joint_answers
 from ntagen.cli.models import (
     constant_option,
     include_option,
@@ -36,7 +37,7 @@ from ntagen.errors import InputError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
-    from ntagen.checker import QueryForm
+    from ntagen.checker import Answer, QueryForm
 
 _EXPECTED: Final = {"yes": "satisfied", "no": "not satisfied"}
 """What ``--expect`` says about all queries; ``file`` stands for what the file says of each."""
@@ -155,6 +156,12 @@ class _CheckCommand(click.Command):
     "written while the plans are certified, and millions of them take no memory.",
 )
 @rank_option("plans of an environment")
+@click.option(
+    "--joint",
+    is_flag=True,
+    help="Answer all Pr and E queries so that all their intervals hold together, with the risk of "
+    "--alpha for all of them. Queries with the same bound share their runs.",
+)
 @engine_options
 @overflow_rule()
 @constant_option()
@@ -174,6 +181,7 @@ def command(
     controller: Path | None,
     plans: str | None,
     ranking: str | None,
+    joint: bool,
     given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
     constants: dict[str, str],
@@ -199,6 +207,8 @@ def command(
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --relative 0.1
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --levels "Queue.length"
 
     \b
     A trace is a run with exact times, which an independent replay has checked. Each step says when
@@ -254,6 +264,7 @@ def command(
         [query.form for query in todo if query.form], is_environment=loaded.task is not None
     )
     shown.loaded(model_path, loaded.model)
+    together = joint_answers(loaded.model, todo, options, quiet=not is_human) if joint else {}
     for number, query in enumerate(todo):
         is_used = is_used_by(query, todo[number + 1 :])
         outputs = replace(outputs, limits=list_limits(options, quiet=not is_human))
@@ -266,8 +277,11 @@ def command(
         expected = _EXPECTED.get(expect, query.expected) if expect else None
         outcome = Outcome(query, None, is_compared=expect is not None, expected=expected)
         try:
-            with progress_of(query.text, query.form, quiet=not is_human) as reports:
-                answer, found = answered(loaded, query, replace(wanted, **reports), overflow)
+            if number in together:
+                answer, found = _unless_wrong(together[number]), None
+            else:
+                with progress_of(query.text, query.form, quiet=not is_human) as reports:
+                    answer, found = answered(loaded, query, replace(wanted, **reports), overflow)
         except Interrupted as interrupted:
             # The runs until then say something, and that is what the user gets.
             outcomes.append(replace(outcome, answer=interrupted.answer))
@@ -301,6 +315,17 @@ _NOTHING_EXPECTED: Final = (
     "no query says what is expected\n"
     "hint: write // false above a query of a .q file, or give --expect yes or --expect no"
 )
+
+
+def _unless_wrong(answer: Answer | InputError) -> Answer:
+    """An answer that was found together with others.
+
+    Raises:
+        InputError: One of the queries is wrong.
+    """
+    if isinstance(answer, InputError):
+        raise answer
+    return answer
 
 
 def _format(name: str, *, trace_is_written: bool) -> Format:

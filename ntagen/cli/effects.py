@@ -78,6 +78,8 @@ def idle_options(
         )
     if not any(query.is_statistical for query in queries):
         notes += _without_statistics(given, values)
+    else:
+        notes += _without_levels(given, values)
     if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
         notes.append("--allow-write has no effect here: no query saves a strategy")
     if "max_plans" in given and not values["plans"]:
@@ -89,11 +91,20 @@ def idle_options(
     return notes
 
 
+def _without_levels(given: Collection[str], values: Mapping[str, object]) -> list[str]:
+    """A note for each option of importance splitting, if there is none."""
+    return [
+        f"--{name} has no effect without --levels"
+        for name in ("effort", "repetitions")
+        if name in given and values["levels"] is None
+    ]
+
+
 def _without_statistics(given: Collection[str], values: Mapping[str, object]) -> list[str]:
     """A note for each option of statistical queries, if no query is one."""
     notes = [
         f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
-        for name in STATISTICAL
+        for name in (*STATISTICAL, "joint")
         if name in given
     ]
     if "seed" in given and values["search"] != "random":

@@ -124,6 +124,27 @@ STATISTICAL: Final[dict[str, Decorator]] = {
         "Wolfowitz, for values between known bounds.  [default: bernstein if bounds are known, "
         "else student]",
     ),
+    "levels": click.option(
+        "--levels",
+        metavar="EXPR",
+        help="For Pr of a rare event: an expression that says how near a state is to it, such as "
+        "the length of a queue that must not overflow. The estimate is made by importance "
+        "splitting: runs are started again where others came nearer.",
+    ),
+    "effort": click.option(
+        "--effort",
+        metavar="N",
+        type=click.IntRange(min=1, max=1_000_000),
+        default=1000,
+        help="With --levels: make N parts of runs between two levels.  [default: 1000]",
+    ),
+    "repetitions": click.option(
+        "--repetitions",
+        metavar="N",
+        type=click.IntRange(min=2, max=1_000_000),
+        default=40,
+        help="With --levels: make the interval of N independent repetitions.  [default: 40]",
+    ),
     "delta": click.option(
         "--delta",
         metavar="WIDTH[,WIDTH]",

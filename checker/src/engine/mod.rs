@@ -23,6 +23,6 @@ pub use crate::search::reachability::report::MOST_THREADS;
 pub use answer::{Answer, Evidence, Verdict, Verification};
 pub use limits::Limits;
 pub use loaded_model::{LoadedModel, NamedStrategy};
-pub use options::{CodeEngine, Options, Reductions, Rules, StrategyWanted, TraceWanted};
+pub use options::{CodeEngine, Options, RareEvent, Reductions, Rules, StrategyWanted, TraceWanted};
 pub use query_form::QueryForm;
 pub use rejection::Rejection;

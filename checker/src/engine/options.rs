@@ -122,6 +122,17 @@ impl std::fmt::Debug for RunObserver {
     }
 }
 
+/// How the rare event of a query for a probability is looked for: by importance splitting.
+#[derive(Clone, Debug)]
+pub struct RareEvent {
+    /// An expression of the state that says how near it is to the event.
+    pub levels: String,
+    /// How many parts of runs each stage has.
+    pub effort: u64,
+    /// How many independent repetitions the interval is made of.
+    pub repetitions: u64,
+}
+
 /// How a query is answered.
 #[derive(Clone, Debug, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is an independent wish")]
@@ -144,6 +155,8 @@ pub struct Options {
     pub code: CodeEngine,
     /// When to give up.
     pub limits: Limits,
+    /// How rare events are looked for; `None` is by plain runs.
+    pub rare: Option<RareEvent>,
     /// At most how many plans are wanted; a single one is found without looking for the others.
     pub plans: Option<usize>,
     /// Whether a strategy is wanted.

@@ -69,6 +69,42 @@ fn doubles(py: Python<'_>, numbers: impl Iterator<Item = f64>) -> Bound<'_, PyBy
     PyBytes::new(py, &bytes)
 }
 
+/// Answers statistical queries from the same runs; their intervals hold together.
+#[pyfunction]
+pub(super) fn check_jointly(
+    model: &Bound<'_, Model>,
+    queries: Vec<String>,
+    options: &Bound<'_, PyAny>,
+) -> PyResult<Vec<Answer>> {
+    let options = options::read(options)?;
+    let inner = model.get();
+    let answers = model.py().detach(|| {
+        inner.with(|model| {
+            let texts: Vec<_> = queries.iter().map(|query| model.add_query(query)).collect();
+            let overflow = model.network().overflow;
+            let options = Options {
+                overflow,
+                ..options
+            };
+            model.check_jointly(&texts, &options)
+        })
+    });
+    let answers = answers.map_err(rejected)?;
+    let is_interrupted = |one: &engine::Answer| {
+        one.estimate.is_none() && one.verdict == Verdict::Unknown(StopReason::Interrupted)
+    };
+    if answers.iter().any(is_interrupted) {
+        return Err(PyKeyboardInterrupt::new_err(()));
+    }
+    let answers = answers.into_iter().zip(queries);
+    let answers = answers.map(|(inner, query)| Answer {
+        model: model.clone().unbind(),
+        query,
+        inner,
+    });
+    Ok(answers.collect())
+}
+
 /// The answer to a query.
 #[pyclass(frozen, module = "ntagen._checker")]
 pub(super) struct Answer {

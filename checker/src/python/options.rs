@@ -10,7 +10,7 @@ use super::convert::{
     code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
 };
 use crate::engine::options::RunObserver;
-use crate::engine::{Limits, Options, Reductions, StrategyWanted, TraceWanted};
+use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
 use crate::stochastic::{MeanMethod, Precision};
 use crate::tuning::Tuning;
@@ -44,6 +44,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         allow_write: field(given, "allow_write")?,
         precision: precision(given)?,
         run_observer: run_observer(field(given, "run_progress")?),
+        rare: rare_event(given)?,
         ..Options::default()
     })
 }
@@ -85,6 +86,18 @@ fn precision(given: &Bound<'_, PyAny>) -> PyResult<Precision> {
         seed: field(given, "seed")?,
         ..Precision::default()
     })
+}
+
+/// How rare events are looked for, if a level is given.
+fn rare_event(given: &Bound<'_, PyAny>) -> PyResult<Option<RareEvent>> {
+    let Some(levels) = field(given, "levels")? else {
+        return Ok(None);
+    };
+    Ok(Some(RareEvent {
+        levels,
+        effort: field(given, "effort")?,
+        repetitions: field(given, "repetitions")?,
+    }))
 }
 
 fn mean_method(name: &str) -> PyResult<MeanMethod> {

@@ -3,12 +3,15 @@
 //! Results come in the order of run numbers, so what is said does not depend on threads.
 
 use super::failure::Failure;
+use super::in_order::in_order;
 use super::precision::{Estimate, MeanMethod, Precision};
+use super::run_watch::{Ends, RunWatch};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,
     ProbabilitySequence, SequentialTest, clopper_pearson,
 };
-use crate::ir::Statistical;
+use crate::exec::Executor;
+use crate::ir::{Network, Statistical};
 
 /// The results of runs, for one query.
 #[derive(Clone, Debug)]
@@ -232,5 +235,71 @@ impl Collector {
             decision,
             is_complete,
         }
+    }
+}
+
+/// Answers a statistical query; `ends` is asked now and then, with the number of runs so far.
+///
+/// # Errors
+/// A run failed: the one with the least number.
+pub fn estimate(
+    network: &Network,
+    executor: &dyn Executor,
+    query: &Statistical,
+    precision: &Precision,
+    ends: impl FnMut(u64) -> bool,
+) -> Result<Estimate, Failure> {
+    estimate_watched(network, executor, query, precision, &mut Ends(ends))
+}
+
+/// Answers a statistical query whose runs are watched.
+///
+/// # Errors
+/// A run failed: the one with the least number.
+pub fn estimate_watched(
+    network: &Network,
+    executor: &dyn Executor,
+    query: &Statistical,
+    precision: &Precision,
+    ends: &mut dyn RunWatch,
+) -> Result<Estimate, Failure> {
+    let program = (network, executor);
+    let mut collector = Collector::new(query, precision);
+    let mut failure = None;
+    let mut push = |value: f64| match collector.push(value) {
+        Ok(is_last) => is_last,
+        Err(found) => {
+            failure = Some(found);
+            true
+        }
+    };
+    let seed = precision.seed;
+    let is_complete = match query {
+        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
+            in_order(
+                program,
+                precision.threads,
+                |runner, run| runner.path((seed, run), bound, path),
+                |outcome| push(f64::from(outcome.satisfied)),
+                ends,
+            )?
+        }
+        Statistical::Expectation {
+            bound,
+            maximum,
+            value,
+            ..
+        } => in_order(
+            program,
+            precision.threads,
+            |runner, run| runner.extreme((seed, run), bound, *value, *maximum),
+            |(value, _)| push(value),
+            ends,
+        )?,
+        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
+    };
+    match failure {
+        Some(failure) => Err(failure),
+        None => Ok(collector.estimate(is_complete)),
     }
 }

@@ -1,80 +1,13 @@
 //! Answers to statistical queries: which results of runs are looked at, and until when.
 
-use super::collector::Collector;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
 use super::run::Trajectory;
-use super::run_watch::{Ends, RunWatch};
+use super::run_watch::Ends;
 use super::statistics::{Method, clopper_pearson};
 use crate::exec::Executor;
-use crate::ir::{Network, Simulation, Statistical};
-
-/// Answers a statistical query; `ends` is asked now and then, with the number of runs so far.
-///
-/// # Errors
-/// A run failed: the one with the least number.
-pub fn estimate(
-    network: &Network,
-    executor: &dyn Executor,
-    query: &Statistical,
-    precision: &Precision,
-    ends: impl FnMut(u64) -> bool,
-) -> Result<Estimate, Failure> {
-    estimate_watched(network, executor, query, precision, &mut Ends(ends))
-}
-
-/// Answers a statistical query whose runs are watched.
-///
-/// # Errors
-/// A run failed: the one with the least number.
-pub fn estimate_watched(
-    network: &Network,
-    executor: &dyn Executor,
-    query: &Statistical,
-    precision: &Precision,
-    ends: &mut dyn RunWatch,
-) -> Result<Estimate, Failure> {
-    let program = (network, executor);
-    let mut collector = Collector::new(query, precision);
-    let mut failure = None;
-    let mut push = |value: f64| match collector.push(value) {
-        Ok(is_last) => is_last,
-        Err(found) => {
-            failure = Some(found);
-            true
-        }
-    };
-    let seed = precision.seed;
-    let is_complete = match query {
-        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
-            in_order(
-                program,
-                precision.threads,
-                |runner, run| runner.path((seed, run), bound, path),
-                |outcome| push(f64::from(outcome.satisfied)),
-                ends,
-            )?
-        }
-        Statistical::Expectation {
-            bound,
-            maximum,
-            value,
-            ..
-        } => in_order(
-            program,
-            precision.threads,
-            |runner, run| runner.extreme((seed, run), bound, *value, *maximum),
-            |(value, _)| push(value),
-            ends,
-        )?,
-        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
-    };
-    match failure {
-        Some(failure) => Err(failure),
-        None => Ok(collector.estimate(is_complete)),
-    }
-}
+use crate::ir::{Network, Simulation};
 
 /// The runs that a query shows.
 #[derive(Clone, Debug, PartialEq)]

@@ -67,8 +67,23 @@ impl<'a> Machine<'a> {
     /// The initial state, with the random numbers of a run.
     pub(super) fn start(&mut self, seed: u64, run: u64) {
         self.words.copy_from_slice(&self.network.initial);
+        self.start_stream(seed, run);
+    }
+
+    /// Begins with the random numbers of a run.
+    pub(super) fn start_stream(&mut self, seed: u64, run: u64) {
         let start = self.network.chances.stream as usize;
         Stream::start(&mut self.words[start..start + STREAM_WORDS], seed, run);
+    }
+
+    /// The words of the state.
+    pub(super) fn words(&self) -> &[i32] {
+        &self.words
+    }
+
+    /// Goes back to a state.
+    pub(super) fn restore(&mut self, words: &[i32]) {
+        self.words.copy_from_slice(words);
     }
 
     /// The random numbers of the run.

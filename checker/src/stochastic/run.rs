@@ -93,8 +93,8 @@ impl Trajectory {
 
 /// Makes runs of a network, one after the other.
 pub struct Runner<'a> {
-    program: Arc<Program<'a>>,
-    race: Race<'a>,
+    pub(super) program: Arc<Program<'a>>,
+    pub(super) race: Race<'a>,
 }
 
 impl<'a> Runner<'a> {
@@ -210,14 +210,23 @@ impl<'a> Runner<'a> {
 
     /// Makes a run; `watch` sees every state with the delay that follows, and ends the run if it
     /// returns true.
-    fn until_bound(
+    pub(super) fn until_bound(
         &mut self,
         numbers: (u64, u64),
         bound: &RunBound,
         watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
+        self.race.start(&self.program, numbers)?;
+        self.go_on(bound, watch)
+    }
+
+    /// Goes on with a run until its bound, as [`Runner::until_bound`] does.
+    pub(super) fn go_on(
+        &mut self,
+        bound: &RunBound,
+        watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
+    ) -> Result<(), Failure> {
         let Runner { program, race } = self;
-        race.start(program, numbers)?;
         loop {
             if bound.limit == RunLimit::Moves {
                 race.forget_moves();
@@ -298,7 +307,11 @@ fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
 }
 
 /// Whether a path is decided by the state or within the delay behind it, and after which time.
-fn watched(race: &mut Race<'_>, path: &Path, delay: f64) -> Result<Option<(bool, f64)>, Failure> {
+pub(super) fn watched(
+    race: &mut Race<'_>,
+    path: &Path,
+    delay: f64,
+) -> Result<Option<(bool, f64)>, Failure> {
     let mut ahead = 0.0;
     for _ in 0..MOST_CHANGES {
         let (keep, reach) = match path {

@@ -43,6 +43,9 @@ impl Shows for (f64, u64) {
 
 impl Shows for Trajectory {}
 
+/// Results for several queries, or none.
+impl Shows for Vec<Option<f64>> {}
+
 /// Watches runs.
 pub trait RunWatch {
     /// Sees what a run shows; runs come in the order of their numbers.

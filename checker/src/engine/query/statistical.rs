@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::splitting::splitting_remark;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::engine::answer::{Answer, Verdict};
 use crate::engine::code::PreparedCode;
@@ -17,11 +18,20 @@ use crate::network;
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Failure, MeanMethod, Precision, RunWatch as _, Stand, ZENO_MOVES, ZENO_TIME, estimate_watched,
-    simulate,
+    Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand, ValuesOfRuns,
+    ZENO_MOVES, ZENO_TIME, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
+
+/// What runs show.
+#[derive(Default)]
+struct Found {
+    estimate: Option<Estimate>,
+    simulated: Option<Arc<Simulated>>,
+    values: Option<Arc<ValuesOfRuns>>,
+    rare: Option<Rare>,
+}
 
 impl LoadedModel {
     /// The query at this span, if it is a statistical one.
@@ -41,6 +51,7 @@ impl LoadedModel {
         let mut stochastic = self.stochastic.take().expect("it was just made");
         stochastic.model.network.overflow = options.overflow;
         let (compiled, found) = stochastic.model.compile_statistical(query, &self.sources);
+        let splitting = self.splitting(&mut stochastic.model, compiled.as_ref(), options);
         let prepared = if compiled.is_some() {
             let network = &stochastic.model.network;
             PreparedCode::prepare(&mut stochastic.code, network, options.code, options.tuning)
@@ -54,6 +65,10 @@ impl LoadedModel {
         };
         let Some(compiled) = compiled else {
             return rejected(self, stochastic, warnings);
+        };
+        let splitting = match splitting {
+            Ok(splitting) => splitting,
+            Err(rejection) => return rejected(self, stochastic, rejection),
         };
         if let Err(message) = prepared {
             let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, query.span, message)
@@ -83,12 +98,31 @@ impl LoadedModel {
                 Statistical::Simulation(asked) => {
                     let ends = |number| runs.ends(number);
                     let simulated = simulate(network, executor, asked, &precision, ends)?;
-                    Ok((simulated.estimate.clone(), Some(Arc::new(simulated)), None))
+                    Ok(Found {
+                        estimate: simulated.estimate.clone(),
+                        simulated: Some(Arc::new(simulated)),
+                        ..Found::default()
+                    })
+                }
+                Statistical::Probability(bound, path) if splitting.is_some() => {
+                    let wanted = splitting.as_ref().expect("it was just seen");
+                    let ends = |number| runs.ends(number);
+                    let asked = (bound, path);
+                    let rare = estimate_rare(network, executor, asked, wanted, &precision, ends)?;
+                    Ok(Found {
+                        estimate: Some(rare.estimate.clone()),
+                        rare: Some(rare),
+                        ..Found::default()
+                    })
                 }
                 kind => {
                     let estimate =
                         estimate_watched(network, executor, kind, &precision, &mut runs)?;
-                    Ok((Some(estimate), None, runs.values(kind)))
+                    Ok(Found {
+                        estimate: Some(estimate),
+                        values: runs.values(kind),
+                        ..Found::default()
+                    })
                 }
             }
         });
@@ -109,27 +143,25 @@ impl LoadedModel {
                 }
             }
             Ok(Err(failure)) => Err(self.run_fails(network, &failure, query.span)),
-            Ok(Ok((estimate, simulated, values))) => {
-                let decision = estimate.as_ref().and_then(|estimate| estimate.decision);
-                let verdict = match decision {
-                    Some(Decision::Below) => Verdict::NotSatisfied,
-                    None if watch.has_stopped() => Verdict::Unknown(watch.stop()),
-                    None if is_test(&compiled.kind) => Verdict::Maybe,
-                    Some(Decision::AtLeast) | None => Verdict::Satisfied,
-                };
+            Ok(Ok(found)) => {
+                let verdict = verdict(&compiled.kind, found.estimate.as_ref(), &watch);
                 let mut answer = Answer::new(verdict, Counters::default());
-                let method = estimate.as_ref().map(|estimate| estimate.method);
+                if let Some(rare) = &found.rare {
+                    answer.remark(splitting_remark(rare));
+                }
+                let method = found.estimate.as_ref().map(|estimate| estimate.method);
                 if let Some(remark) = remark(&compiled.kind, verdict, method) {
                     answer.remark(remark);
                 }
+                let simulated = found.simulated;
                 if simulated.as_ref().is_some_and(|simulated| simulated.is_cut) {
                     answer.remark(
                         "there is room for these runs only: ask for fewer, or for shorter ones",
                     );
                 }
-                answer.estimate = estimate;
+                answer.estimate = found.estimate;
                 answer.simulated = simulated;
-                answer.values_of_runs = values;
+                answer.values_of_runs = found.values;
                 Ok(answer)
             }
         };
@@ -141,7 +173,11 @@ impl LoadedModel {
         Ok(answer)
     }
 
-    fn run_time_error(&self, network: &Network, error: crate::exec::RunTimeError) -> Rejection {
+    pub(super) fn run_time_error(
+        &self,
+        network: &Network,
+        error: crate::exec::RunTimeError,
+    ) -> Rejection {
         let span = network.sites[error.site.0 as usize].span;
         let what = crate::engine::format::text::run_time_error(error.kind);
         let message = format!("a random run ends in an error: {what}");
@@ -153,7 +189,7 @@ impl LoadedModel {
     }
 
     /// Why a random run has no result, with the place in the model.
-    fn run_fails(&self, network: &Network, failure: &Failure, query: Span) -> Rejection {
+    pub(super) fn run_fails(&self, network: &Network, failure: &Failure, query: Span) -> Rejection {
         let span = |stand: Stand| {
             let process = &network.processes[stand.process.0 as usize];
             process.locations[stand.location.0 as usize].span
@@ -267,7 +303,7 @@ impl LoadedModel {
 }
 
 /// Why an interval cannot be made as it is asked for, and what to do.
-fn contradiction(
+pub(super) fn contradiction(
     query: &Statistical,
     precision: &Precision,
 ) -> Option<(&'static str, &'static str)> {
@@ -302,8 +338,26 @@ fn is_test(query: &Statistical) -> bool {
     matches!(query, Statistical::Hypothesis { .. })
 }
 
+/// The verdict that goes with an estimate.
+pub(super) fn verdict(
+    query: &Statistical,
+    estimate: Option<&Estimate>,
+    watch: &LimitWatch,
+) -> Verdict {
+    match estimate.and_then(|estimate| estimate.decision) {
+        Some(Decision::Below) => Verdict::NotSatisfied,
+        None if watch.has_stopped() => Verdict::Unknown(watch.stop()),
+        None if is_test(query) => Verdict::Maybe,
+        Some(Decision::AtLeast) | None => Verdict::Satisfied,
+    }
+}
+
 /// What the numbers do not say themselves.
-fn remark(query: &Statistical, verdict: Verdict, method: Option<Method>) -> Option<&'static str> {
+pub(super) fn remark(
+    query: &Statistical,
+    verdict: Verdict,
+    method: Option<Method>,
+) -> Option<&'static str> {
     match (query, verdict) {
         (_, Verdict::Unknown(_)) => Some("the estimate is that of the runs until then"),
         (Statistical::Hypothesis { .. }, Verdict::Maybe) => {

@@ -18,6 +18,8 @@ pub enum Method {
     EmpiricalBernsteinSequence,
     /// [`super::Distribution`]: for a fixed number of runs.
     DvoretzkyKieferWolfowitz,
+    /// Of independent repetitions of importance splitting: right in the limit of many.
+    ImportanceSplitting,
 }
 
 impl Method {
@@ -30,6 +32,7 @@ impl Method {
             Method::EmpiricalBernstein => "empirical Bernstein",
             Method::EmpiricalBernsteinSequence => "empirical Bernstein confidence sequence",
             Method::DvoretzkyKieferWolfowitz => "Dvoretzky-Kiefer-Wolfowitz",
+            Method::ImportanceSplitting => "importance splitting, Student (asymptotic)",
         }
     }
 }

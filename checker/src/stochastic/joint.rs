@@ -1,0 +1,174 @@
+//! Several queries that are answered from the same runs: each run is made once, and watched for
+//! all of them.
+//!
+//! Watching changes nothing, so each query sees the results that it would see alone. A query that
+//! has seen enough is not watched for any more.
+//!
+//! With a risk of alpha / k for each of k queries, all intervals hold together but for a risk of
+//! alpha, whatever the queries have to do with each other (C. E. Bonferroni, "Teoria statistica
+//! delle classi e calcolo delle probabilità", 1936).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::collector::Collector;
+use super::extreme::Extreme;
+use super::failure::Failure;
+use super::in_order::in_order;
+use super::precision::{Estimate, Precision};
+use super::run::{Runner, watched};
+use super::run_watch::Ends;
+use crate::exec::Executor;
+use crate::ir::{Network, Path, RunBound, Statistical};
+
+/// Answers queries for estimates or tests from the same runs; all have the same bound. The risks
+/// of `precision` are those of each query alone. `ends` is asked now and then, with the number of
+/// runs so far.
+///
+/// # Errors
+/// A run failed: the one with the least number.
+pub fn estimate_jointly(
+    network: &Network,
+    executor: &dyn Executor,
+    queries: &[&Statistical],
+    precision: &Precision,
+    ends: impl FnMut(u64) -> bool,
+) -> Result<Vec<Estimate>, Failure> {
+    let Some(bound) = queries.first().map(|query| bound_of(query)) else {
+        return Ok(Vec::new());
+    };
+    let mut collectors: Vec<Collector> = queries
+        .iter()
+        .map(|query| Collector::new(query, precision))
+        .collect();
+    let open: Vec<AtomicBool> = queries.iter().map(|_| AtomicBool::new(true)).collect();
+    let mut failure = None;
+    in_order(
+        (network, executor),
+        precision.threads,
+        |runner, run| runner.all((precision.seed, run), bound, queries, &open),
+        |results| {
+            let mut is_over = true;
+            for ((collector, result), open) in collectors.iter_mut().zip(results).zip(&open) {
+                // A run that began before the query was closed has a result that does not count.
+                if !open.load(Ordering::Relaxed) {
+                    continue;
+                }
+                let result = result.expect("open queries are watched for");
+                match collector.push(result) {
+                    Ok(is_last) => open.store(!is_last, Ordering::Relaxed),
+                    Err(found) => {
+                        failure = Some(found);
+                        return true;
+                    }
+                }
+                is_over &= !open.load(Ordering::Relaxed);
+            }
+            is_over
+        },
+        &mut Ends(ends),
+    )?;
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
+    let estimates = collectors.iter().zip(&open).map(|(collector, open)| {
+        let is_complete = !open.load(Ordering::Relaxed);
+        collector.estimate(is_complete)
+    });
+    Ok(estimates.collect())
+}
+
+/// How long the runs of a query are.
+pub fn bound_of(query: &Statistical) -> &RunBound {
+    match query {
+        Statistical::Probability(bound, _)
+        | Statistical::Hypothesis { bound, .. }
+        | Statistical::Expectation { bound, .. } => bound,
+        Statistical::Simulation(asked) => &asked.bound,
+    }
+}
+
+/// What is known of a run for one query.
+enum Seen {
+    /// Nothing is looked for.
+    Closed,
+    /// Not decided yet.
+    Open,
+    /// Whether it is satisfied.
+    Decided(bool),
+    /// The least or greatest value so far, and whether it may change as time passes.
+    Extreme(Extreme, bool),
+}
+
+impl Runner<'_> {
+    /// The results of run number `run` of a seed, for each query that is open when it begins.
+    fn all(
+        &mut self,
+        (seed, run): (u64, u64),
+        bound: &RunBound,
+        queries: &[&Statistical],
+        open: &[AtomicBool],
+    ) -> Result<Vec<Option<f64>>, Failure> {
+        let mut seen: Vec<Seen> = queries
+            .iter()
+            .zip(open)
+            .map(|(query, open)| match query {
+                _ if !open.load(Ordering::Relaxed) => Seen::Closed,
+                &&Statistical::Expectation { value, maximum, .. } => {
+                    Seen::Extreme(Extreme::new(value, maximum), self.program.is_timed(value))
+                }
+                _ => Seen::Open,
+            })
+            .collect();
+        self.until_bound((seed, run), bound, &mut |race, delay| {
+            let mut is_over = true;
+            for (query, seen) in queries.iter().zip(&mut seen) {
+                match (&mut *seen, query) {
+                    (
+                        Seen::Open,
+                        Statistical::Probability(_, path) | Statistical::Hypothesis { path, .. },
+                    ) => {
+                        if let Some((satisfied, _)) = watched(race, path, delay)? {
+                            *seen = Seen::Decided(satisfied);
+                        } else {
+                            is_over = false;
+                        }
+                    }
+                    (Seen::Extreme(extreme, is_timed), _) => {
+                        extreme.look(&mut race.machine)?;
+                        if *is_timed && delay > 0.0 && delay.is_finite() {
+                            extreme.look_through(race, delay)?;
+                        }
+                        is_over = false;
+                    }
+                    _ => {}
+                }
+            }
+            Ok(is_over)
+        })?;
+        let mut results = Vec::with_capacity(seen.len());
+        for (query, seen) in queries.iter().zip(&mut seen) {
+            if let Seen::Extreme(extreme, _) = seen {
+                extreme.look(&mut self.race.machine)?;
+            }
+            results.push(match seen {
+                Seen::Closed => None,
+                Seen::Open => Some(f64::from(holds_at_the_end(query))),
+                Seen::Decided(satisfied) => Some(f64::from(*satisfied)),
+                Seen::Extreme(extreme, _) => Some(extreme.value()),
+            });
+        }
+        Ok(results)
+    }
+}
+
+/// Whether a run that was not decided until its bound satisfies a query.
+fn holds_at_the_end(query: &Statistical) -> bool {
+    matches!(
+        query,
+        Statistical::Probability(_, Path::Always(_))
+            | Statistical::Hypothesis {
+                path: Path::Always(_),
+                ..
+            }
+    )
+}

@@ -1,0 +1,44 @@
+"""`ntagen check --joint`: statistical queries that are answered from the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ntagen.cli.asked import Asked
+from ntagen.cli.progress import shown_progress
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, Model, Options
+
+
+def joint_answers(
+    model: Model, queries: Sequence[Asked], options: Options, *, quiet: bool
+) -> dict[int, Answer | InputError]:
+    """The answers to the statistical queries among these, by their places in the list.
+
+    If one of them is wrong, none has an answer: each has the mistake instead.
+
+    Args:
+        model: The model.
+        queries: All queries.
+        options: How they are to be answered.
+        quiet: Whether no progress is shown.
+    """
+    places = [place for place, query in enumerate(queries) if _is_joint(query)]
+    if not places:
+        return {}
+    texts = [queries[place].text for place in places]
+    with shown_progress(f"{len(texts)} queries together", quiet=quiet) as report:
+        try:
+            answers = model.answer_jointly(texts, replace(options, progress=report))
+        except InputError as error:
+            return dict.fromkeys(places, error)
+    return dict(zip(places, answers, strict=True))
+
+
+def _is_joint(query: Asked) -> bool:
+    form = query.form
+    return form is not None and form.is_statistical and form.kind != "simulate"
