@@ -18,17 +18,36 @@ mod certainties;
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
 mod flows;
+mod intervals;
 mod known;
 mod networks;
 #[path = "../common/random.rs"]
 #[allow(dead_code, reason = "this program draws in some of the ways only")]
 mod random;
 mod random_networks;
+mod rare_events;
 mod refusals;
 mod values;
 
 /// A model in the stochastic reading, with a compiled query.
 fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), String> {
+    let (network, mut queries) = load_all(model, &[query])?;
+    Ok((network, queries.remove(0)))
+}
+
+/// A model in the stochastic reading, with what all these queries ask, compiled into it.
+fn together(model: &str, queries: &[&str]) -> (Network, Vec<Statistical>) {
+    match load_all(model, queries) {
+        Ok((network, queries)) => {
+            let kinds = queries.into_iter().map(|query| query.kind);
+            (network, kinds.collect())
+        }
+        Err(message) => panic!("{message}"),
+    }
+}
+
+/// A model in the stochastic reading, with compiled queries.
+fn load_all(model: &str, queries: &[&str]) -> Result<(Network, Vec<StatisticalQuery>), String> {
     let mut sources = SourceMap::default();
     let prelude = syntax::prelude(&mut sources);
     let parsed = syntax::read_model("model.xta", model.as_bytes(), &mut sources);
@@ -50,13 +69,17 @@ fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), String>
     found.extend(more);
     text(&found, &sources)?;
     let mut model = model.ok_or("no model")?;
-    let span = syntax::add_query_text(query, &mut sources);
-    let (parsed, found) = syntax::parse_query(span, &sources);
-    text(&found, &sources)?;
-    let parsed = parsed.ok_or("no query")?;
-    let (query, found) = model.compile_statistical(&parsed, &sources);
-    text(&found, &sources)?;
-    Ok((model.network, query.ok_or("not statistical")?))
+    let mut compiled = Vec::new();
+    for query in queries {
+        let span = syntax::add_query_text(query, &mut sources);
+        let (parsed, found) = syntax::parse_query(span, &sources);
+        text(&found, &sources)?;
+        let parsed = parsed.ok_or("no query")?;
+        let (query, found) = model.compile_statistical(&parsed, &sources);
+        text(&found, &sources)?;
+        compiled.push(query.ok_or("not statistical")?);
+    }
+    Ok((model.network, compiled))
 }
 
 fn executors(network: &Network) -> [Box<dyn Executor>; 2] {

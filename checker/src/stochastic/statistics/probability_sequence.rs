@@ -165,7 +165,7 @@ mod tests {
             for end in [interval.lower, interval.upper] {
                 let won = now.won(now.mixture(), end);
                 assert!(
-                    end == 0.0 || end == 1.0 || (won - 20_f64.ln()).abs() < 1e-6,
+                    [0.0, 1.0].contains(&end) || (won - 20_f64.ln()).abs() < 1e-6,
                     "{won}"
                 );
             }
