@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,9 @@ class Asked:
 
     remark: tuple[str, ...] = ()
     """The lines of its comment, without its name and without what is expected."""
+
+    options: Mapping[str, str] = field(default_factory=dict)
+    """The options that the file gives for the query."""
 
     expected: Expected | None = None
     """What the file says about the answer."""
@@ -71,7 +75,8 @@ def _asked(query: Query, folder: Path | None = None) -> Asked:
     if remark and re.fullmatch(r"[A-Za-z_]\w*", remark[0]):
         name, remark = remark[0], remark[1:]
     place = (query.path, query.line, query.column) if query.line else None
-    return Asked(name, query.text, form, folder, remark, expected_of(query), place)
+    expected = expected_of(query)
+    return Asked(name, query.text, form, folder, remark, query.options, expected, place)
 
 
 def _find(text: str, named: dict[str, Asked]) -> Asked:

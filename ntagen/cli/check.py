@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -223,16 +223,13 @@ def command(
     says so.
     """  # noqa: D301  click wants the control character
     from ntagen.checker import Interrupted, Options
+    from ntagen.verifyta.statistical import of_model
 
-    if as_json and form not in (None, "json"):
-        raise click.UsageError(f"--json and --format {form} exclude each other; give one")
-    is_human = not as_json and form in (None, "human")
-    for option, target in (("--strategy", strategy), ("--plans", plans), ("--trace", trace)):
-        if not is_human and target == "-":
-            option_given = "--json" if as_json else f"--format {form}"
-            raise click.UsageError(
-                f"{option_given} and {option} - both write to standard output; give {option} a FILE"
-            )
+    is_human = _is_human(form, as_json=as_json)
+    _require_one_output(
+        {"--strategy": strategy, "--plans": plans, "--trace": trace},
+        "" if is_human else "--json" if as_json else f"--format {form}",
+    )
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
     criteria = _criteria(ranking)
@@ -272,6 +269,7 @@ def command(
             options,
             strategy=is_used or outputs.wants_strategy,
             folder=query.folder,
+            **of_model(query.options, given_options()),
             **for_task(options, loaded.task, query),
         )
         expected = _EXPECTED.get(expect, query.expected) if expect else None
@@ -315,6 +313,22 @@ _NOTHING_EXPECTED: Final = (
     "no query says what is expected\n"
     "hint: write // false above a query of a .q file, or give --expect yes or --expect no"
 )
+
+
+def _is_human(form: str | None, *, as_json: bool) -> bool:
+    """Whether answers are printed for people."""
+    if as_json and form not in (None, "json"):
+        raise click.UsageError(f"--json and --format {form} exclude each other; give one")
+    return not as_json and form in (None, "human")
+
+
+def _require_one_output(targets: Mapping[str, str | None], option_given: str) -> None:
+    """Refuses options that write to standard output beside answers for programs."""
+    for option, target in targets.items():
+        if option_given and target == "-":
+            raise click.UsageError(
+                f"{option_given} and {option} - both write to standard output; give {option} a FILE"
+            )
 
 
 def _unless_wrong(answer: Answer | InputError) -> Answer:

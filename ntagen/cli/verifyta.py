@@ -16,6 +16,7 @@ from ntagen.version import VERSION
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
+    from ntagen.checker.facts import Query
     from ntagen.verifyta.options import CommandLine
 
 FAILED: Final = 1
@@ -106,11 +107,11 @@ def _checked(line: CommandLine, path: Path) -> int:
     if not line.has("-q"):
         echo(header(line))
     code = 0
-    for number, (text, place) in enumerate(zip(texts, places, strict=True), start=1):
+    for number, (query, place) in enumerate(zip(queries, places, strict=True), start=1):
         _progress(line, "\n")
         echo(f"Verifying formula {number} at {place}")
         try:
-            _answer(line, model, text, number, [one for one in (path, query_path) if one])
+            _answer(line, model, query, number, [p for p in (path, query_path) if p])
         except RejectedError as error:
             # The other queries may be right. A model that fails ends everything.
             code = _failed(str(error), query_path or path)
@@ -125,13 +126,14 @@ def _progress(line: CommandLine, after: str) -> None:
     echo_exactly(f"{ERASE_LINE if shown else ''}{after}", nl=False)
 
 
-def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: list[Path]) -> None:
+def _answer(line: CommandLine, model: Model, query: Query, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
     from ntagen.verifyta.histogram import histogram
     from ntagen.verifyta.output import estimate, summary, values, verdict
-    from ntagen.verifyta.statistical import statistical
+    from ntagen.verifyta.statistical import of_model, statistical
 
+    text = query.text
     form = form_of(text)
     wants_trace = line.has("--diagnostic")
     wanted = _TRACE.get(line.value("--diagnostic"), "any")
@@ -142,7 +144,7 @@ def _answer(line: CommandLine, model: Model, text: str, number: int, inputs: lis
         text,
         Options(
             search=_SEARCH.get(line.value("--search-order"), "bfs"),
-            **statistical(line.given),
+            **of_model(query.options) | statistical(line.given),
             trace=wants_trace,
             wanted_trace=wanted if wants_trace else "any",
             strategy=form is not None

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
 _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
@@ -15,6 +16,31 @@ _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--discretization": ("discretisation", float),
 }
 """For each option, the field of `ntagen.checker.Options` and the type of its value."""
+
+
+_RANGES: Final = {"seed": (-1, math.inf), "runs": (0, math.inf), "discretisation": (0, math.inf)}
+"""Between which numbers values lie, without the ends; those of other fields between 0 and 1."""
+
+
+def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:
+    """The fields of `ntagen.checker.Options` that a model file says for a query.
+
+    Args:
+        options: The options of the file; what is not for random runs, or has a value without
+            meaning, is left out.
+        given: The fields that the command line says itself.
+    """
+    usable = {}
+    for name, value in options.items():
+        field, read = _FIELDS.get(name, ("", float))
+        low, high = _RANGES.get(field, (0, 1))
+        try:
+            number = read(value)
+        except ValueError:
+            continue
+        if field and field not in given and low < number < high:
+            usable[field] = number
+    return usable
 
 
 def statistical(given: Mapping[str, str]) -> dict[str, Any]:

@@ -159,6 +159,7 @@ impl LoadedModel {
             text: text.trim().to_owned(),
             comment: String::new(),
             expect: None,
+            options: Vec::new(),
         }
     }
 

@@ -70,6 +70,9 @@ pub struct QueryText {
     pub comment: String,
     /// The expected verdict, from `<expect>`, `<result>` or an `EXPECT:` comment.
     pub expect: Option<Expectation>,
+    /// The options of `<option>` elements, of the query or of all: names such as `--epsilon` with
+    /// their values. Only XML has them.
+    pub options: Vec<(String, String)>,
 }
 
 /// The verdict that a file states for one of its queries.

@@ -598,6 +598,7 @@ pub(super) fn query_texts(spans: &[Span], sources: &SourceMap) -> Vec<QueryText>
             text: super::q_file::collapsed(sources.text(span)),
             comment: String::new(),
             expect: None,
+            options: Vec::new(),
         })
         .collect()
 }

@@ -128,6 +128,7 @@ impl<'a> Splitter<'a> {
             text: collapsed(&self.text[start..end]),
             comment: self.comments.join("\n"),
             expect: self.expectation.take(),
+            options: Vec::new(),
         });
         self.comments.clear();
     }

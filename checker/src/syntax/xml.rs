@@ -293,6 +293,7 @@ impl Reader<'_, '_> {
     }
 
     fn queries(&mut self, node: Node) {
+        let for_all = options_of(node);
         for (index, query) in node
             .children()
             .filter(|n| is_element(*n, "query"))
@@ -300,7 +301,8 @@ impl Reader<'_, '_> {
         {
             if let Some(formula) = child(query, "formula") {
                 let place = format!("query {}", index + 1);
-                if let Some(text) = self.query(query, formula, place) {
+                if let Some(mut text) = self.query(query, formula, place) {
+                    text.options.splice(0..0, for_all.iter().cloned());
                     self.document.queries.push(text);
                 }
             }
@@ -325,8 +327,20 @@ impl Reader<'_, '_> {
             text: collapsed(text),
             comment: comment.unwrap_or("").trim().to_owned(),
             expect: expected.or_else(|| expectation_in(text)),
+            options: options_of(query),
         })
     }
+}
+
+/// The options that stand in a node, such as `<option key="--epsilon" value="0.01"/>`.
+fn options_of(node: Node) -> Vec<(String, String)> {
+    node.children()
+        .filter(|one| is_element(*one, "option"))
+        .filter_map(|one| {
+            let (key, value) = (one.attribute("key")?, one.attribute("value")?);
+            Some((key.trim().to_owned(), value.trim().to_owned()))
+        })
+        .collect()
 }
 
 fn expected_outcome(node: Node) -> Option<Expectation> {

@@ -409,10 +409,15 @@ fn query(query: &QueryText, sources: &SourceMap) -> Json {
         Expectation::Number(value) => json!(value),
     });
     let place = sources.position(query.span);
+    let options = query.options.iter();
+    let options: serde_json::Map<String, Json> = options
+        .map(|(key, value)| (key.clone(), json!(value)))
+        .collect();
     json!({
         "text": query.text,
         "comment": query.comment,
         "expect": expect,
+        "options": options,
         "path": *sources.get(query.span.source).path,
         "line": place.line,
         "column": place.column,
