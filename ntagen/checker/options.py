@@ -220,7 +220,8 @@ class Options:
     run_progress: RunProgress | None = None
     """Is called about ten times per second while a statistical query makes random runs, with their
     number, the estimate so far and the ends of its interval; each is ``None`` as long as it is not
-    known. The interval is that of as many runs, and was not chosen to be looked at before."""
+    known. The interval is that of as many runs, and was not chosen to be looked at before. What it
+    raises ends the runs as Ctrl-C does."""
 
     def __post_init__(self) -> None:
         if self.threads != "all" and self.threads < 0:

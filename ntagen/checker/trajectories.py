@@ -226,11 +226,12 @@ def over_time(
         raise InputError(f"the quantiles {low} and {high} do not lie between 0 and 1 in this order")
     if times is None:
         times = np.linspace(0.0, max(one.end for one in runs), GRID)
-    moments = np.asarray(times, dtype=np.float64)
+    moments = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    values = [one.at(moments) for one in runs]
     found: dict[str, tuple[Floats, Floats, Floats]] = {}
     lasting = np.zeros(len(moments), dtype=np.int64)
     for text in runs[0].expressions:
-        table = np.array([one.at(moments)[text] for one in runs])
+        table = np.array([one[text] for one in values])
         is_there = ~np.isnan(table)
         lasting = np.maximum(lasting, is_there.sum(axis=0))
         some = is_there.any(axis=0)

@@ -1,6 +1,7 @@
 //! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::PyValueError;
@@ -9,6 +10,7 @@ use pyo3::prelude::*;
 use super::convert::{
     code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
 };
+use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
 use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
@@ -18,6 +20,7 @@ use crate::tuning::Tuning;
 /// The options that a Python value holds.
 pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
     let text = |name| field::<String>(given, name);
+    let is_raised = Arc::new(AtomicBool::new(false));
     Ok(Options {
         order: order(&text("search")?, field(given, "seed")?)?,
         guide: field(given, "guide")?,
@@ -29,7 +32,10 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
             states: field(given, "states")?,
             memory_bytes: field(given, "memory_bytes")?,
             timeout: time_limit(field(given, "timeout_s")?)?,
-            observer: Some(observer(field(given, "progress")?)),
+            observer: Some(or_raised(
+                observer(field(given, "progress")?),
+                Arc::clone(&is_raised),
+            )),
         },
         plans: plans(&text("plans")?, field(given, "max_plans")?)?,
         strategy: field(given, "strategy")?,
@@ -43,30 +49,33 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         folder: field(given, "folder")?,
         allow_write: field(given, "allow_write")?,
         precision: precision(given)?,
-        run_observer: run_observer(field(given, "run_progress")?),
+        run_observer: run_observer(field(given, "run_progress")?, is_raised),
         rare: rare_event(given)?,
         ..Options::default()
     })
 }
 
-/// Shows what runs say until now to a Python function. What it raises is reported and ends nothing.
-fn run_observer(progress: Option<Py<PyAny>>) -> Option<RunObserver> {
+/// Shows what runs say until now to a Python function, and notes in `is_raised` if it raises: what a
+/// signal raises comes out of whatever Python code runs then.
+fn run_observer(progress: Option<Py<PyAny>>, is_raised: Arc<AtomicBool>) -> Option<RunObserver> {
     let progress = progress?;
     Some(RunObserver(Arc::new(move |so_far| {
         let known = |value: f64| value.is_finite().then_some(value);
-        let (lower, upper) = (so_far.interval.lower, so_far.interval.upper);
         let shown = (
             so_far.runs,
             known(so_far.estimate),
-            known(lower),
-            known(upper),
+            known(so_far.interval.lower),
+            known(so_far.interval.upper),
         );
-        Python::attach(|py| {
-            if let Err(error) = progress.call1(py, shown) {
-                error.write_unraisable(py, None);
-            }
-        });
+        if Python::attach(|py| progress.call1(py, shown).is_err()) {
+            is_raised.store(true, Ordering::Relaxed);
+        }
     })))
+}
+
+/// What an observer says, or whether something was raised elsewhere.
+fn or_raised(observer: Observer, is_raised: Arc<AtomicBool>) -> Observer {
+    Arc::new(move |counters| is_raised.load(Ordering::Relaxed) || observer(counters))
 }
 
 /// What statistical queries promise.

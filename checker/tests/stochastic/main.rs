@@ -103,7 +103,8 @@ fn satisfied(network: &Network, query: &StatisticalQuery, runs: u64) -> Result<u
         for run in 0..runs {
             let outcome = runner.path((1, run), bound, path)?;
             satisfied += u64::from(outcome.satisfied);
-            moves.push(outcome.time.to_bits() ^ outcome.moves);
+            moves
+                .push(outcome.time.to_bits() ^ outcome.moves ^ outcome.at.to_bits().rotate_left(7));
         }
         Ok((satisfied, moves))
     };

@@ -59,6 +59,7 @@ def test_the_share_of_runs_over_time_is_the_probability(model: Model) -> None:
     assert found.runs.tolist() == [4000] * 6
     assert found.lower["n"].tolist() == [0, 0, 0, 0, 0, 5]
     assert found.upper["n"].tolist() == [0, 0, 5, 5, 5, 5]
+    assert answer.frequency_over_time(3.0).mean["Q.B"] == found.mean["Q.B"][3]
     whole = answer.frequency_over_time()
     assert (whole.times[0], whole.times[-1], len(whole.times)) == (0, 6, 201)
     assert "from 5 % to 95 % of the runs" in whole._repr_svg_()

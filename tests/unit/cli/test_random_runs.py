@@ -16,6 +16,7 @@ from ntagen import checker
 from ntagen.cli import main
 from ntagen.cli.run_progress import so_far
 from ntagen.cli.run_rows import bars
+from ntagen.cli.signals import ending_at_once_next_time
 
 MODEL = """
 clock x; int n;
@@ -138,6 +139,15 @@ def test_ctrl_c_gives_the_result_so_far(path: str, capsys: pytest.CaptureFixture
     assert record["runs"] == record["distribution"]["runs"]
 
 
+def test_the_second_ctrl_c_ends_at_once() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with ending_at_once_next_time():
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
+    assert signal.getsignal(signal.SIGINT) == before
+
+
 def test_ctrl_c_before_the_first_result_is_an_interruption(
     path: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -158,6 +168,16 @@ def test_python_gets_the_result_so_far(path: str) -> None:
     assert (answer.verdict, answer.stop) == ("unknown", "interrupted")
     assert answer.estimate is not None
     assert answer.estimate.value == pytest.approx(0.5, abs=0.1)
+
+
+def test_what_progress_raises_ends_the_runs(path: str) -> None:
+    def fail(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    model = checker.load_file(Path(path))
+    with pytest.raises(checker.Interrupted) as caught:
+        model.check("Pr[<=3](<> Q.B)", epsilon=0.0001, run_progress=fail, timeout_s=60)
+    assert caught.value.answer.stop == "interrupted"
 
 
 def test_progress_shows_the_interval_so_far(path: str) -> None:
