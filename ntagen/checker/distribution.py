@@ -247,7 +247,7 @@ class Distribution:
         """The histogram above the cumulative distribution with its band.
 
         Args:
-            buckets: As for `histogram`; by default at most so many that a picture shows them.
+            buckets: As for `histogram`; by default at most 120.
             width: As for `histogram`.
             interval: An interval of the mean, which is marked.
 
@@ -316,7 +316,7 @@ class Distribution:
         return self.resolution == 0 and bool((self.values % 1.0 == 0.0).all())
 
     def _thinned(self, low: float, high: float) -> tuple[list[float], ...]:
-        """The cumulative distribution from one place to another, at so many as a picture shows."""
+        """The cumulative distribution from one place to another, at a few hundred values."""
         import numpy as np
 
         values = self.values

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 GRID: Final = 201
-"""So many moments a grid has if none is given."""
+"""The number of moments of a grid if none is given."""
 
 _MOST_LINES: Final = 40
 """More runs than this are one area of colour."""

@@ -12,13 +12,13 @@
 
 use std::collections::VecDeque;
 
-/// So many different values are kept as they are.
+/// The most different values that are kept as they are.
 pub const MOST_VALUES: usize = 100_000;
 
-/// So many bins there are at most.
+/// The most bins.
 pub const MOST_BINS: usize = 1 << 16;
 
-/// So many values wait until they are sorted in among the others.
+/// The most values that wait until they are sorted in among the others.
 const MOST_RECENT: usize = 1 << 16;
 
 /// Values, as they come.

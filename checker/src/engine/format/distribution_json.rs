@@ -5,7 +5,7 @@ use serde_json::{Value as Json, json};
 use super::json::real;
 use crate::stochastic::{Measured, ValuesOfRuns};
 
-/// The cumulative distribution is written at so many values at most.
+/// The most values at which the cumulative distribution is written.
 const MOST_POINTS: usize = 200;
 
 /// What the values are (`of`), whether they are of runs that break what is asked (`broken`), how
