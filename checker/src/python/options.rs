@@ -55,8 +55,8 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
     })
 }
 
-/// Shows what runs say until now to a Python function, and notes in `is_raised` if it raises: what a
-/// signal raises comes out of whatever Python code runs then.
+/// Shows what runs say until now to a Python function, and notes in `is_raised` if it raises: what
+/// a signal raises comes out of whatever Python code runs then.
 fn run_observer(progress: Option<Py<PyAny>>, is_raised: Arc<AtomicBool>) -> Option<RunObserver> {
     let progress = progress?;
     Some(RunObserver(Arc::new(move |so_far| {
