@@ -54,7 +54,7 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     # query asks the same. A search through all that may happen then takes minutes.
     is_long = scene.tissue.is_adversarial or scene.breath is not None
     papers = PAPER_QUERIES[1:] if is_long else PAPER_QUERIES
-    queries = {query.name: query for query in papers}
+    queries = {query.name: query for query in (*papers, *_chance_queries(scene))}
     for named in scene.queries:
         breach = rules.query(named.name, named.text)
         if breach is not None:
@@ -69,8 +69,26 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     return tuple(queries.values())
 
 
+MOST_RUNS: Final = 2000
+"""How many runs give the expected clearance under a strategy."""
+
+
+def _chance_queries(scene: Scene) -> tuple[Query, ...]:
+    """What is asked about the strategy in a tissue with chance."""
+    if not scene.tissue.is_stochastic:
+        return ()
+    push_mm = scene.needle.speed_mm_per_s * scene.limits.step_s
+    dt, _, _ = rules.time_units(scene.limits.step_s, scene.needle.speed_mm_per_s)
+    # The push that inserts too much is made; the check after it ends the path.
+    most_time = dt * (int(scene.needle.length_mm / push_mm) + 2)
+    return tuple(
+        Query(one.name, f"{one.formula} under ReachFinalTR", one.comment)
+        for one in questions(scene, most_time, "Checker.Final_TR_Reached", MOST_RUNS)
+    )
+
+
 def plan_queries(scene: Scene, push_count: int, runs: int) -> tuple[Query, ...]:
-    """The questions about a plan that has so many pushes, from so many runs."""
+    """The questions about a plan with this number of pushes."""
     dt, _, _ = rules.time_units(scene.limits.step_s, scene.needle.speed_mm_per_s)
     return questions(scene, dt * (push_count + 1), "Insertion.Done", runs)
 
@@ -82,9 +100,9 @@ def questions(scene: Scene, most_time: int, end: str, runs: int) -> tuple[Query,
 
     Args:
         scene: The scene.
-        most_time: It ends before so many units of time.
+        most_time: It ends before this time.
         end: The location in which it ends.
-        runs: So many runs give a mean.
+        runs: The number of runs that give a mean.
     """
     reach = f"Pr[<={most_time}](<> {end} && tip_miss <= 0"
     if not has_unsafe(scene):
@@ -92,24 +110,24 @@ def questions(scene: Scene, most_time: int, end: str, runs: int) -> tuple[Query,
             Query(
                 "ReachProbability",
                 f"{reach})",
-                "ReachProbability\nHow likely does the true tip reach the target",
+                "ReachProbability\nHow likely does the true tip reach the target?",
             ),
         )
     return (
         Query(
             "ReachProbability",
             f"{reach} && tip_clearance > 0)",
-            "ReachProbability\nHow likely does the true tip reach the target, and touch nothing",
+            "ReachProbability\nHow likely does the true tip reach the target, and touch nothing?",
         ),
         Query(
             "TouchProbability",
             f"Pr[<={most_time}](<> tip_clearance <= 0)",
-            "TouchProbability\nHow likely does it touch a critical region",
+            "TouchProbability\nHow likely does it touch a critical region?",
         ),
         Query(
             "ExpectedClearance",
             f"E[<={most_time}; {runs}](min: tip_clearance)",
-            "ExpectedClearance\nHow near does it come to one, in mm, in the mean",
+            "ExpectedClearance\nHow near does it come to one in the mean, in mm?",
         ),
     )
 

@@ -12,7 +12,8 @@ from ntagen.errors import InputError
 from ntagen.nsl import loads
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import certify
-from ntagen.plan.chance import actions_of
+from ntagen.plan.chance import Sampling, actions_of, odds_of
+from ntagen.plan.extract import pages_of
 from ntagen.render import render, render_plan, render_queries
 from ntagen.scene import MEASURED_TISSUE, Scene, Tissue
 from ntagen.units import rad_from_deg
@@ -186,3 +187,45 @@ def test_moving_regions_and_static_tissue_are_refused() -> None:
 def test_queries_of_static_tissue_stay_the_same() -> None:
     scene = replace(scene_of(BALLS), tissue=Tissue())
     assert "Probability" not in render_queries(scene)
+
+
+def test_each_such_task_has_the_questions_about_its_strategy() -> None:
+    lines = render_queries(scene_of(BALLS)).splitlines()
+    asked = [line for line in lines if line.endswith(" under ReachFinalTR")]
+    assert [line.partition("[")[0] for line in asked] == ["Pr", "Pr", "E"]
+    names = ["// ReachProbability", "// TouchProbability", "// ExpectedClearance"]
+    assert [line for line in lines if line in names] == names
+
+
+def test_under_the_strategy_the_true_tip_does_its_plan() -> None:
+    """There is one plan, so the model of this plan must say the same."""
+    text = BALLS.replace("tissue stochastic", "motion { roll by 180 deg at most 0 times }").replace(
+        "sphere (0, -50, 4) mm  radius 4 mm", "sphere (0, -35, -13) mm  radius 3 mm"
+    )
+    text = text.replace("\n}", "\n  tissue stochastic  curvature 10 %  roll 0 deg  tip 0.5 mm\n}")
+    text = text.replace("sphere (0, -25, 0) mm", "sphere (0, -20, -1) mm")
+    scene = scene_of(text)
+    model = checker.load(render(scene))
+    by_name = {query.comment.partition("\n")[0]: query.text for query in model.queries}
+    strategy = model.check(by_name["ReachFinalTR"], strategy=True, plans="all")
+    assert strategy.verdict == "satisfied"
+    (plan,) = (plan for page in pages_of(strategy, scene) for plan in page)
+    odds = odds_of(plan, scene, Sampling(runs=4000, seed=1, risk=1e-4))
+    ended = model.check("Pr[<=204](<> Checker.Final_TR_Reached) under ReachFinalTR", runs=100)
+    assert ended.estimate is not None
+    assert ended.estimate.value == 1.0
+    for name, expected in (
+        ("ReachProbability", odds.reach),
+        ("TouchProbability", odds.touch),
+        ("ExpectedClearance", odds.clearance_mm),
+    ):
+        found = model.check(by_name[name], runs=4000, seed=2, alpha=1e-4).estimate
+        assert found is not None
+        assert expected is not None
+        assert found.lower is not None
+        assert found.upper is not None
+        assert expected.lower is not None
+        assert expected.upper is not None
+        assert found.lower <= expected.upper
+        assert expected.lower <= found.upper
+        assert name == "ExpectedClearance" or 0.02 < found.value < 0.98
