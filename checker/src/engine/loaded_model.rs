@@ -65,11 +65,19 @@ impl LoadedModel {
         let (mut model, more) = analysed(Reading::Symbolic);
         let mut symbolic_refusal = None;
         let errors: Vec<Diagnostic> = more.iter().filter(|one| one.is_error()).cloned().collect();
+        let mut stochastic_errors = Vec::new();
         if !errors.is_empty() && errors.iter().all(semantics::is_symbolic) {
-            model = analysed(Reading::Stochastic).0;
+            let (stochastic, found) = analysed(Reading::Stochastic);
+            model = stochastic;
+            stochastic_errors.extend(found.into_iter().filter(Diagnostic::is_error));
         }
         let Some(model) = model else {
-            diagnostics.extend(more);
+            if stochastic_errors.is_empty() {
+                diagnostics.extend(more);
+            } else {
+                // Symbolic queries exclude even more; what keeps it from having any meaning counts.
+                diagnostics.extend(stochastic_errors);
+            }
             return Err(Rejection::new(diagnostics, &sources));
         };
         if errors.is_empty() {
@@ -191,9 +199,9 @@ impl LoadedModel {
     /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
     /// text.
     pub fn compile(&mut self, span: Span) -> Result<(Query, Vec<String>), Rejection> {
-        self.expect_symbolic()?;
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
+            self.expect_symbolic()?;
             let names = self.strategy_names();
             let (query, more) = self.model.compile_query(&parsed, &self.sources, &names);
             diagnostics.extend(more);

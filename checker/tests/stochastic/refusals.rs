@@ -150,6 +150,25 @@ fn bounds_are_known_numbers() {
 }
 
 #[test]
+fn a_model_without_meaning_is_refused_for_what_statistical_queries_cannot_read() {
+    let text = "
+        clock x, y; double d = 0.5;
+        process P() {
+            state a { x <= 2.5 };
+            init a;
+            trans a -> a { guard x * y >= d; };
+        }
+        system P;";
+    let Err(rejection) = LoadedModel::load("model.xta", text.as_bytes()) else {
+        panic!("it is accepted");
+    };
+    let [only] = &rejection.rendered[..] else {
+        panic!("there is one mistake: {:?}", rejection.rendered);
+    };
+    assert!(only.contains("E0283") && only.contains("x * y"), "{only}");
+}
+
+#[test]
 fn a_model_that_zones_cannot_hold_is_asked_statistical_queries() {
     let text = "
         clock x; double d = 0.5;
