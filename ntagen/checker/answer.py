@@ -71,6 +71,8 @@ class Estimate:
             ``importance splitting, Student (asymptotic)``.
         runs: The number of runs; with importance splitting, of parts of runs.
         satisfied_runs: How many of them are satisfied; ``None`` for means and with splitting.
+        compared: What runs say of the second probability of a comparison,
+            ``Pr[…](…) >= Pr[…](…)``; ``None`` for other queries.
     """
 
     value: float
@@ -80,6 +82,13 @@ class Estimate:
     method: str
     runs: int
     satisfied_runs: int | None
+    compared: Estimate | None = None
+
+    @classmethod
+    def from_object(cls, given: dict[str, Any]) -> Estimate:
+        """The estimate that an object of the engine describes."""
+        compared = given["compared"]
+        return cls(**given | {"compared": compared and cls.from_object(compared)})
 
 
 class Answer:
@@ -136,7 +145,7 @@ class Answer:
         self.estimate = (
             None
             if estimate is None
-            else Estimate(value=json.loads(value or "0"), **json.loads(estimate))
+            else Estimate.from_object({"value": json.loads(value or "0")} | json.loads(estimate))
         )
         self.message = raw.message
         self.wrapped = None if raw.wrapped is None else Place(*raw.wrapped)

@@ -81,6 +81,8 @@ def _record(outcome: Outcome) -> dict[str, object]:
     }
     if answer is not None and answer.estimate is not None:
         record |= asdict(answer.estimate)
+        if answer.estimate.compared is None:
+            del record["compared"]
     if answer is not None and answer.distribution is not None:
         record["distribution"] = answer.distribution.to_json()
     if answer is not None and outcome.shows_runs:

@@ -96,14 +96,13 @@ _USUAL_METHODS: Final = ("Clopper-Pearson", "Student (asymptotic)")
 
 def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
     """What random runs say: the estimate with its interval, and what it took."""
-    percent = f"{100 * estimate.confidence:g} %"
-    between = f"in [{_number(estimate.lower)}, {_number(estimate.upper)}] at {percent} confidence"
-    lines = [f"value: {_number(estimate.value)}, {between}"]
+    lines = [f"value: {_interval(estimate)}"]
     if estimate.method not in _USUAL_METHODS:
         lines.append(f"interval: {estimate.method}")
-    runs = f"{estimate.runs:,} run" + ("s" if estimate.runs != 1 else "")
-    if estimate.satisfied_runs is not None:
-        runs = f"{estimate.satisfied_runs:,} of {runs} satisfied"
+    runs = _runs(estimate)
+    if estimate.compared is not None:
+        lines.append(f"compared with: {_interval(estimate.compared)}")
+        runs += f", and {_runs(estimate.compared)}"
     stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
     values = answer.distribution
@@ -118,6 +117,18 @@ def _made(answer: Answer) -> list[str]:
     facts = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     facts += [f"{count:,} run" + ("s" if count != 1 else ""), f"{1000 * answer.seconds:.1f} ms"]
     return [", ".join(facts), *([answer.message] if answer.message else [])]
+
+
+def _interval(estimate: Estimate) -> str:
+    between = f"in [{_number(estimate.lower)}, {_number(estimate.upper)}]"
+    return f"{_number(estimate.value)}, {between} at {100 * estimate.confidence:g} % confidence"
+
+
+def _runs(estimate: Estimate) -> str:
+    runs = f"{estimate.runs:,} run" + ("s" if estimate.runs != 1 else "")
+    if estimate.satisfied_runs is None:
+        return runs
+    return f"{estimate.satisfied_runs:,} of {runs} satisfied"
 
 
 RUNS_SHOWN: Final = 3

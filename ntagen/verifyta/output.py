@@ -121,10 +121,15 @@ def estimate(answer: Answer) -> list[str]:
         kind = "min" if re.match(r"[^(]*\(\s*min\b", answer.query) else "max"
         mean = f"≈ {found.value:g}" if half == 0 else f"{found.value:g} ± {half:g} ({share})"
         return [f"({found.runs} runs) E({kind}) = {mean}"]
-    runs = f"({found.satisfied_runs}/{found.runs} runs)"
-    path = re.search(r"\(\s*(<>|\[\])", answer.query)
-    asked = f"{path[1]} …" if path else "… U …"
-    return [f"{runs} Pr({asked}) in [{found.lower:g},{found.upper:g}] ({share})"]
+    paths = [asked.strip() for asked in re.split(r"\bPr\b", answer.query)[1:]]
+    estimates = [found, found.compared] if found.compared else [found]
+    lines = []
+    for path, one in zip(paths, estimates, strict=False):
+        operator = re.match(r"(\[.*?\])?\s*\(\s*(<>|\[\])", path, re.DOTALL)
+        asked = f"{operator[2]} …" if operator else "… U …"
+        runs = f"({one.satisfied_runs}/{one.runs} runs)"
+        lines.append(f"{runs} Pr({asked}) in [{one.lower:g},{one.upper:g}] ({share})")
+    return lines
 
 
 def _trajectory(number: int, trajectory: Trajectory, text: str) -> str:

@@ -1,5 +1,6 @@
 //! Compiled statistical queries.
 
+use super::formulas::Formula;
 use super::ids::FunctionId;
 use super::labels::Guard;
 use crate::diagnostics::Span;
@@ -30,6 +31,15 @@ pub enum Statistical {
         at_least: bool,
         /// The probability that is compared.
         threshold: f64,
+    },
+    /// `Pr[bound](path) >= Pr[bound](path)`, or `<=`.
+    Comparison {
+        /// How long a run for the first probability is, and what is asked of it.
+        left: (RunBound, Path),
+        /// The same for the second one.
+        right: (RunBound, Path),
+        /// Whether it is `>=`.
+        at_least: bool,
     },
     /// `E[bound; runs](max: value)`
     Expectation {
@@ -99,4 +109,6 @@ pub enum Path {
     Always(Guard),
     /// `p U q`
     Until(Guard, Guard),
+    /// Any other formula over time.
+    Formula(Formula),
 }

@@ -155,6 +155,8 @@ codes! {
     HOOK_FAILS = "E0282" "hook-fails";
     /// An invariant that gives a clock two rates.
     RATE_TWICE = "E0285" "rate-twice";
+    /// A statistical query in which nothing says when a run is over.
+    RUN_UNBOUNDED = "E0286" "run-unbounded";
     /// A channel, or a condition on clocks, where a statement is needed.
     NOT_A_STATEMENT = "E0291" "not-a-statement";
     /// A channel that is chosen by `?:`.

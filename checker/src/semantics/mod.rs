@@ -82,6 +82,7 @@ mod members;
 
 mod queries;
 
+mod formulas;
 mod value_ranges;
 
 mod statistical;

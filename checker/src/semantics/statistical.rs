@@ -53,6 +53,18 @@ impl Checker<'_> {
                     threshold: self.known_real(threshold, "a probability", (0.0, 1.0))?,
                 }
             }
+            ast::Statistical::Comparison {
+                left,
+                right,
+                at_least,
+            } => {
+                let (left, right) = (self.estimated(left), self.estimated(right));
+                Statistical::Comparison {
+                    left: left?,
+                    right: right?,
+                    at_least: *at_least,
+                }
+            }
             ast::Statistical::Expectation {
                 bound,
                 maximum,
@@ -154,13 +166,32 @@ impl Checker<'_> {
     }
 
     fn estimated(&mut self, estimated: &ast::Estimated) -> Option<(RunBound, Path)> {
-        let bound = self.run_bound(&estimated.bound);
+        let bound = match (&estimated.bound, &estimated.path) {
+            (Some(bound), _) => self.run_bound(bound),
+            (None, ast::Path::Formula(_)) => Some(RunBound {
+                limit: RunLimit::Time,
+                value: f64::INFINITY,
+                runs: None,
+            }),
+            (
+                None,
+                ast::Path::Eventually(state)
+                | ast::Path::Always(state)
+                | ast::Path::Until(_, state),
+            ) => {
+                self.report_unbounded(state.span);
+                None
+            }
+        };
         let path = match &estimated.path {
             ast::Path::Eventually(goal) => Path::Eventually(self.state_condition(goal)?),
             ast::Path::Always(keep) => Path::Always(self.state_condition(keep)?),
             ast::Path::Until(keep, goal) => {
                 let (keep, goal) = (self.state_condition(keep), self.state_condition(goal));
                 Path::Until(keep?, goal?)
+            }
+            ast::Path::Formula(formula) => {
+                Path::Formula(self.formula(formula, estimated.bound.is_some())?)
             }
         };
         Some((bound?, path))
@@ -200,7 +231,12 @@ impl Checker<'_> {
     }
 
     /// A number that is known now and between these two.
-    fn known_real(&mut self, expr: &ast::Expr, what: &str, range: (f64, f64)) -> Option<f64> {
+    pub(super) fn known_real(
+        &mut self,
+        expr: &ast::Expr,
+        what: &str,
+        range: (f64, f64),
+    ) -> Option<f64> {
         let value = self.expression(expr);
         let value = self.converted(value, &Type::Double)?;
         let span = value.span;
@@ -225,7 +261,7 @@ impl Checker<'_> {
     }
 
     /// The mask of a condition on states.
-    fn state_condition(&mut self, expr: &ast::Expr) -> Option<Guard> {
+    pub(super) fn state_condition(&mut self, expr: &ast::Expr) -> Option<Guard> {
         let span = expr.span;
         let expr = self.expression(expr);
         self.report_members(&expr, span);

@@ -73,6 +73,9 @@ impl Collector {
                 let wanted = precision.runs.or(bound.runs);
                 (bound, Collector::mean(precision, *range, wanted))
             }
+            Statistical::Comparison { .. } => {
+                unreachable!("probabilities are compared by `compare`")
+            }
             Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
         };
         Collector {
@@ -233,6 +236,7 @@ impl Collector {
             runs,
             satisfied_runs: (!self.is_mean()).then_some(self.satisfied),
             decision,
+            compared: None,
             is_complete,
         }
     }
@@ -296,6 +300,7 @@ pub fn estimate_watched(
             |(value, _)| push(value),
             ends,
         )?,
+        Statistical::Comparison { .. } => unreachable!("probabilities are compared by `compare`"),
         Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
     };
     match failure {

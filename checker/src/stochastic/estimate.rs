@@ -70,7 +70,7 @@ pub fn simulate(
 }
 
 /// The estimate of a probability from the numbers of runs and of satisfied ones.
-fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estimate {
+pub(super) fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estimate {
     let interval = clopper_pearson(satisfied, runs, alpha);
     Estimate {
         value: satisfied as f64 / runs as f64,
@@ -81,6 +81,7 @@ fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estima
         runs,
         satisfied_runs: Some(satisfied),
         decision: None,
+        compared: None,
         is_complete,
     }
 }

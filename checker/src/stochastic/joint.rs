@@ -14,6 +14,7 @@ use super::collector::Collector;
 use super::extreme::Extreme;
 use super::failure::Failure;
 use super::in_order::in_order;
+use super::mitl::Watch;
 use super::precision::{Estimate, Precision};
 use super::run::{Runner, watched};
 use super::run_watch::Ends;
@@ -83,16 +84,20 @@ pub fn bound_of(query: &Statistical) -> &RunBound {
         Statistical::Probability(bound, _)
         | Statistical::Hypothesis { bound, .. }
         | Statistical::Expectation { bound, .. } => bound,
+        // The runs of the second probability have a bound of their own.
+        Statistical::Comparison { left, .. } => &left.0,
         Statistical::Simulation(asked) => &asked.bound,
     }
 }
 
 /// What is known of a run for one query.
-enum Seen {
+enum Seen<'q> {
     /// Nothing is looked for.
     Closed,
     /// Not decided yet.
     Open,
+    /// A formula that is not decided yet.
+    Formula(Watch<'q>),
     /// Whether it is satisfied.
     Decided(bool),
     /// The least or greatest value so far, and whether it may change as time passes.
@@ -108,7 +113,7 @@ impl Runner<'_> {
         queries: &[&Statistical],
         open: &[AtomicBool],
     ) -> Result<Vec<Option<f64>>, Failure> {
-        let mut seen: Vec<Seen> = queries
+        let mut seen: Vec<Seen<'_>> = queries
             .iter()
             .zip(open)
             .map(|(query, open)| match query {
@@ -116,6 +121,11 @@ impl Runner<'_> {
                 &&Statistical::Expectation { value, maximum, .. } => {
                     Seen::Extreme(Extreme::new(value, maximum), self.program.is_timed(value))
                 }
+                Statistical::Probability(_, Path::Formula(formula))
+                | Statistical::Hypothesis {
+                    path: Path::Formula(formula),
+                    ..
+                } => Seen::Formula(Watch::new(formula)),
                 _ => Seen::Open,
             })
             .collect();
@@ -128,6 +138,13 @@ impl Runner<'_> {
                         Statistical::Probability(_, path) | Statistical::Hypothesis { path, .. },
                     ) => {
                         if let Some((satisfied, _)) = watched(race, path, delay)? {
+                            *seen = Seen::Decided(satisfied);
+                        } else {
+                            is_over = false;
+                        }
+                    }
+                    (Seen::Formula(watch), _) => {
+                        if let Some((satisfied, _)) = watch.state(race, delay)? {
                             *seen = Seen::Decided(satisfied);
                         } else {
                             is_over = false;
@@ -153,6 +170,7 @@ impl Runner<'_> {
             results.push(match seen {
                 Seen::Closed => None,
                 Seen::Open => Some(f64::from(holds_at_the_end(query))),
+                Seen::Formula(watch) => Some(f64::from(watch.finish())),
                 Seen::Decided(satisfied) => Some(f64::from(*satisfied)),
                 Seen::Extreme(extreme, _) => Some(extreme.value()),
             });

@@ -4,6 +4,7 @@
 //! whatever the number of threads, and results count in the order of run numbers.
 
 mod collector;
+mod comparison;
 mod condition;
 mod estimate;
 mod extreme;
@@ -12,6 +13,7 @@ mod in_order;
 mod integrator;
 mod joint;
 mod machine;
+mod mitl;
 mod motion;
 mod precision;
 mod program;
@@ -27,6 +29,7 @@ mod values_of_runs;
 mod windows;
 
 pub use collector::{estimate, estimate_watched};
+pub use comparison::compare;
 pub use estimate::{Simulated, simulate};
 pub use failure::{Failure, Stand};
 pub use joint::{bound_of, estimate_jointly};

@@ -93,6 +93,8 @@ pub struct Estimate {
     pub satisfied_runs: Option<u64>,
     /// What a test decided.
     pub decision: Option<Decision>,
+    /// The estimate of the probability that this one was compared with.
+    pub compared: Option<Box<Estimate>>,
     /// Whether all runs were made that were wanted.
     pub is_complete: bool,
 }

@@ -100,6 +100,7 @@ pub fn estimate_rare(
             runs: made,
             satisfied_runs: None,
             decision: None,
+            compared: None,
             is_complete,
         },
         thresholds: found.thresholds,

@@ -8,11 +8,12 @@ use super::condition::Condition;
 use super::extreme::Extreme;
 use super::failure::Failure;
 use super::machine::{Machine, Mask};
+use super::mitl::Watch;
 use super::program::Program;
 use super::race::Race;
 use crate::cancellation;
 use crate::exec::Executor;
-use crate::ir::{FunctionId, Network, Path, RunBound, RunLimit, Simulation};
+use crate::ir::{Formula, FunctionId, Network, Path, RunBound, RunLimit, Simulation};
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
@@ -123,12 +124,37 @@ impl<'a> Runner<'a> {
         bound: &RunBound,
         path: &Path,
     ) -> Result<Outcome, Failure> {
+        if let Path::Formula(formula) = path {
+            return self.formula((seed, run), bound, formula);
+        }
         let mut decided = None;
         self.until_bound((seed, run), bound, &mut |race, delay| {
             decided = watched(race, path, delay)?;
             Ok(decided.is_some())
         })?;
         let (satisfied, ahead) = decided.unwrap_or((matches!(path, Path::Always(_)), 0.0));
+        Ok(Outcome {
+            satisfied,
+            time: self.race.time + ahead,
+            moves: self.race.moves,
+            at: position(&self.race, bound, ahead),
+        })
+    }
+
+    /// Run number `run` of a seed, until it is decided whether a formula holds for it.
+    fn formula(
+        &mut self,
+        (seed, run): (u64, u64),
+        bound: &RunBound,
+        formula: &Formula,
+    ) -> Result<Outcome, Failure> {
+        let mut watch = Watch::new(formula);
+        let mut decided = None;
+        self.until_bound((seed, run), bound, &mut |race, delay| {
+            decided = watch.state(race, delay)?;
+            Ok(decided.is_some())
+        })?;
+        let (satisfied, ahead) = decided.unwrap_or_else(|| (watch.finish(), 0.0));
         Ok(Outcome {
             satisfied,
             time: self.race.time + ahead,
@@ -327,6 +353,7 @@ pub(super) fn watched(
                 race.mask(Condition::of(keep), ahead, delay)?,
                 race.mask(Condition::of(goal), ahead, delay)?,
             ),
+            Path::Formula(_) => unreachable!("formulas have a watch of their own"),
         };
         if reach.now || !keep.now {
             return Ok(Some((reach.now, ahead)));

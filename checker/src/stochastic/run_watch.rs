@@ -43,6 +43,9 @@ impl Shows for (f64, u64) {
 
 impl Shows for Trajectory {}
 
+/// Whether the two runs of a pair have what was asked.
+impl Shows for (bool, bool) {}
+
 /// Results for several queries, or none.
 impl Shows for Vec<Option<f64>> {}
 

@@ -80,6 +80,6 @@ fn measured(query: &Statistical) -> Option<(Measured, bool)> {
             Some((measured, matches!(path, Path::Always(_))))
         }
         Statistical::Expectation { .. } => Some((Measured::Value, false)),
-        Statistical::Simulation(_) => None,
+        Statistical::Comparison { .. } | Statistical::Simulation(_) => None,
     }
 }

@@ -639,6 +639,15 @@ pub enum Statistical {
         /// What it is compared with.
         threshold: Expr,
     },
+    /// `Pr[bound](path) >= Pr[bound](path)`, or `<=`.
+    Comparison {
+        /// The first probability.
+        left: Box<Estimated>,
+        /// The second one.
+        right: Box<Estimated>,
+        /// Whether it is `>=`.
+        at_least: bool,
+    },
     /// `E[bound; runs](max: value)`, or `min`.
     Expectation {
         /// How long a run is.
@@ -662,8 +671,8 @@ pub enum Statistical {
 /// What a probability is asked of.
 #[derive(Clone, Debug)]
 pub struct Estimated {
-    /// How long a run is.
-    pub bound: RunBound,
+    /// How long a run is; `None` leaves it to the formula.
+    pub bound: Option<RunBound>,
     /// What is asked of a run.
     pub path: Path,
 }
@@ -701,6 +710,59 @@ pub enum Path {
     Always(Expr),
     /// `p U q`
     Until(Expr, Expr),
+    /// Any other formula over time.
+    Formula(Formula),
+}
+
+/// A formula over time: metric interval temporal logic.
+#[derive(Clone, Debug)]
+pub enum Formula {
+    /// A condition on states.
+    State(Expr),
+    /// `!f`
+    Not(Box<Formula>),
+    /// `f && g`
+    And(Box<Formula>, Box<Formula>),
+    /// `f || g`
+    Or(Box<Formula>, Box<Formula>),
+    /// `X f`: behind the next move.
+    Next(Box<Formula>),
+    /// `<>[a,b] f`
+    Eventually(Option<Interval>, Box<Formula>),
+    /// `[][a,b] f`
+    Always(Option<Interval>, Box<Formula>),
+    /// `f U[a,b] g`
+    Until(Option<Interval>, Box<Formula>, Box<Formula>),
+    /// `f R[a,b] g`
+    Release(Option<Interval>, Box<Formula>, Box<Formula>),
+}
+
+impl Formula {
+    /// Where its last condition on states stands.
+    pub fn span(&self) -> Span {
+        match self {
+            Formula::State(state) => state.span,
+            Formula::Not(inner)
+            | Formula::Next(inner)
+            | Formula::Eventually(_, inner)
+            | Formula::Always(_, inner)
+            | Formula::And(_, inner)
+            | Formula::Or(_, inner)
+            | Formula::Until(_, _, inner)
+            | Formula::Release(_, _, inner) => inner.span(),
+        }
+    }
+}
+
+/// `[a,b]`, the distance in time.
+#[derive(Clone, Debug)]
+pub struct Interval {
+    /// The least distance.
+    pub from: Expr,
+    /// The greatest distance.
+    pub to: Expr,
+    /// Where it stands.
+    pub span: Span,
 }
 
 /// `sup`, `inf`, `bounds`

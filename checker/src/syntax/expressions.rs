@@ -411,7 +411,7 @@ impl Parser<'_> {
         }
     }
 
-    fn parenthesised(&mut self) -> Expr {
+    pub(super) fn parenthesised(&mut self) -> Expr {
         self.bump();
         let expr = self.expression();
         let height = self.height;

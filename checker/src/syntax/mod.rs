@@ -32,6 +32,9 @@ mod types;
 mod declarations;
 
 mod statements;
+
+mod formulas;
+
 mod statistical;
 
 mod processes;

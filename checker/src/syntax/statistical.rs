@@ -1,100 +1,146 @@
-//! Statistical queries: `Pr[bound](path)`, alone or compared with a number,
+//! Statistical queries: `Pr[bound](path)`, alone or compared with a number or another probability,
 //! `E[bound; runs](max: e)`, and `simulate [bound; runs] {a, b}`.
 //!
-//! Source: UPPAAL's language reference, "Statistical Queries".
+//! Source: UPPAAL's language reference, "Statistical Queries". Forms of older versions are read,
+//! too: `simulate 5 [<=10] {a}`, and `?` behind a probability.
 
-use super::ast::{
-    BinaryOp, Estimated, Expr, ExprKind, Path, QueryKind, RunBound, RunLimit, Statistical,
-};
+use super::ast::{BinaryOp, Estimated, Expr, ExprKind, QueryKind, RunBound, RunLimit, Statistical};
+use super::codes;
 use super::lexer::TokenKind;
 use super::parser::Parser;
+use crate::diagnostics::Diagnostic;
 
 impl Parser<'_> {
-    /// A statistical query; what is not read (yet) is known by its name only.
+    /// A statistical query.
     pub(super) fn statistical(&mut self) -> QueryKind {
-        let checkpoint = self.checkpoint();
-        let query = self.statistical_query();
-        let is_whole = self.at_end() || self.at_word("under");
-        match query {
-            Some(query) if is_whole && self.is_clean_since(&checkpoint) => {
-                QueryKind::Statistical(query)
-            }
-            _ => {
-                self.rewind(&checkpoint);
-                self.unsupported_query("statistical model checking")
-            }
-        }
+        let query = if self.eat_word("simulate") {
+            self.simulation()
+        } else if self.at_word("E") {
+            self.bump();
+            self.expectation()
+        } else {
+            self.bump();
+            self.probability()
+        };
+        QueryKind::Statistical(query)
     }
 
-    fn statistical_query(&mut self) -> Option<Statistical> {
-        if self.eat_word("simulate") {
-            return self.simulation();
-        }
-        let is_expectation = self.at_word("E");
-        if !(is_expectation || self.at_word("Pr")) {
-            return None;
-        }
-        self.bump();
-        let bound = self.run_bound()?;
-        if !self.eat(TokenKind::LeftParenthesis) {
-            return None;
-        }
-        if is_expectation {
-            let maximum = self.at_word("max");
-            if !(maximum || self.at_word("min")) {
-                return None;
-            }
-            self.bump();
-            let is_prefix = self.eat(TokenKind::Colon);
-            let value = self.expression();
-            let is_closed = self.eat(TokenKind::RightParenthesis);
-            return (is_prefix && is_closed).then_some(Statistical::Expectation {
-                bound,
-                maximum,
-                value,
-            });
-        }
-        let path = self.path()?;
-        if !self.eat(TokenKind::RightParenthesis) {
-            return None;
-        }
-        let estimated = Estimated { bound, path };
+    /// `[bound](path)`, with what it is compared with.
+    fn probability(&mut self) -> Statistical {
+        let estimated = self.estimated();
         let at_least = self.at(TokenKind::GreaterEqual);
         if !(at_least || self.at(TokenKind::LessEqual)) {
-            return Some(Statistical::Probability(estimated));
+            self.expect_no_other_comparison();
+            return Statistical::Probability(estimated);
         }
         self.bump();
-        if self.at_word("Pr") {
-            return None;
+        if self.eat_word("Pr") {
+            return Statistical::Comparison {
+                left: Box::new(estimated),
+                right: Box::new(self.estimated()),
+                at_least,
+            };
         }
-        Some(Statistical::Hypothesis {
+        Statistical::Hypothesis {
             estimated,
             at_least,
             threshold: self.expression(),
-        })
+        }
     }
 
-    /// `simulate [<=10; 5] {a, b} : 2 : p`, and the old form, `simulate 5 [<=10] {a, b} : 2 : p`.
-    fn simulation(&mut self) -> Option<Statistical> {
+    /// `>`, `==`, `=` are no tests; `?` was how older versions asked for an estimate.
+    fn expect_no_other_comparison(&mut self) {
+        let old_mark = self.eat(TokenKind::Question);
+        let is_comparison = matches!(
+            self.kind(),
+            TokenKind::Less
+                | TokenKind::Greater
+                | TokenKind::EqualEqual
+                | TokenKind::Assign
+                | TokenKind::NotEqual
+        );
+        if is_comparison && !old_mark {
+            let (span, found) = (self.here(), self.found());
+            let message = format!("a probability is not compared by {found}");
+            self.report(
+                Diagnostic::new(codes::UNEXPECTED_TOKEN, span, message).help(
+                    "write `>=` or `<=` with a number or another Pr, or nothing to estimate it",
+                ),
+            );
+            self.skip_rest();
+        }
+    }
+
+    /// Leaves the rest unread because of a mistake.
+    fn skip_rest(&mut self) {
+        while !self.at_end() && !self.at_word("under") {
+            self.bump();
+        }
+        self.suppress_reports();
+    }
+
+    fn estimated(&mut self) -> Estimated {
+        let bound = self.at(TokenKind::LeftBracket).then(|| self.run_bound());
+        let is_open = self.expect(TokenKind::LeftParenthesis, "before what is asked of a run");
+        let path = self.path();
+        if is_open {
+            self.closing(TokenKind::RightParenthesis, "after what is asked of a run");
+        } else {
+            self.skip_rest();
+        }
+        Estimated { bound, path }
+    }
+
+    /// `[bound; runs](max: e)`
+    fn expectation(&mut self) -> Statistical {
+        let bound = self.run_bound();
+        self.expect(TokenKind::LeftParenthesis, "before what is measured");
+        let maximum = self.at_word("max");
+        if maximum || self.at_word("min") {
+            self.bump();
+        } else {
+            self.expected("`max:` or `min:`");
+            self.skip_to(&[TokenKind::Colon, TokenKind::RightParenthesis]);
+        }
+        self.expect(TokenKind::Colon, "before what is measured");
+        let value = self.expression();
+        self.closing(TokenKind::RightParenthesis, "after what is measured");
+        Statistical::Expectation {
+            bound,
+            maximum,
+            value,
+        }
+    }
+
+    /// `[<=10; 5] {a, b} : 2 : p`, and the old form, `5 [<=10] {a, b} : 2 : p`.
+    fn simulation(&mut self) -> Statistical {
         let old_runs = match self.kind() {
             TokenKind::LeftBracket => None,
-            TokenKind::LeftParenthesis => Some(self.expression()),
-            _ => Some(self.lone_operand()?),
+            TokenKind::LeftParenthesis => Some(self.parenthesised()),
+            _ => self.lone_operand(),
         };
-        let mut bound = self.run_bound()?;
+        let mut bound = self.run_bound();
         if let Some(runs) = old_runs {
             if bound.runs.is_some() {
-                return None;
+                self.report_earlier(
+                    Diagnostic::new(
+                        codes::UNEXPECTED_TOKEN,
+                        runs.span,
+                        "the number of runs is given twice",
+                    )
+                    .help("write it behind the bound only: simulate [<=10; 5] {…}"),
+                );
             }
             bound.runs = Some(runs);
         }
-        if !self.eat(TokenKind::LeftBrace) {
-            return None;
+        if !self.expect(TokenKind::LeftBrace, "before what is shown") {
+            self.skip_rest();
         }
-        let items = self.expression_list();
-        if !self.eat(TokenKind::RightBrace) {
-            return None;
+        let mut items = vec![self.expression()];
+        while self.eat(TokenKind::Comma) && !self.at(TokenKind::RightBrace) {
+            items.push(self.expression());
         }
+        self.closing(TokenKind::RightBrace, "after what is shown");
         let mut filter = None;
         if self.eat(TokenKind::Colon) {
             let first = self.expression();
@@ -104,72 +150,73 @@ impl Parser<'_> {
                 (None, first)
             });
         }
-        Some(Statistical::Simulation {
+        Statistical::Simulation {
             bound,
             items,
             filter,
-        })
+        }
     }
 
     /// A number or a name, without the bracket behind it.
     fn lone_operand(&mut self) -> Option<Expr> {
-        let token = self.bump();
-        let span = self.span_of(token);
+        let (token, span) = (self.token(), self.here());
         let text = self.text_of(token);
         let kind = match token.kind {
             TokenKind::Word => ExprKind::Name(text.to_owned()),
-            _ => ExprKind::Int(text.parse().ok()?),
+            TokenKind::Int => text.parse().map_or(ExprKind::Error, ExprKind::Int),
+            _ => {
+                self.expected("the bound of the runs, or their number");
+                return None;
+            }
         };
+        if matches!(kind, ExprKind::Error) {
+            let message = "this number does not fit into an integer";
+            self.error(codes::NUMBER_TOO_LARGE, span, message);
+        }
+        self.bump();
         Some(Expr { kind, span })
     }
 
     /// `[<=10]`, `[x<=10]` or `[#<=10]`, each with a number of runs behind `;` or not.
-    fn run_bound(&mut self) -> Option<RunBound> {
+    fn run_bound(&mut self) -> RunBound {
         let start = self.here();
-        if !self.eat(TokenKind::LeftBracket) {
-            return None;
-        }
-        let counts_moves = self.eat(TokenKind::Hash);
-        let (limit, value) = if self.eat(TokenKind::LessEqual) {
-            let limit = if counts_moves {
-                RunLimit::Moves
-            } else {
-                RunLimit::Time
-            };
-            (limit, self.expression())
+        self.expect(TokenKind::LeftBracket, "before the bound of the runs");
+        let (limit, value) = if self.eat(TokenKind::Hash) {
+            self.expect(TokenKind::LessEqual, "before the number of moves");
+            (RunLimit::Moves, self.expression())
+        } else if self.eat(TokenKind::LessEqual) {
+            (RunLimit::Time, self.expression())
         } else {
-            let bound = self.expression();
-            clock_bound(bound).filter(|_| !counts_moves)?
+            self.clock_bound()
         };
         let runs = self.eat(TokenKind::Semicolon).then(|| self.expression());
+        self.closing(TokenKind::RightBracket, "after the bound of the runs");
         let span = self.since(start);
-        self.eat(TokenKind::RightBracket).then_some(RunBound {
+        RunBound {
             limit,
             value,
             runs,
             span,
-        })
+        }
     }
 
-    fn path(&mut self) -> Option<Path> {
-        if self.eat(TokenKind::Diamond) {
-            return Some(Path::Eventually(self.expression()));
+    /// `x<=10` as a limit and its value.
+    fn clock_bound(&mut self) -> (RunLimit, Expr) {
+        let bound = self.expression();
+        match bound.kind {
+            ExprKind::Binary(BinaryOp::LessEqual, clock, value) => {
+                (RunLimit::Clock(*clock), *value)
+            }
+            ExprKind::Error => (RunLimit::Time, bound),
+            _ => {
+                let message = "this does not bound the runs";
+                self.report_earlier(
+                    Diagnostic::new(codes::UNEXPECTED_TOKEN, bound.span, message)
+                        .help("write [<=10], [x<=10] for a clock x, or [#<=10] for ten moves"),
+                );
+                let kind = ExprKind::Error;
+                (RunLimit::Time, Expr { kind, ..bound })
+            }
         }
-        if self.eat(TokenKind::Box) {
-            return Some(Path::Always(self.expression()));
-        }
-        let keep = self.expression();
-        self.eat_word("U")
-            .then(|| Path::Until(keep, self.expression()))
-    }
-}
-
-/// `x<=10` as a limit and its value.
-fn clock_bound(bound: Expr) -> Option<(RunLimit, Expr)> {
-    match bound.kind {
-        ExprKind::Binary(BinaryOp::LessEqual, clock, value) => {
-            Some((RunLimit::Clock(*clock), *value))
-        }
-        _ => None,
     }
 }

@@ -17,7 +17,9 @@ mod certainties;
 #[path = "../common/checks.rs"]
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
+mod comparisons;
 mod flows;
+mod formulas;
 mod intervals;
 mod known;
 mod networks;
@@ -139,6 +141,9 @@ fn bound_of(query: &StatisticalQuery) -> &RunBound {
         Statistical::Probability(bound, _)
         | Statistical::Hypothesis { bound, .. }
         | Statistical::Expectation { bound, .. }
+        | Statistical::Comparison {
+            left: (bound, _), ..
+        }
         | Statistical::Simulation(Simulation { bound, .. }) => bound,
     }
 }

@@ -154,9 +154,9 @@ fn a_model_without_meaning_is_refused_for_what_statistical_queries_cannot_read()
     let text = "
         clock x, y; double d = 0.5;
         process P() {
-            state a { x <= 2.5 };
+            state a { x <= 2.5 && y' == 1 && y' == 2 };
             init a;
-            trans a -> a { guard x * y >= d; };
+            trans a -> a { guard x >= d; };
         }
         system P;";
     let Err(rejection) = LoadedModel::load("model.xta", text.as_bytes()) else {
@@ -165,7 +165,7 @@ fn a_model_without_meaning_is_refused_for_what_statistical_queries_cannot_read()
     let [only] = &rejection.rendered[..] else {
         panic!("there is one mistake: {:?}", rejection.rendered);
     };
-    assert!(only.contains("E0283") && only.contains("x * y"), "{only}");
+    assert!(only.contains("E0285") && only.contains("y' == 2"), "{only}");
 }
 
 #[test]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -259,3 +260,38 @@ def test_runs_are_shown(model: Model, tmp_path: Path, capsys: pytest.CaptureFixt
     assert lines[-3] == "x:"
     assert lines[-2].startswith("[0]: (0,0) ")
     assert lines[-1].endswith(" (3,3)")
+
+
+def test_two_probabilities_are_compared(model: Model) -> None:
+    query = "Pr[<=3](<> P.B) >= Pr[<=3](<> Q.B)"
+    answer = model.check(query)
+    assert answer.verdict == "satisfied"
+    estimate = answer.estimate
+    assert estimate is not None
+    assert estimate.compared is not None
+    assert estimate.value == pytest.approx(1 - math.exp(-1.5), abs=0.1)
+    assert estimate.compared.value == pytest.approx(0.5, abs=0.1)
+    assert estimate.compared.runs == estimate.runs
+    assert model.check("Pr[<=3](<> P.B) <= Pr[<=3](<> Q.B)").verdict == "not satisfied"
+    undecided = model.check("Pr[<=3](<> P.B) >= Pr[<=3](<> P.B)", runs=10)
+    assert undecided.verdict == "maybe"
+    assert undecided.message is not None
+
+
+def test_formulas_over_time(model: Model) -> None:
+    answer = model.check("Pr(!Q.B U[3,4] Q.B && (P.A || P.B))", runs=20_000)
+    assert answer.value == pytest.approx(0.5, abs=0.02)
+    # The run ends where the formula is decided, not at its horizon.
+    assert model.check("Pr([][0,900000000](Q.A || P.A || P.B))", runs=10).value == 1.0
+
+
+def test_mistakes_in_statistical_queries_have_a_place(model: Model) -> None:
+    for query, says in (
+        ("Pr[<=3](<> P.B", "expected `)` after what is asked of a run"),
+        ("Pr(<> P.B)", "nothing says how long the runs are"),
+        ("Pr(<>[3,1] P.B)", "no distance is at least 3 and at most 1"),
+        ("Pr[<=x](<> P.B)", "must be known"),
+        ("Pr[<=3](<> P.B) = 1", "a probability is not compared by `=`"),
+    ):
+        with pytest.raises(InputError, match=re.escape(says)):
+            model.check(query)

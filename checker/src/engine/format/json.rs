@@ -110,8 +110,14 @@ pub fn real(value: f64) -> Json {
 }
 
 /// What a statistical query found out: `lower` and `upper` bound the interval at this `confidence`;
-/// expectations have no `satisfied_runs`.
+/// expectations have no `satisfied_runs`. `compared` is the estimate of the second probability of a
+/// comparison, with its value.
 pub fn estimate(estimate: &Estimate) -> Json {
+    let compared = estimate.compared.as_deref().map(|compared| {
+        let mut object = self::estimate(compared);
+        object["value"] = real(compared.value);
+        object
+    });
     json!({
         "lower": real(estimate.lower),
         "upper": real(estimate.upper),
@@ -119,6 +125,7 @@ pub fn estimate(estimate: &Estimate) -> Json {
         "method": estimate.method.name(),
         "runs": estimate.runs,
         "satisfied_runs": estimate.satisfied_runs,
+        "compared": compared,
     })
 }
 

@@ -147,6 +147,12 @@ impl LoadedModel {
                 "ask for this one alone",
             ));
         }
+        if matches!(query.kind, Statistical::Comparison { .. }) {
+            return Err(refused(
+                "a comparison has runs of its own, and no part in a joint guarantee",
+                "ask for this one alone",
+            ));
+        }
         if let Some((message, help)) = contradiction(&query.kind, precision) {
             return Err(refused(message, help));
         }

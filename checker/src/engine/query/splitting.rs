@@ -30,6 +30,13 @@ impl LoadedModel {
             let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
             return Err(Rejection::new(vec![error], &self.sources));
         }
+        if matches!(path, Path::Formula(_)) {
+            let message =
+                "levels lead to a state, and whether a formula holds is seen of whole runs";
+            let help = "ask for a state: Pr[…](<> p) or Pr[…](p U q), without bounds behind them";
+            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
+            return Err(Rejection::new(vec![error], &self.sources));
+        }
         // Whatever `E` can measure is a level.
         let text = self.add_query(&format!("E[<=1; 1](max: {})", wanted.levels));
         let measured = self.statistical_query(text.span);

@@ -19,7 +19,7 @@ use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
     Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand, ValuesOfRuns,
-    ZENO_MOVES, ZENO_TIME, estimate_rare, estimate_watched, simulate,
+    ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -112,6 +112,14 @@ impl LoadedModel {
                     Ok(Found {
                         estimate: Some(rare.estimate.clone()),
                         rare: Some(rare),
+                        ..Found::default()
+                    })
+                }
+                kind @ Statistical::Comparison { .. } => {
+                    let ends = |number| runs.ends(number);
+                    let estimate = compare(network, executor, kind, &precision, ends)?;
+                    Ok(Found {
+                        estimate: Some(estimate),
                         ..Found::default()
                     })
                 }
@@ -335,7 +343,10 @@ pub(super) fn contradiction(
 const NO_RUN: &str = "no run has ended until then: bound runs by less, and see that the clock that bounds them is not set back";
 
 fn is_test(query: &Statistical) -> bool {
-    matches!(query, Statistical::Hypothesis { .. })
+    matches!(
+        query,
+        Statistical::Hypothesis { .. } | Statistical::Comparison { .. }
+    )
 }
 
 /// The verdict that goes with an estimate.
@@ -363,6 +374,12 @@ pub(super) fn remark(
         (Statistical::Hypothesis { .. }, Verdict::Maybe) => {
             Some("these runs do not decide the test")
         }
+        (Statistical::Comparison { .. }, Verdict::Maybe) => {
+            Some("these runs do not decide which of the two is greater")
+        }
+        (Statistical::Comparison { .. }, _) => Some(
+            "decided by a sequential test of pairs of runs; the intervals are those of as many runs",
+        ),
         (Statistical::Hypothesis { .. }, _) => {
             Some("decided by a sequential test; the interval is that of as many runs")
         }

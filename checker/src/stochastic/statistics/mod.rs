@@ -6,6 +6,7 @@
 mod binomial;
 mod bounded_mean;
 mod distribution;
+mod double_sampling;
 #[cfg(test)]
 pub(super) mod draws;
 mod expectation;
@@ -17,6 +18,7 @@ mod sequential_test;
 pub use binomial::{Interval, clopper_pearson};
 pub use bounded_mean::BoundedMean;
 pub use distribution::Distribution;
+pub use double_sampling::DoubleSampling;
 pub use expectation::Expectation;
 pub use fixed_width::FixedWidth;
 pub use method::Method;

@@ -120,14 +120,96 @@ fn statistical_queries_are_read() {
         "simulate[<=10; 5]{ x} : 2 : p",
     );
     check("simulate N [#<=10] {x} : p", "simulate[#<=10; N]{ x} : p");
+    check(
+        "Pr[<=9](<> p) >= Pr[#<=3; 50]([] q)",
+        "Pr[<=9](<> p) >= Pr[#<=3; 50]([] q)",
+    );
+    check("Pr[<=9](p U q) <= Pr(X p)", "Pr[<=9](p U q) <= Pr((X p))");
+}
+
+#[test]
+fn older_forms_of_statistical_queries_are_read() {
+    check("Pr[c<=5] (<> p) ?", "Pr[c<=5](<> p)");
+    check(
+        "simulate (N+1) [<=10] {x, y,}",
+        "simulate[<=10; (Add N 1)]{ x y}",
+    );
+}
+
+#[test]
+fn formulas_over_time() {
+    check("Pr(<>[0,2] q)", "Pr((<>[0,2] q))");
+    check("Pr((p U[1,N+1] q))", "Pr((U[1,(Add N 1)] p q))");
+    check("Pr ([][0,9] p)", "Pr(([][0,9] p))");
+    check("Pr[<=5](X p)", "Pr[<=5]((X p))");
+    check("Pr(p R[0,3] q)", "Pr((R[0,3] p q))");
+    // Operators over time bind most loosely, and take all to their right.
+    check(
+        "Pr(a && b U[0,1] c || d)",
+        "Pr((U[0,1] (And a b) (Or c d)))",
+    );
+    check("Pr(p || <>[0,1] q && r)", "Pr((or p (<>[0,1] (And q r))))");
+    check(
+        "Pr(([][0,9](a != 0 || (b == 1 U[0,3] a == 1))))",
+        "Pr(([][0,9] (or (NotEqual a 0) (U[0,3] (Equal b 1) (Equal a 1)))))",
+    );
+    check(
+        "Pr(!(<>[0,1] p) and not (q imply X r))",
+        "Pr((and (not (<>[0,1] p)) (not (or (not q) (X r)))))",
+    );
+    check("Pr[<=9](<> (p U[0,1] q))", "Pr[<=9]((<> (U[0,1] p q)))");
+    // Names of the operators stay names where none can stand.
+    check("Pr[<=9](<> X > U + R)", "Pr[<=9](<> (Greater X (Add U R)))");
+    check("Pr(X.a U[0,1] X)", "Pr((U[0,1] (. X a) X))");
+    // Parentheses of expressions are no parentheses of formulas.
+    check(
+        "Pr((a + 1) * 2 > 3 U[0,1] ((b)))",
+        "Pr((U[0,1] (Greater (Multiply (Add a 1) 2) 3) b))",
+    );
+}
+
+#[test]
+fn mistakes_in_statistical_queries() {
+    check_mistake("Pr[<=10](<> p", "expected `)` after what is asked of a run");
+    check_mistake(
+        "Pr[<=10] <> p",
+        "expected `(` before what is asked of a run",
+    );
+    check_mistake(
+        "Pr[<=10](<> p) > 0.5",
+        "a probability is not compared by `>`",
+    );
+    check_mistake("Pr[<=10](<> p) = ?", "a probability is not compared by `=`");
+    check_mistake(
+        "Pr[10](<> p)",
+        "E0105 at 1:4 \"this does not bound the runs\"",
+    );
+    check_mistake("Pr[#10](<> p)", "expected `<=` before the number of moves");
+    check_mistake(
+        "Pr(<>[0] p)",
+        "expected `,` between the bounds of the operator",
+    );
+    check_mistake(
+        "Pr(<>[0,2 p)",
+        "expected `]` after the bounds of the operator",
+    );
+    check_mistake("Pr(p U[0,2])", "expected an expression");
+    check_mistake("Pr[<=10](<> p &&)", "expected an expression");
+    check_mistake("simulate [<=10] x", "expected `{` before what is shown");
+    check_mistake(
+        "simulate 5 [<=10; 5] {x}",
+        "the number of runs is given twice",
+    );
+    check_mistake(
+        "simulate {x}",
+        "expected the bound of the runs, or their number",
+    );
+    check_mistake("E[<=10; 5](avg: x)", "expected `max:` or `min:`");
+    check_mistake("E[<=10; 5](max: x / (y z))", "E0105");
 }
 
 #[test]
 fn unsupported_queries_are_named() {
-    check(
-        "Pr (<>[0,3] p \\/ q)",
-        "unsupported: statistical model checking",
-    );
     check("Pmax", "unsupported: statistical model checking");
     check(
         "strategy S = minE(c)[<=9]{P.location}->{x}: <> g under T",

@@ -2,8 +2,8 @@
 
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
-    Control, Document, Estimated, Expr, ExprKind, Objective, Path, Query, QueryKind, RunBound,
-    RunLimit, Statistical, TypeExpr, TypeKind,
+    Control, Document, Estimated, Expr, ExprKind, Formula, Interval, Objective, Path, Query,
+    QueryKind, RunBound, RunLimit, Statistical, TypeExpr, TypeKind,
 };
 use checker::syntax::{Parsed, parse_query, print_type, read_model};
 
@@ -199,6 +199,18 @@ fn statistical_shape(query: &Statistical) -> String {
                 shape(threshold)
             )
         }
+        Statistical::Comparison {
+            left,
+            right,
+            at_least,
+        } => {
+            let relation = if *at_least { ">=" } else { "<=" };
+            format!(
+                "{} {relation} {}",
+                estimated_shape(left),
+                estimated_shape(right)
+            )
+        }
         Statistical::Expectation {
             bound,
             maximum,
@@ -232,8 +244,43 @@ fn estimated_shape(estimated: &Estimated) -> String {
         Path::Eventually(p) => format!("<> {}", shape(p)),
         Path::Always(p) => format!("[] {}", shape(p)),
         Path::Until(p, q) => format!("{} U {}", shape(p), shape(q)),
+        Path::Formula(formula) => formula_shape(formula),
     };
-    format!("Pr{}({path})", bound_shape(&estimated.bound))
+    let bound = estimated.bound.as_ref().map_or(String::new(), bound_shape);
+    format!("Pr{bound}({path})")
+}
+
+fn formula_shape(formula: &Formula) -> String {
+    let interval = |interval: &Option<Interval>| {
+        interval.as_ref().map_or(String::new(), |interval| {
+            format!("[{},{}]", shape(&interval.from), shape(&interval.to))
+        })
+    };
+    match formula {
+        Formula::State(p) => shape(p),
+        Formula::Not(f) => format!("(not {})", formula_shape(f)),
+        Formula::And(f, g) => format!("(and {} {})", formula_shape(f), formula_shape(g)),
+        Formula::Or(f, g) => format!("(or {} {})", formula_shape(f), formula_shape(g)),
+        Formula::Next(f) => format!("(X {})", formula_shape(f)),
+        Formula::Eventually(i, f) => format!("(<>{} {})", interval(i), formula_shape(f)),
+        Formula::Always(i, f) => format!("([]{} {})", interval(i), formula_shape(f)),
+        Formula::Until(i, f, g) => {
+            format!(
+                "(U{} {} {})",
+                interval(i),
+                formula_shape(f),
+                formula_shape(g)
+            )
+        }
+        Formula::Release(i, f, g) => {
+            format!(
+                "(R{} {} {})",
+                interval(i),
+                formula_shape(f),
+                formula_shape(g)
+            )
+        }
+    }
 }
 
 fn bound_shape(bound: &RunBound) -> String {

@@ -1,0 +1,82 @@
+//! Answers `Pr[…](…) >= Pr[…](…)`: runs in pairs, until the test decides.
+
+use super::estimate::share;
+use super::failure::Failure;
+use super::in_order::in_order;
+use super::precision::{Estimate, Precision};
+use super::run_watch::Ends;
+use super::statistics::{Decision, DoubleSampling};
+use crate::exec::Executor;
+use crate::ir::{Network, Statistical};
+
+/// After so many pairs the test gives up: two probabilities that are both near to 0 or 1 hardly
+/// ever differ, and those that are equal may never be told apart.
+const MOST_PAIRS: u64 = 1_000_000;
+
+/// Answers a comparison; `ends` is asked now and then, with the number of runs so far. Runs 2k and
+/// 2k + 1 are a pair.
+///
+/// # Errors
+/// A run failed: that of the pair with the least number.
+///
+/// # Panics
+/// The query is no comparison.
+pub fn compare(
+    network: &Network,
+    executor: &dyn Executor,
+    query: &Statistical,
+    precision: &Precision,
+    mut ends: impl FnMut(u64) -> bool,
+) -> Result<Estimate, Failure> {
+    let Statistical::Comparison {
+        left,
+        right,
+        at_least,
+    } = query
+    else {
+        panic!("this compares no probabilities");
+    };
+    let mut test = DoubleSampling::new(precision.odds_ratios, precision.alpha, precision.beta);
+    let mut decision = None;
+    let (mut pairs, mut first, mut second) = (0, 0, 0);
+    let said = left.0.runs.max(right.0.runs);
+    let most = precision.runs.or(said).unwrap_or(MOST_PAIRS);
+    let seed = precision.seed;
+    in_order(
+        (network, executor),
+        precision.threads,
+        |runner, pair| {
+            let left = runner.path((seed, 2 * pair), &left.0, &left.1)?;
+            let right = runner.path((seed, 2 * pair + 1), &right.0, &right.1)?;
+            Ok((left.satisfied, right.satisfied))
+        },
+        |(left, right)| {
+            pairs += 1;
+            first += u64::from(left);
+            second += u64::from(right);
+            // p <= q is q >= p.
+            let (greater, smaller) = if *at_least {
+                (left, right)
+            } else {
+                (right, left)
+            };
+            decision = test.push(greater, smaller);
+            decision.is_some() || pairs >= most
+        },
+        &mut Ends(|pairs| ends(2 * pairs)),
+    )?;
+    Ok(estimate((pairs, first, second), decision, precision.alpha))
+}
+
+fn estimate(
+    (pairs, first, second): (u64, u64, u64),
+    decision: Option<Decision>,
+    alpha: f64,
+) -> Estimate {
+    let is_complete = decision.is_some();
+    Estimate {
+        decision,
+        compared: Some(Box::new(share((pairs, second), alpha, is_complete))),
+        ..share((pairs, first), alpha, is_complete)
+    }
+}
