@@ -30,6 +30,7 @@ impl Checker<'_> {
             | Kind::ClockCompare { .. }
             | Kind::ClockSum(_)
             | Kind::Rate { .. }
+            | Kind::Random(..)
             | Kind::AssignClock { .. } => true,
             _ => false,
         })

@@ -69,6 +69,8 @@ impl Builder<'_> {
                 let arguments = self.stable_values(arguments);
                 let site = self.site(expr.span);
                 let target = self.register(RegisterType::Double);
+                // The random numbers lie in the state.
+                self.effects.reads_state = true;
                 self.emit(Instruction::Random {
                     distribution: *distribution,
                     target,
