@@ -294,7 +294,7 @@ fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), Box<dyn
     let mut compiled = None;
     let mut model = model.filter(|_| !found.iter().any(Diagnostic::is_error));
     if let (Some(model), Some(parsed)) = (&mut model, parsed) {
-        let (query, more) = model.compile_statistical(&parsed, &sources);
+        let (query, more) = model.compile_statistical(&parsed, &sources, &[]);
         found.extend(more);
         compiled = query;
     }

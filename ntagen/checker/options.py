@@ -25,6 +25,7 @@ CodeEngine = Literal["jit", "interpreter"]
 PlansWanted = Literal["none", "all"]
 StrategyWanted = Literal["winner", "controller"]
 TraceWanted = Literal["any", "shortest", "fastest"]
+UnderChoice = Literal["race", "eager", "lazy"]
 MeanInterval = Literal["auto", "student", "bernstein", "dkw"]
 
 Progress = Callable[[int, int, int, int], object]
@@ -130,6 +131,11 @@ class Options:
     discretisation: float | None = None
     """The step with which equations of clocks are solved, in units of the model, instead of steps
     that their errors choose."""
+
+    under_choice: UnderChoice = "race"
+    """When the controller moves in random runs under a strategy that lets it choose: its processes
+    ``race`` for what the strategy allows, until it demands a move; or it moves as soon as it may
+    (``eager``), or only when it must (``lazy``)."""
 
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""

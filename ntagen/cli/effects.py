@@ -76,10 +76,7 @@ def idle_options(
             "--reductions has no effect here: of the reductions games make live-variables only, "
             "and strategies and plans are about states with all their values"
         )
-    if not any(query.is_statistical for query in queries):
-        notes += _without_statistics(given, values)
-    else:
-        notes += _without_levels(given, values)
+    notes += _of_statistics(given, values, queries)
     if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
         notes.append("--allow-write has no effect here: no query saves a strategy")
     if "max_plans" in given and not values["plans"]:
@@ -91,24 +88,26 @@ def idle_options(
     return notes
 
 
-def _without_levels(given: Collection[str], values: Mapping[str, object]) -> list[str]:
-    """A note for each option of importance splitting, if there is none."""
-    return [
-        f"--{name} has no effect without --levels"
-        for name in ("effort", "repetitions")
-        if name in given and values["levels"] is None
-    ]
-
-
-def _without_statistics(given: Collection[str], values: Mapping[str, object]) -> list[str]:
-    """A note for each option of statistical queries, if no query is one."""
-    notes = [
-        f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
-        for name in (*STATISTICAL, "joint")
-        if name in given
-    ]
-    if "seed" in given and values["search"] != "random":
-        notes.append("--seed has no effect without --search random or a statistical query")
+def _of_statistics(
+    given: Collection[str], values: Mapping[str, object], queries: Sequence[QueryForm]
+) -> list[str]:
+    """A note for each option of statistical queries, if no query takes it."""
+    if any(query.is_statistical for query in queries):
+        notes = [
+            f"--{name} has no effect without --levels"
+            for name in ("effort", "repetitions")
+            if name in given and values["levels"] is None
+        ]
+    else:
+        notes = [
+            f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
+            for name in (*STATISTICAL, "joint")
+            if name in given
+        ]
+        if "seed" in given and values["search"] != "random":
+            notes.append("--seed has no effect without --search random or a statistical query")
+    if "under_choice" in given and not any(one.is_statistical and one.uses for one in queries):
+        notes.append("--under-choice has no effect here: no statistical query is under a strategy")
     return notes
 
 

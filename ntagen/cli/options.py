@@ -122,6 +122,15 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         "the same runs.  [default: 0]",
     ),
     **STATISTICAL,
+    "under_choice": click.option(
+        "--under-choice",
+        type=click.Choice(["race", "eager", "lazy"]),
+        default="race",
+        help="For Pr, E and simulate under a strategy that lets the controller choose: its "
+        "processes draw delays as without the strategy, until it demands a move (race), or the "
+        "controller moves as soon as it may (eager), or only when it must (lazy).  "
+        "[default: race]",
+    ),
     "reductions": click.option(
         "--reductions",
         metavar="all|none|LIST",

@@ -7,8 +7,8 @@ use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
-use crate::stochastic::Precision;
 use crate::stochastic::statistics::Interval;
+use crate::stochastic::{Precision, UnderChoice};
 use crate::tuning::Tuning;
 
 /// What runs the code of the model.
@@ -183,6 +183,8 @@ pub struct Options {
     pub tuning: Tuning,
     /// What statistical queries promise; [`Options::threads`] counts for them too.
     pub precision: Precision,
+    /// When the controller moves in random runs where a strategy lets it choose.
+    pub under_choice: UnderChoice,
     /// Sees what the runs of a statistical query say while they are made.
     pub run_observer: Option<RunObserver>,
 }

@@ -10,6 +10,8 @@ use crate::diagnostics::Span;
 pub struct StatisticalQuery {
     /// The text, blanks collapsed.
     pub text: String,
+    /// The strategy that the controller follows, if any.
+    pub under: Option<String>,
     /// What is asked.
     pub kind: Statistical,
     /// The whole query.

@@ -14,7 +14,7 @@ use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
 use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
-use crate::stochastic::{MeanMethod, Precision};
+use crate::stochastic::{MeanMethod, Precision, UnderChoice};
 use crate::tuning::Tuning;
 
 /// The options that a Python value holds.
@@ -49,6 +49,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         folder: field(given, "folder")?,
         allow_write: field(given, "allow_write")?,
         precision: precision(given)?,
+        under_choice: under_choice(&text("under_choice")?)?,
         run_observer: run_observer(field(given, "run_progress")?, is_raised),
         rare: rare_event(given)?,
         ..Options::default()
@@ -141,6 +142,15 @@ fn order(name: &str, seed: u64) -> PyResult<Order> {
         "dfs" => Ok(Order::DepthFirst),
         "random" => Ok(Order::Random(seed)),
         other => Err(unknown("search order", other)),
+    }
+}
+
+fn under_choice(name: &str) -> PyResult<UnderChoice> {
+    match name {
+        "race" => Ok(UnderChoice::Race),
+        "eager" => Ok(UnderChoice::Eager),
+        "lazy" => Ok(UnderChoice::Lazy),
+        other => Err(unknown("choice under a strategy", other)),
     }
 }
 

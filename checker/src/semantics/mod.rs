@@ -181,8 +181,9 @@ impl Model {
         &mut self,
         query: &ast::Query,
         sources: &SourceMap,
+        strategies: &[String],
     ) -> (Option<ir::StatisticalQuery>, Vec<Diagnostic>) {
-        self.compile(sources, |checker| checker.statistical(query))
+        self.compile(sources, |checker| checker.statistical(query, strategies))
     }
 
     /// Adds what a query brings to the network.

@@ -51,7 +51,7 @@ impl Checker<'_> {
         })
     }
 
-    fn known_strategy(&mut self, name: &ast::Name, strategies: &[String]) {
+    pub(super) fn known_strategy(&mut self, name: &ast::Name, strategies: &[String]) {
         if !strategies.contains(&name.text) {
             let help = if strategies.is_empty() {
                 String::from("define it first: strategy S = control: …")

@@ -13,18 +13,16 @@ use crate::syntax::ast;
 
 impl Checker<'_> {
     /// Checks and lowers a statistical query.
-    pub(super) fn statistical(&mut self, query: &ast::Query) -> Option<ir::StatisticalQuery> {
+    pub(super) fn statistical(
+        &mut self,
+        query: &ast::Query,
+        strategies: &[String],
+    ) -> Option<ir::StatisticalQuery> {
         let ast::QueryKind::Statistical(asked) = &query.kind else {
             return None;
         };
         if let Some(under) = &query.under {
-            self.error(
-                codes::QUERY_UNSUPPORTED,
-                under.span,
-                "statistical queries under a strategy are not supported",
-                "ask without `under`",
-            );
-            return None;
+            self.known_strategy(under, strategies);
         }
         if self.world.network.features.priorities {
             self.error(
@@ -111,6 +109,7 @@ impl Checker<'_> {
         };
         Some(ir::StatisticalQuery {
             text: collapse(self.sources.text(query.span)),
+            under: query.under.as_ref().map(|name| name.text.clone()),
             kind,
             span: query.span,
         })

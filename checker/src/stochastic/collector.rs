@@ -2,6 +2,7 @@
 //!
 //! Results come in the order of run numbers, so what is said does not depend on threads.
 
+use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, MeanMethod, Precision};
@@ -253,7 +254,8 @@ pub fn estimate(
     precision: &Precision,
     ends: impl FnMut(u64) -> bool,
 ) -> Result<Estimate, Failure> {
-    estimate_watched(network, executor, query, precision, &mut Ends(ends))
+    let behaviour = Behaviour::new(network, executor);
+    estimate_watched(behaviour, query, precision, &mut Ends(ends))
 }
 
 /// Answers a statistical query whose runs are watched.
@@ -261,13 +263,11 @@ pub fn estimate(
 /// # Errors
 /// A run failed: the one with the least number.
 pub fn estimate_watched(
-    network: &Network,
-    executor: &dyn Executor,
+    behaviour: Behaviour<'_>,
     query: &Statistical,
     precision: &Precision,
     ends: &mut dyn RunWatch,
 ) -> Result<Estimate, Failure> {
-    let program = (network, executor);
     let mut collector = Collector::new(query, precision);
     let mut failure = None;
     let mut push = |value: f64| match collector.push(value) {
@@ -281,7 +281,7 @@ pub fn estimate_watched(
     let is_complete = match query {
         Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
             in_order(
-                program,
+                behaviour,
                 precision.threads,
                 |runner, run| runner.path((seed, run), bound, path),
                 |outcome| push(f64::from(outcome.satisfied)),
@@ -294,7 +294,7 @@ pub fn estimate_watched(
             value,
             ..
         } => in_order(
-            program,
+            behaviour,
             precision.threads,
             |runner, run| runner.extreme((seed, run), bound, *value, *maximum),
             |(value, _)| push(value),

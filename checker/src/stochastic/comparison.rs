@@ -1,13 +1,13 @@
 //! Answers `Pr[…](…) >= Pr[…](…)`: runs in pairs, until the test decides.
 
+use super::behaviour::Behaviour;
 use super::estimate::share;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
 use super::run_watch::Ends;
 use super::statistics::{Decision, DoubleSampling};
-use crate::exec::Executor;
-use crate::ir::{Network, Statistical};
+use crate::ir::Statistical;
 
 /// After so many pairs the test gives up: two probabilities that are both near to 0 or 1 hardly
 /// ever differ, and those that are equal may never be told apart.
@@ -22,8 +22,7 @@ const MOST_PAIRS: u64 = 1_000_000;
 /// # Panics
 /// The query is no comparison.
 pub fn compare(
-    network: &Network,
-    executor: &dyn Executor,
+    behaviour: Behaviour<'_>,
     query: &Statistical,
     precision: &Precision,
     mut ends: impl FnMut(u64) -> bool,
@@ -43,7 +42,7 @@ pub fn compare(
     let most = precision.runs.or(said).unwrap_or(MOST_PAIRS);
     let seed = precision.seed;
     in_order(
-        (network, executor),
+        behaviour,
         precision.threads,
         |runner, pair| {
             let left = runner.path((seed, 2 * pair), &left.0, &left.1)?;

@@ -1,13 +1,13 @@
 //! Answers to statistical queries: which results of runs are looked at, and until when.
 
+use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
 use super::run::Trajectory;
 use super::run_watch::Ends;
 use super::statistics::{Method, clopper_pearson};
-use crate::exec::Executor;
-use crate::ir::{Network, Simulation};
+use crate::ir::Simulation;
 
 /// The runs that a query shows.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,8 +32,7 @@ const POINTS_OF_A_RUN: usize = 16;
 /// # Errors
 /// A run failed: the one with the least number.
 pub fn simulate(
-    network: &Network,
-    executor: &dyn Executor,
+    behaviour: Behaviour<'_>,
     query: &Simulation,
     precision: &Precision,
     ends: impl FnMut(u64) -> bool,
@@ -43,7 +42,7 @@ pub fn simulate(
     let mut shown = Vec::new();
     let (mut made, mut points, mut is_cut) = (0, 0, false);
     let is_complete = in_order(
-        (network, executor),
+        behaviour,
         precision.threads,
         |runner, run| runner.trajectory((precision.seed, run), query),
         |trajectory| {

@@ -41,6 +41,8 @@ pub enum Failure {
     NoNumber,
     /// A value whose mean is asked for lies outside the bounds that the user gave.
     ValueOutOfBounds(f64),
+    /// The strategy demands a move that is not possible.
+    ImpossibleDemand,
     /// A comparison changes more often than numbers can tell apart.
     NoProgress(Stand),
 }

@@ -7,12 +7,11 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::run::Runner;
 use super::run_watch::{RunWatch, Shows};
 use crate::cancellation::{self, Cut};
-use crate::exec::Executor;
-use crate::ir::Network;
 
 /// How long a block of runs should take.
 const BLOCK_TIME: Duration = Duration::from_millis(10);
@@ -26,15 +25,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// Makes runs 0, 1, … and consumes their results in this order until `consume` returns true or
 /// `watch`, asked now and then, ends them. Returns whether `consume` ended it.
 pub(super) fn in_order<T: Send + Shows>(
-    (network, executor): (&Network, &dyn Executor),
+    behaviour: Behaviour<'_>,
     threads: usize,
     run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
     mut consume: impl FnMut(T) -> bool,
     watch: &mut dyn RunWatch,
 ) -> Result<bool, Failure> {
-    let mut runners: Vec<Runner<'_>> = (0..threads.max(1))
-        .map(|_| Runner::new(network, executor))
-        .collect();
+    let mut runners: Vec<Runner<'_>> = (0..threads.max(1)).map(|_| Runner::of(behaviour)).collect();
     let (mut first, mut share, mut consumed) = (0_u64, 1_u64, 0_u64);
     loop {
         let start = Instant::now();

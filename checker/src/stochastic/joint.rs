@@ -10,6 +10,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use super::behaviour::Behaviour;
 use super::collector::Collector;
 use super::extreme::Extreme;
 use super::failure::Failure;
@@ -18,8 +19,7 @@ use super::mitl::Watch;
 use super::precision::{Estimate, Precision};
 use super::run::{Runner, watched};
 use super::run_watch::Ends;
-use crate::exec::Executor;
-use crate::ir::{Network, Path, RunBound, Statistical};
+use crate::ir::{Path, RunBound, Statistical};
 
 /// Answers queries for estimates or tests from the same runs; all have the same bound. The risks
 /// of `precision` are those of each query alone. `ends` is asked now and then, with the number of
@@ -28,8 +28,7 @@ use crate::ir::{Network, Path, RunBound, Statistical};
 /// # Errors
 /// A run failed: the one with the least number.
 pub fn estimate_jointly(
-    network: &Network,
-    executor: &dyn Executor,
+    behaviour: Behaviour<'_>,
     queries: &[&Statistical],
     precision: &Precision,
     ends: impl FnMut(u64) -> bool,
@@ -44,7 +43,7 @@ pub fn estimate_jointly(
     let open: Vec<AtomicBool> = queries.iter().map(|_| AtomicBool::new(true)).collect();
     let mut failure = None;
     in_order(
-        (network, executor),
+        behaviour,
         precision.threads,
         |runner, run| runner.all((precision.seed, run), bound, queries, &open),
         |results| {

@@ -3,9 +3,12 @@
 //! Every run draws from a generator of its own, numbered by the run: run k of a seed is the same
 //! whatever the number of threads, and results count in the order of run numbers.
 
+mod advice;
+mod behaviour;
 mod collector;
 mod comparison;
 mod condition;
+mod correspondence;
 mod estimate;
 mod extreme;
 mod failure;
@@ -19,6 +22,7 @@ mod precision;
 mod program;
 mod race;
 mod rare;
+mod restriction;
 mod run;
 mod run_watch;
 mod samples;
@@ -28,6 +32,7 @@ pub mod statistics;
 mod values_of_runs;
 mod windows;
 
+pub use behaviour::Behaviour;
 pub use collector::{estimate, estimate_watched};
 pub use comparison::compare;
 pub use estimate::{Simulated, simulate};
@@ -36,6 +41,7 @@ pub use joint::{bound_of, estimate_jointly};
 pub use precision::{Estimate, MeanMethod, Precision};
 pub use race::{ZENO_MOVES, ZENO_TIME};
 pub use rare::{Rare, Splitting, estimate_rare};
+pub use restriction::{Restriction, UnderChoice, Unfit};
 pub use run::{Outcome, Runner, Trajectory};
 pub use run_watch::{RunWatch, Shown};
 pub use samples::{Distribution, Histogram, MOST_BINS, MOST_VALUES, Samples};

@@ -58,6 +58,8 @@ pub(super) struct Spot {
     pub(super) exponential_rate: Option<Number>,
     /// Sets the rates of clocks.
     pub(super) rates: Option<FunctionId>,
+    /// Whether the controller owns the edge of an output.
+    pub(super) is_controllable: bool,
     /// Whether its outputs that are enabled stay so as time passes, and none is on an urgent
     /// channel or needs a receiver.
     pub(super) is_plain: bool,
@@ -122,7 +124,9 @@ impl<'a> Program<'a> {
             let chances = &location.chances;
             self.has_rates |= chances.rates.is_some();
             self.has_flows |= chances.flows.contains(&true);
-            let is_plain = self.instances[outputs.0 as usize..outputs.1 as usize]
+            let known = &self.instances[outputs.0 as usize..outputs.1 as usize];
+            let is_controllable = known.iter().any(|one| one.edge.controllable);
+            let is_plain = known
                 .iter()
                 .all(|one| !one.guard.is_timed() && !one.is_binary && !one.may_be_urgent);
             let invariant = self.condition(&location.invariant, &[], machine);
@@ -136,6 +140,7 @@ impl<'a> Program<'a> {
                 inputs,
                 exponential_rate,
                 rates: chances.rates,
+                is_controllable,
                 is_plain,
             });
         }

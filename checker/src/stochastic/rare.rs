@@ -1,6 +1,7 @@
 //! Importance splitting of the runs of a network: the level is an expression of the state, looked
 //! at in every state that a run enters.
 
+use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
@@ -9,8 +10,7 @@ use super::run::{Runner, watched};
 use super::run_watch::Ends;
 use super::splitting::{End, Part, Parts, pilot, repetition};
 use super::statistics::{Expectation, Interval, Method};
-use crate::exec::Executor;
-use crate::ir::{FunctionId, Network, Path, RunBound};
+use crate::ir::{FunctionId, Path, RunBound};
 
 /// How a rare event is looked for.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +40,7 @@ pub struct Rare {
 /// # Errors
 /// A part of a run failed.
 pub fn estimate_rare(
-    network: &Network,
-    executor: &dyn Executor,
+    behaviour: Behaviour<'_>,
     (bound, path): (&RunBound, &Path),
     splitting: &Splitting,
     precision: &Precision,
@@ -49,7 +48,7 @@ pub fn estimate_rare(
 ) -> Result<Rare, Failure> {
     let seed = precision.seed;
     let level = splitting.level;
-    let mut runner = Runner::new(network, executor);
+    let mut runner = Runner::of(behaviour);
     let mut parts = RunParts {
         runner: &mut runner,
         seed,
@@ -61,7 +60,7 @@ pub fn estimate_rare(
     let mut mean = Expectation::default();
     let mut made = found.parts;
     let is_complete = in_order(
-        (network, executor),
+        behaviour,
         precision.threads,
         |runner, number| {
             let mut parts = RunParts {

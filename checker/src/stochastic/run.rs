@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use super::behaviour::Behaviour;
 use super::condition::Condition;
 use super::extreme::Extreme;
 use super::failure::Failure;
@@ -101,19 +102,15 @@ pub struct Runner<'a> {
 impl<'a> Runner<'a> {
     /// What makes runs of a network in the stochastic reading.
     pub fn new(network: &'a Network, executor: &'a dyn Executor) -> Runner<'a> {
-        Runner::with_step(network, executor, None)
+        Runner::of(Behaviour::new(network, executor))
     }
 
-    /// The same; differential equations are solved by Euler's method with this step, adaptively
-    /// without one.
-    pub fn with_step(
-        network: &'a Network,
-        executor: &'a dyn Executor,
-        fixed_step: Option<f64>,
-    ) -> Runner<'a> {
+    /// What makes runs in which the controller does only what a strategy allows, or equations are
+    /// solved by Euler's method.
+    pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
         Runner {
-            program: Arc::new(Program::new(network, executor)),
-            race: Race::new(network, executor, fixed_step),
+            program: Arc::new(Program::new(behaviour.network, behaviour.executor)),
+            race: Race::new(behaviour),
         }
     }
 

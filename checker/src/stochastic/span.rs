@@ -47,10 +47,7 @@ impl Machine<'_> {
     ) -> Result<Option<Span>, Failure> {
         let mut span = Span::ALL;
         for &(clock, relation, bound) in &comparisons.bounds {
-            let bound = match bound {
-                Number::Known(value) => value,
-                Number::Computed(function) => self.real(function, values)?,
-            };
+            let bound = self.number(bound, values)?;
             let (value, rate) = self.clock(clock);
             match span.and(compared(relation, value, bound, rate)) {
                 Some(both) => span = both,
@@ -59,15 +56,59 @@ impl Machine<'_> {
         }
         Ok(Some(span))
     }
+
+    /// Whether comparisons hold now, the condition on words left aside.
+    #[inline]
+    pub(super) fn compare(
+        &mut self,
+        comparisons: &Comparisons,
+        values: &[i32],
+    ) -> Result<bool, Failure> {
+        for &(clock, relation, bound) in &comparisons.bounds {
+            let bound = self.number(bound, values)?;
+            if !related(relation, self.clock(clock).0, bound) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    fn number(&mut self, number: Number, values: &[i32]) -> Result<f64, Failure> {
+        match number {
+            Number::Known(value) => Ok(value),
+            Number::Computed(function) => self.real(function, values),
+        }
+    }
+}
+
+/// Whether a number stands in a relation to a bound.
+#[inline]
+fn related(relation: Relation, value: f64, bound: f64) -> bool {
+    let gap = gap(value, bound);
+    match relation {
+        Relation::LessEqual => gap <= 0.0,
+        Relation::Less => gap < 0.0,
+        Relation::GreaterEqual => gap >= 0.0,
+        Relation::Greater => gap > 0.0,
+        Relation::Equal => gap == 0.0,
+        Relation::NotEqual => gap != 0.0,
+    }
+}
+
+/// The difference of two numbers; 0 if they count as equal.
+#[inline]
+fn gap(value: f64, bound: f64) -> f64 {
+    let gap = value - bound;
+    if gap.abs() <= TOLERANCE * value.abs().max(bound.abs()).max(1.0) {
+        return 0.0;
+    }
+    gap
 }
 
 /// When a number with this slope stands in a relation to a bound.
 #[inline]
 fn compared(relation: Relation, value: f64, bound: f64, slope: f64) -> Option<Span> {
-    let mut gap = value - bound;
-    if gap.abs() <= TOLERANCE * value.abs().max(bound.abs()).max(1.0) {
-        gap = 0.0;
-    }
+    let gap = gap(value, bound);
     match relation {
         Relation::LessEqual => at_most(gap, slope, false),
         Relation::Less => at_most(gap, slope, true),

@@ -2,7 +2,7 @@
 //! solutions in closed form.
 
 use checker::ir::Statistical;
-use checker::stochastic::{Precision, Runner, simulate};
+use checker::stochastic::{Behaviour, Precision, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -198,7 +198,10 @@ fn a_fixed_step_is_eulers() {
         panic!("it is an expectation");
     };
     let [_, jit] = executors(&network);
-    let mut runner = Runner::with_step(&network, &*jit, Some(0.25));
+    let mut runner = Runner::of(Behaviour {
+        fixed_step: Some(0.25),
+        ..Behaviour::new(&network, &*jit)
+    });
     let (found, _) = runner
         .extreme((1, 0), bound_of(&query), value, false)
         .expect("the run does not fail");
@@ -221,7 +224,13 @@ fn trajectories_follow_the_solution() {
         panic!("it shows runs");
     };
     let [_, jit] = executors(&network);
-    let shown = simulate(&network, &*jit, asked, &Precision::default(), |_| false).unwrap();
+    let shown = simulate(
+        Behaviour::new(&network, &*jit),
+        asked,
+        &Precision::default(),
+        |_| false,
+    )
+    .unwrap();
     let points = &shown.runs[0].points;
     assert!(points[0].len() > 100, "{} points", points[0].len());
     for &(time, value) in points[0].iter().filter(|point| point.0 > 0.0) {

@@ -3,7 +3,9 @@
 use checker::exec::Executor;
 use checker::ir::{Network, Statistical};
 use checker::stochastic::statistics::Method;
-use checker::stochastic::{Estimate, Failure, MeanMethod, Precision, estimate, estimate_jointly};
+use checker::stochastic::{
+    Behaviour, Estimate, Failure, MeanMethod, Precision, estimate, estimate_jointly,
+};
 
 use super::{executors, together};
 
@@ -188,8 +190,13 @@ fn queries_that_share_runs_have_the_answers_that_they_have_alone() {
             threads,
             ..Precision::default()
         };
-        let found = estimate_jointly(&network, &**executor, &kinds, &precision, |_| false)
-            .expect("no run fails");
+        let found = estimate_jointly(
+            Behaviour::new(&network, &**executor),
+            &kinds,
+            &precision,
+            |_| false,
+        )
+        .expect("no run fails");
         for ((alone, query), found) in compiled.iter().zip(&found) {
             let [_, jit] = executors(alone);
             let expected = asked((alone, &*jit), query, &precision).expect("no run fails");
@@ -225,8 +232,10 @@ fn joint_intervals_hold_all_together_as_often_as_promised() {
             alpha: 0.1 / 3.0,
             ..Precision::default()
         };
-        let found =
-            estimate_jointly(&network, &*jit, &kinds, &precision, |_| false).expect("no run fails");
+        let found = estimate_jointly(Behaviour::new(&network, &*jit), &kinds, &precision, |_| {
+            false
+        })
+        .expect("no run fails");
         let holds = found
             .iter()
             .zip(1..)

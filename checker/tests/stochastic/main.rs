@@ -29,6 +29,7 @@ mod random;
 mod random_networks;
 mod rare_events;
 mod refusals;
+mod under;
 mod values;
 
 /// A model in the stochastic reading, with a compiled query.
@@ -77,7 +78,7 @@ fn load_all(model: &str, queries: &[&str]) -> Result<(Network, Vec<StatisticalQu
         let (parsed, found) = syntax::parse_query(span, &sources);
         text(&found, &sources)?;
         let parsed = parsed.ok_or("no query")?;
-        let (query, found) = model.compile_statistical(&parsed, &sources);
+        let (query, found) = model.compile_statistical(&parsed, &sources, &[]);
         text(&found, &sources)?;
         compiled.push(query.ok_or("not statistical")?);
     }

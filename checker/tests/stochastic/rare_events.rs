@@ -2,7 +2,7 @@
 
 use checker::ir::{Network, Statistical};
 use checker::stochastic::statistics::Method;
-use checker::stochastic::{Failure, Precision, Rare, Splitting, estimate_rare};
+use checker::stochastic::{Behaviour, Failure, Precision, Rare, Splitting, estimate_rare};
 
 use super::{executors, together};
 
@@ -27,7 +27,13 @@ fn split(
         repetitions,
     };
     let asked = (bound, path);
-    estimate_rare(network, &*jit, asked, &splitting, precision, |_| false)
+    estimate_rare(
+        Behaviour::new(&network, &*jit),
+        asked,
+        &splitting,
+        precision,
+        |_| false,
+    )
 }
 
 /// A walk from 1, up with 3/10, until 0 or 25.

@@ -1,7 +1,7 @@
 //! Probabilities and expectations that have closed forms.
 
 use checker::ir::Statistical;
-use checker::stochastic::{Failure, Precision, Runner, simulate};
+use checker::stochastic::{Behaviour, Failure, Precision, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -392,7 +392,10 @@ fn a_filter_ends_the_run_where_it_holds() {
     };
     let [_, jit] = executors(&network);
     let precision = Precision::default();
-    let shown = simulate(&network, &*jit, asked, &precision, |_| false).expect("no run fails");
+    let shown = simulate(Behaviour::new(&network, &*jit), asked, &precision, |_| {
+        false
+    })
+    .expect("no run fails");
     assert_eq!(shown.runs.len(), 3);
     for run in &shown.runs {
         assert_eq!(run.points[0], [(0.0, 0.0), (3.0, 3.0)]);
@@ -458,4 +461,17 @@ fn a_committed_receiver_may_be_left_by_a_broadcast_of_others() {
         process Q() { state c, d; commit c; init c; trans c -> d { sync go?; }; }
         system P, Q;";
     expect(model, "Pr[<=1](<> P.b && Q.d)", 1.0);
+}
+
+#[test]
+fn a_strict_guard_does_not_hold_at_its_bound() {
+    let model = "
+        clock x;
+        broadcast chan go;
+        process P() { state a { x <= 1 }, b; init a; trans a -> b { guard x == 1; sync go!; }; }
+        process Q() { state c, d; init c; trans c -> d { guard x > 1; sync go?; }; }
+        process R() { state e, f; init e; trans e -> f { guard x >= 1; sync go?; }; }
+        system P, Q, R;";
+    expect(model, "Pr[<=2](<> P.b && R.f)", 1.0);
+    expect(model, "Pr[<=2](<> Q.d)", 0.0);
 }

@@ -295,3 +295,62 @@ def test_mistakes_in_statistical_queries_have_a_place(model: Model) -> None:
     ):
         with pytest.raises(InputError, match=re.escape(says)):
             model.check(query)
+
+
+GAME = """
+clock x;
+bool waiting = true;
+process C() {
+    state wait, done;
+    init wait;
+    trans wait -> done { guard x >= 2; assign waiting = false; };
+}
+process E() {
+    state calm { ; 50 }, alarm;
+    init calm;
+    trans calm -u-> alarm { guard x > 5 && waiting; };
+}
+c = C(); e = E();
+system c, e;
+"""
+SAFE = "strategy S = control: A[] not e.alarm"
+EARLY = "Pr[<=2](<> c.done) under S"
+
+
+def test_random_runs_follow_a_strategy(tmp_path: Path) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME, "utf-8")
+    game = load_file(path)
+    with pytest.raises(InputError, match="there is no strategy 'S'"):
+        game.check(EARLY)
+    assert game.check(SAFE).satisfied
+    assert game.check("Pr[<=20](<> e.alarm) under S", runs=500).value == 0
+    assert game.check("Pr[<=3](<> c.done) under S", runs=5000).value == pytest.approx(
+        1 / 3, abs=0.05
+    )
+    assert game.check(EARLY, runs=100, under_choice="eager").value == 1
+    assert game.check("Pr[<=4](<> c.done) under S", runs=100, under_choice="lazy").value == 0
+    shown = game.check("simulate[<=9; 2]{c.done} under S", under_choice="lazy").trajectories
+    assert [one.points["c.done"][-1] for one in shown] == [(9.0, 1.0)] * 2
+    with pytest.raises(ValueError, match="choice under a strategy"):
+        game.check(EARLY, under_choice="clever")
+
+
+def test_the_command_line_and_verifyta_follow_strategies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME, "utf-8")
+    queries = tmp_path / "game.q"
+    queries.write_text(f"{SAFE}\n{EARLY}\n", "utf-8")
+    arguments = ["check", str(path), "--query", SAFE, "--query", EARLY, "--runs", "50"]
+    assert main([*arguments, "--under-choice", "eager", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["value"] == 1
+    assert main([*arguments[:4], "--under-choice", "eager"]) == 0
+    assert "--under-choice has no effect here" in capsys.readouterr().err
+    assert main([*arguments, "--under-choice", "clever"]) == 2
+    assert "'clever' is not one of 'race', 'eager', 'lazy'" in capsys.readouterr().err
+    assert main(["verifyta", str(path), str(queries), "-s"]) == 0
+    out = capsys.readouterr().out
+    assert "Verifying formula 2" in out
+    assert " runs) Pr(<> …) in [0," in out

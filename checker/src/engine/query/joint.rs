@@ -14,7 +14,7 @@ use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Statistical, StatisticalQuery};
 use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::{Estimate, Failure, Precision, bound_of, estimate_jointly};
+use crate::stochastic::{Behaviour, Estimate, Failure, Precision, bound_of, estimate_jointly};
 use crate::syntax::ast::QueryText;
 
 impl LoadedModel {
@@ -58,7 +58,10 @@ impl LoadedModel {
             })?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let executor = stochastic.code.as_ref().map(PreparedCode::executor);
-        let executor = executor.expect("code was just prepared");
+        let behaviour = Behaviour {
+            fixed_step: options.precision.discretisation,
+            ..Behaviour::new(network, executor.expect("code was just prepared"))
+        };
         let count = compiled.len() as f64;
         let precision = Precision {
             threads: options.thread_count(),
@@ -79,8 +82,8 @@ impl LoadedModel {
                     };
                     watch.look(&counters).is_some()
                 };
-                let found = estimate_jointly(network, executor, &kinds, &precision, ends);
-                let found = found.map_err(|failure| (failure, compiled[group[0]].span))?;
+                let found = estimate_jointly(behaviour, &kinds, &precision, ends);
+                let found = found.map_err(|failure| (failure, group[0]))?;
                 for (&index, estimate) in group.iter().zip(found) {
                     estimates[index] = Some(estimate);
                 }
@@ -95,7 +98,9 @@ impl LoadedModel {
             Ok(Err((Failure::RunTime(error), _))) => {
                 return Err(self.run_time_error(network, error));
             }
-            Ok(Err((failure, span))) => return Err(self.run_fails(network, &failure, span)),
+            Ok(Err((failure, index))) => {
+                return Err(self.run_fails(network, &failure, &compiled[index]));
+            }
             Ok(Ok(estimates)) => estimates,
         };
         let seconds = start.elapsed().as_secs_f64();
@@ -137,7 +142,9 @@ impl LoadedModel {
                 "ask for this one alone",
             ));
         };
-        let (query, found) = stochastic.model.compile_statistical(&parsed, &self.sources);
+        let (query, found) = stochastic
+            .model
+            .compile_statistical(&parsed, &self.sources, &[]);
         let Some(query) = query else {
             return Err(Rejection::new(found, &self.sources));
         };

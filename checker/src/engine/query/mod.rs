@@ -13,6 +13,7 @@ pub(super) mod optimal_trace;
 pub mod partial_observation;
 pub(super) mod plans;
 pub(super) mod reachable;
+mod restriction;
 mod splitting;
 mod statistical;
 pub(crate) mod subject;

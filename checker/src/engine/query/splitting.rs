@@ -41,7 +41,7 @@ impl LoadedModel {
         let text = self.add_query(&format!("E[<=1; 1](max: {})", wanted.levels));
         let measured = self.statistical_query(text.span);
         let measured =
-            measured.and_then(|asked| model.compile_statistical(&asked, &self.sources).0);
+            measured.and_then(|asked| model.compile_statistical(&asked, &self.sources, &[]).0);
         let Some(Statistical::Expectation { value: level, .. }) = measured.map(|one| one.kind)
         else {
             let message = format!("`{}` is no level", wanted.levels);

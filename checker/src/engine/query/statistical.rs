@@ -13,13 +13,13 @@ use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 use crate::engine::query::watched_runs::WatchedRuns;
 use crate::engine::rejection::Rejection;
-use crate::ir::{EdgeId, Network, Statistical};
+use crate::ir::{EdgeId, Network, Statistical, StatisticalQuery};
 use crate::network;
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand, ValuesOfRuns,
-    ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, simulate,
+    Behaviour, Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand,
+    ValuesOfRuns, ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -50,7 +50,9 @@ impl LoadedModel {
         self.stochastic()?;
         let mut stochastic = self.stochastic.take().expect("it was just made");
         stochastic.model.network.overflow = options.overflow;
-        let (compiled, found) = stochastic.model.compile_statistical(query, &self.sources);
+        let names = self.strategy_names();
+        let model = &mut stochastic.model;
+        let (compiled, found) = model.compile_statistical(query, &self.sources, &names);
         let splitting = self.splitting(&mut stochastic.model, compiled.as_ref(), options);
         let prepared = if compiled.is_some() {
             let network = &stochastic.model.network;
@@ -77,9 +79,18 @@ impl LoadedModel {
             return rejected(self, stochastic, rejection);
         }
         self.load_seconds += start.elapsed().as_secs_f64();
+        let restriction = match self.restriction(query, &stochastic.model.network, options) {
+            Ok(restriction) => restriction,
+            Err(rejection) => return rejected(self, stochastic, rejection),
+        };
         let network = &stochastic.model.network;
         let executor = stochastic.code.as_ref().map(PreparedCode::executor);
-        let executor = executor.expect("code was just prepared");
+        let behaviour = Behaviour {
+            network,
+            executor: executor.expect("code was just prepared"),
+            restriction: restriction.as_ref(),
+            fixed_step: options.precision.discretisation,
+        };
         let precision = Precision {
             threads: options.thread_count(),
             ..options.precision
@@ -97,7 +108,7 @@ impl LoadedModel {
             match &compiled.kind {
                 Statistical::Simulation(asked) => {
                     let ends = |number| runs.ends(number);
-                    let simulated = simulate(network, executor, asked, &precision, ends)?;
+                    let simulated = simulate(behaviour, asked, &precision, ends)?;
                     Ok(Found {
                         estimate: simulated.estimate.clone(),
                         simulated: Some(Arc::new(simulated)),
@@ -108,7 +119,7 @@ impl LoadedModel {
                     let wanted = splitting.as_ref().expect("it was just seen");
                     let ends = |number| runs.ends(number);
                     let asked = (bound, path);
-                    let rare = estimate_rare(network, executor, asked, wanted, &precision, ends)?;
+                    let rare = estimate_rare(behaviour, asked, wanted, &precision, ends)?;
                     Ok(Found {
                         estimate: Some(rare.estimate.clone()),
                         rare: Some(rare),
@@ -117,15 +128,14 @@ impl LoadedModel {
                 }
                 kind @ Statistical::Comparison { .. } => {
                     let ends = |number| runs.ends(number);
-                    let estimate = compare(network, executor, kind, &precision, ends)?;
+                    let estimate = compare(behaviour, kind, &precision, ends)?;
                     Ok(Found {
                         estimate: Some(estimate),
                         ..Found::default()
                     })
                 }
                 kind => {
-                    let estimate =
-                        estimate_watched(network, executor, kind, &precision, &mut runs)?;
+                    let estimate = estimate_watched(behaviour, kind, &precision, &mut runs)?;
                     Ok(Found {
                         estimate: Some(estimate),
                         values: runs.values(kind),
@@ -150,7 +160,7 @@ impl LoadedModel {
                     _ => Err(self.run_time_error(network, error)),
                 }
             }
-            Ok(Err(failure)) => Err(self.run_fails(network, &failure, query.span)),
+            Ok(Err(failure)) => Err(self.run_fails(network, &failure, &compiled)),
             Ok(Ok(found)) => {
                 let verdict = verdict(&compiled.kind, found.estimate.as_ref(), &watch);
                 let mut answer = Answer::new(verdict, Counters::default());
@@ -197,7 +207,12 @@ impl LoadedModel {
     }
 
     /// Why a random run has no result, with the place in the model.
-    pub(super) fn run_fails(&self, network: &Network, failure: &Failure, query: Span) -> Rejection {
+    pub(super) fn run_fails(
+        &self,
+        network: &Network,
+        failure: &Failure,
+        query: &StatisticalQuery,
+    ) -> Rejection {
         let span = |stand: Stand| {
             let process = &network.processes[stand.process.0 as usize];
             process.locations[stand.location.0 as usize].span
@@ -218,7 +233,12 @@ impl LoadedModel {
                     "{} can be left at any time: nothing says how long a random run stays",
                     name(stand)
                 ),
-                "give the location an exponential rate, or an invariant that bounds the time",
+                if query.under.is_some() {
+                    "give the location an exponential rate, or an invariant that bounds the time; \
+                     or ask with --under-choice eager or lazy"
+                } else {
+                    "give the location an exponential rate, or an invariant that bounds the time"
+                },
             ),
             Failure::Rate(stand, rate) => (
                 span(stand),
@@ -261,7 +281,7 @@ impl LoadedModel {
                 "widen its invariant, or give it an edge that is enabled in time",
             ),
             Failure::ValueOutOfBounds(value) => (
-                query,
+                query.span,
                 format!("in a random run the value is {value}, which is not between the bounds"),
                 "give wider ones: --value-bounds LOW,HIGH",
             ),
@@ -281,14 +301,19 @@ impl LoadedModel {
                 ),
                 "let time pass in every loop, or bound the run by its moves: [#<=1000]",
             ),
+            Failure::ImpossibleDemand => (
+                query.span,
+                "the strategy demands a move that is not possible in a random run".to_owned(),
+                "a strategy from a file must be one of this model: make it again",
+            ),
             Failure::BoundNeverReached => (
-                query,
+                query.span,
                 "the clock that bounds the run stands still, and nothing happens any more"
                     .to_owned(),
                 "bound the run by time: [<=100]",
             ),
             Failure::NoNumber => (
-                query,
+                query.span,
                 "the value of the expression is no finite number in some run".to_owned(),
                 "keep arguments of functions in their domains, and divisors away from 0",
             ),

@@ -12,6 +12,9 @@
 //! depends. Drawing anew at any other moment would give the same law: both distributions,
 //! conditioned on "not yet", are themselves again.
 //!
+//! Under a strategy of the controller (`advised.rs`) its moves count only where the strategy
+//! allows them, and processes that have some plan anew before every move.
+//!
 //! Invariants, while no move is being made:
 //! * `attempts` and `bounds` of a process that is not in `stale` are what its plan says, counted
 //!   from now.
@@ -19,19 +22,21 @@
 //!
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
+mod advised;
 mod outputs;
 mod planning;
 mod transition;
 
 use rustc_hash::FxHashMap;
 
+use super::advice::Advice;
+use super::behaviour::Behaviour;
 use super::condition::Condition;
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::Motion;
 use super::program::Program;
 use super::windows::Windows;
-use crate::exec::Executor;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
 /// So many moves in less than [`ZENO_TIME`] are taken for a run that never gets on.
@@ -100,14 +105,23 @@ pub(in crate::stochastic) struct Race<'a> {
     since: (f64, u64),
     /// The moves until plans are drawn anew that wait for a clock.
     until_renewal: u32,
+    /// What the strategy says, if the run is under one.
+    advice: Option<Advice<'a>>,
+    /// The first time at which an urgent channel stops time for a move that the strategy forbids,
+    /// and who could make it.
+    standstill: Option<(f64, usize)>,
+    /// How long all invariants together let time pass, if that matters to the strategy.
+    longest_stay: f64,
 }
 
 impl<'a> Race<'a> {
-    pub(in crate::stochastic) fn new(
-        network: &'a Network,
-        executor: &'a dyn Executor,
-        fixed_step: Option<f64>,
-    ) -> Race<'a> {
+    pub(in crate::stochastic) fn new(behaviour: Behaviour<'a>) -> Race<'a> {
+        let Behaviour {
+            network,
+            executor,
+            restriction,
+            fixed_step,
+        } = behaviour;
         let processes = network.processes.len();
         Race {
             machine: Machine::new(network, executor),
@@ -131,6 +145,9 @@ impl<'a> Race<'a> {
             moves: 0,
             since: (0.0, 0),
             until_renewal: MOVES_OF_A_PLAN,
+            advice: restriction.map(Advice::new),
+            standstill: None,
+            longest_stay: f64::INFINITY,
         }
     }
 
@@ -231,6 +248,7 @@ impl<'a> Race<'a> {
         rest: f64,
     ) -> Result<Next, Failure> {
         self.rest = rest;
+        self.take_advice(program)?;
         self.plan_anew(program)?;
         if self.committed > 0 {
             return self.next_committed(program);
@@ -242,6 +260,9 @@ impl<'a> Race<'a> {
         let mut least = f64::INFINITY;
         for &bound in &self.bounds {
             least = least.min(bound);
+        }
+        if let Some(next) = self.next_by_advice(program, delay, least)? {
+            return Ok(next);
         }
         if delay > least * (1.0 + TOLERANCE) + TOLERANCE {
             return self.next_at_the_latest(program, least);
@@ -311,19 +332,23 @@ impl<'a> Race<'a> {
     fn one_with_outputs(
         &mut self,
         program: &Program<'a>,
-        processes: impl IntoIterator<Item = usize>,
+        processes: impl IntoIterator<Item = usize> + Clone,
     ) -> Result<Option<usize>, Failure> {
         let (mut winner, mut ties) = (None, 0);
-        for process in processes {
-            if !self.find_outputs(program, process)? {
-                continue;
+        loop {
+            for process in processes.clone() {
+                if !self.find_outputs(program, process)? {
+                    continue;
+                }
+                ties += 1;
+                if ties == 1 || self.machine.stream().below(ties) == 0 {
+                    winner = Some(process);
+                }
             }
-            ties += 1;
-            if ties == 1 || self.machine.stream().below(ties) == 0 {
-                winner = Some(process);
+            if winner.is_some() || !self.hurry() {
+                return Ok(winner);
             }
         }
-        Ok(winner)
     }
 
     /// The failure of a run in which nobody moves and time cannot pass.
@@ -364,7 +389,10 @@ impl<'a> Race<'a> {
                 self.make_stale(process as u32);
             }
         }
-        if !self.find_outputs(program, process)? {
+        self.look();
+        let is_able = self.find_outputs(program, process)?
+            || self.hurry() && self.find_outputs(program, process)?;
+        if !is_able {
             // Rounding has put the delay beside the window: it is drawn again.
             self.make_stale(process as u32);
             return self.count_move(process, false);
@@ -378,6 +406,16 @@ impl<'a> Race<'a> {
         let sender = program.instance(chosen);
         if let Some(channel) = self.channel(sender)? {
             self.add_receivers(program, sender, channel)?;
+            let mut attempts = 0;
+            while !self.allows_move(program) {
+                // Some receivers make a move that the strategy allows.
+                attempts += 1;
+                if attempts == MOST_CHANGES {
+                    return Err(Failure::NoProgress(self.stand(process)));
+                }
+                self.movers.truncate(1);
+                self.add_receivers(program, sender, channel)?;
+            }
         }
         self.carry_out(program)?;
         self.until_renewal -= 1;

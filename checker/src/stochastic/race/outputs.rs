@@ -2,6 +2,7 @@
 
 use super::{MOST_CHANGES, Race, TOLERANCE};
 use crate::ir::Urgency;
+use crate::stochastic::advice::View;
 use crate::stochastic::condition::Condition;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
@@ -20,13 +21,17 @@ impl<'a> Race<'a> {
         windows: &mut Windows,
     ) -> Result<f64, Failure> {
         let mut urgent = f64::INFINITY;
+        let view = View::Drawn(self.longest_stay);
         for instance in program.range(spot.outputs) {
-            if instance.may_be_urgent && self.is_urgent(instance)? {
+            if self.is_advised(instance) {
+                urgent = urgent.min(self.advised_windows(program, instance, bound, windows)?);
+            } else if instance.may_be_urgent && self.is_urgent(instance)? {
                 // It is taken as soon as it can be, so no time is drawn for it.
-                let first = self.instance_windows(program, instance, bound, None)?;
+                let asked = (bound, view);
+                let first = self.instance_windows(program, instance, asked, None)?;
                 urgent = urgent.min(first);
             } else {
-                self.instance_windows(program, instance, bound, Some(windows))?;
+                self.instance_windows(program, instance, (bound, view), Some(windows))?;
             }
         }
         Ok(urgent)
@@ -37,7 +42,7 @@ impl<'a> Race<'a> {
         &mut self,
         program: &Program<'a>,
         instance: &Instance<'a>,
-        bound: f64,
+        (bound, view): (f64, View),
         mut windows: Option<&mut Windows>,
     ) -> Result<f64, Failure> {
         let mut add = |low: f64, high: f64| {
@@ -48,7 +53,8 @@ impl<'a> Race<'a> {
         let steps = self.steps(program, instance.guard);
         self.is_stepped[instance.process as usize] |= steps;
         let is_span = !matches!(instance.guard, Condition::Timed(_) | Condition::Curved(_));
-        if is_span && !instance.is_binary && !steps {
+        let is_alone = !instance.is_binary && !self.is_advised(instance);
+        if is_span && is_alone && !steps {
             let span = self.span(program, instance.guard, &instance.values)?;
             let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
             let Some(span) = span.filter(|span| span.low <= latest) else {
@@ -60,7 +66,7 @@ impl<'a> Race<'a> {
         let (mut ahead, mut before) = (0.0, false);
         let mut first = f64::INFINITY;
         for _ in 0..MOST_CHANGES {
-            let mask = self.output(program, instance, ahead)?;
+            let mask = self.output(program, instance, ahead, view)?;
             let end = (ahead + mask.horizon).min(bound);
             if mask.behind && ahead < bound {
                 add(ahead, end);
@@ -89,8 +95,12 @@ impl<'a> Race<'a> {
         program: &Program<'a>,
         instance: &Instance<'a>,
         ahead: f64,
+        view: View,
     ) -> Result<Mask, Failure> {
         let guard = self.mask_of(program, instance.guard, &instance.values, ahead)?;
+        if (guard.now || guard.behind) && view != View::Model && self.is_advised(instance) {
+            return Ok(guard.and(self.partners(program, instance, ahead, view)?));
+        }
         if !instance.is_binary || !(guard.now || guard.behind) {
             return Ok(guard);
         }
@@ -160,9 +170,10 @@ impl<'a> Race<'a> {
         condition: Condition,
         values: &[i32],
     ) -> Result<bool, Failure> {
-        if let Condition::Compared(_) = condition {
-            let span = self.span(program, condition, values)?;
-            return Ok(span.is_some_and(|span| span.low <= TOLERANCE));
+        if let Condition::Compared(place) = condition {
+            let comparisons = program.comparisons(place);
+            return Ok(self.machine.holds(comparisons.on_words, values)?
+                && self.machine.compare(comparisons, values)?);
         }
         self.machine.holds(condition, values)
     }
@@ -199,7 +210,8 @@ impl<'a> Race<'a> {
         self.choices.clear();
         let spot = program.spot(process, self.locations[process]);
         let leaves_committed = self.committed == 0 || spot.urgency == Urgency::Committed;
-        if spot.is_plain && !self.is_stale[process] {
+        let is_advised = spot.is_controllable && self.advice.is_some();
+        if spot.is_plain && !is_advised && !self.is_stale[process] {
             for index in 0..self.enabled[process].len() {
                 let number = self.enabled[process][index];
                 if leaves_committed || self.partner_commits(program, program.instance(number))? {
@@ -210,8 +222,8 @@ impl<'a> Race<'a> {
         }
         for number in spot.outputs.0..spot.outputs.1 {
             let instance = program.instance(number);
-            let is_enabled = if instance.is_binary {
-                self.output(program, instance, 0.0)?.now
+            let is_enabled = if instance.is_binary || is_advised {
+                self.output(program, instance, 0.0, View::Allowed)?.now
             } else {
                 self.holds(program, instance.guard, &instance.values)?
             };

@@ -2,6 +2,7 @@
 
 use super::{FAR_BEYOND, MOST_CHANGES, Race};
 use crate::ir::{FunctionId, Urgency};
+use crate::stochastic::advice::View;
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Program, Spot, clocks_of};
@@ -38,7 +39,8 @@ impl<'a> Race<'a> {
         let bound = self.invariant_bound(program, spot, process)?;
         let is_urgent = spot.urgency != Urgency::Normal;
         self.bounds[process] = if is_urgent { 0.0 } else { bound };
-        self.attempts[process] = if spot.is_plain {
+        let is_advised = spot.is_controllable && self.has_decisions();
+        self.attempts[process] = if spot.is_plain && !is_advised {
             self.find_plain_outputs(program, spot, process)?;
             if self.enabled[process].is_empty() {
                 f64::INFINITY
@@ -57,7 +59,7 @@ impl<'a> Race<'a> {
         } else if is_urgent {
             let mut is_enabled = false;
             for output in program.range(spot.outputs) {
-                is_enabled = is_enabled || self.output(program, output, 0.0)?.now;
+                is_enabled = is_enabled || self.output(program, output, 0.0, View::Allowed)?.now;
             }
             if is_enabled { 0.0 } else { f64::INFINITY }
         } else {
@@ -212,7 +214,8 @@ impl<'a> Race<'a> {
             return Ok(f64::INFINITY);
         };
         let length = windows.length();
-        if bound.is_finite() {
+        let is_demanded = self.demand().is_some() && length.is_finite();
+        if bound.is_finite() || spot.exponential_rate.is_none() && is_demanded {
             let mut stream = self.machine.stream();
             if length > 0.0 {
                 let part = stream.uniform();

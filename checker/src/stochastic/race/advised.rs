@@ -1,0 +1,249 @@
+//! The race under a strategy of the controller.
+//!
+//! Until the strategy demands a move, a controllable output counts in the delay of its process
+//! where the strategy allows it. Where it demands a move, time stops, and every process with one
+//! that is allowed competes. A process without a rate whose stay no invariant bounds draws
+//! uniformly among the times until then.
+//!
+//! An urgent channel stops time also if the strategy forbids to use it. Then who else can move
+//! does.
+
+use super::{Next, Race, TOLERANCE};
+use crate::ir::Urgency;
+use crate::stochastic::advice::{Advice, Ready, View};
+use crate::stochastic::failure::Failure;
+use crate::stochastic::machine::Mask;
+use crate::stochastic::program::{Instance, Program};
+use crate::stochastic::restriction::Entry;
+use crate::stochastic::windows::Windows;
+
+/// Where a move is to be made as soon as possible, and there is no first moment, it is made this
+/// part, or this long, after the beginning.
+const SOON: f64 = 5.0 * TOLERANCE;
+
+impl<'a> Race<'a> {
+    /// Lets the strategy look at the state before anybody plans.
+    pub(super) fn take_advice(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+        if self.advice.is_none() {
+            return Ok(());
+        }
+        self.look();
+        self.standstill = None;
+        self.longest_stay = f64::INFINITY;
+        self.until = self.rest;
+        for process in 0..self.locations.len() {
+            let spot = program.spot(process, self.locations[process]);
+            if self.has_decisions() {
+                let bound = if spot.urgency != Urgency::Normal {
+                    0.0
+                } else if self.is_stale[process] {
+                    self.invariant_bound(program, spot, process)?
+                } else {
+                    self.bounds[process]
+                };
+                self.longest_stay = self.longest_stay.min(bound);
+            }
+            if spot.is_controllable {
+                self.make_stale(process as u32);
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets the strategy look at the state.
+    pub(super) fn look(&mut self) {
+        if let Some(advice) = &mut self.advice {
+            let machine = &self.machine;
+            advice.look(machine.words(), |clock| machine.clock(clock), self.time);
+        }
+    }
+
+    /// What comes before a delay, and before time has to stop, because of the strategy.
+    pub(super) fn next_by_advice(
+        &mut self,
+        program: &Program<'a>,
+        delay: f64,
+        least: f64,
+    ) -> Result<Option<Next>, Failure> {
+        let first = delay.min(least);
+        if let Some((standstill, process)) = self.standstill
+            && standstill < first
+        {
+            let all = 0..self.attempts.len();
+            let is_now = standstill <= TOLERANCE;
+            let winner = if is_now {
+                self.one_with_outputs(program, all)?
+            } else {
+                // What it can do then is found then.
+                Some(process)
+            };
+            return Ok(Some(Next {
+                delay: if is_now { 0.0 } else { standstill },
+                winner,
+                stopped_by: Some(process),
+            }));
+        }
+        match self.demand() {
+            Some(demand) if demand * (1.0 + TOLERANCE) + TOLERANCE < first => {
+                Err(Failure::ImpossibleDemand)
+            }
+            _ => Ok(None),
+        }
+    }
+
+    pub(super) fn has_decisions(&self) -> bool {
+        self.advice.as_ref().is_some_and(Advice::has_decisions)
+    }
+
+    /// Whether the strategy has a say in an output.
+    pub(super) fn is_advised(&self, instance: &Instance<'_>) -> bool {
+        instance.edge.controllable && self.has_decisions()
+    }
+
+    /// Lets the controller make a move that is allowed, but not demanded. Returns whether that
+    /// makes a difference.
+    pub(super) fn hurry(&mut self) -> bool {
+        self.advice.as_mut().is_some_and(Advice::hurry)
+    }
+
+    /// When the strategy demands a move.
+    pub(super) fn demand(&self) -> Option<f64> {
+        let demand = self.advice.as_ref()?.demand();
+        demand.is_finite().then_some(demand)
+    }
+
+    /// Adds the times until `bound` at which the strategy allows a controllable output, and a
+    /// delay for it is drawn; returns the first at which it is made without.
+    pub(super) fn advised_windows(
+        &mut self,
+        program: &Program<'a>,
+        instance: &Instance<'a>,
+        bound: f64,
+        windows: &mut Windows,
+    ) -> Result<f64, Failure> {
+        let view = View::Drawn(self.longest_stay);
+        let mut urgent = self.demanded(program, instance, bound)?;
+        if instance.may_be_urgent && self.is_urgent(instance)? {
+            let first = self.first(program, instance, (bound, view))?;
+            urgent = urgent.min(first);
+            let possible = self.first(program, instance, (bound, View::Model))?;
+            if possible < urgent && self.standstill.is_none_or(|one| possible < one.0) {
+                self.standstill = Some((possible, instance.process as usize));
+            }
+        } else if self.advice.as_ref().is_some_and(Advice::is_eager) {
+            let first = self.first(program, instance, (bound, view))?;
+            if first.is_finite() {
+                let mask = self.output(program, instance, first, view)?;
+                // Without a first moment one soon after the beginning is taken.
+                let soon = (SOON * first.max(1.0)).min(mask.horizon / 2.0);
+                urgent = urgent.min(if mask.now { first } else { first + soon });
+            }
+        } else {
+            self.instance_windows(program, instance, (bound, view), Some(windows))?;
+        }
+        Ok(urgent)
+    }
+
+    /// The first time at which an instance is enabled.
+    fn first(
+        &mut self,
+        program: &Program<'a>,
+        instance: &Instance<'a>,
+        asked: (f64, View),
+    ) -> Result<f64, Failure> {
+        self.instance_windows(program, instance, asked, None)
+    }
+
+    /// When the strategy demands a move that this instance can make; infinity if it cannot.
+    fn demanded(
+        &mut self,
+        program: &Program<'a>,
+        instance: &Instance<'a>,
+        bound: f64,
+    ) -> Result<f64, Failure> {
+        let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
+        let Some(demand) = self.demand().filter(|&demand| demand <= latest) else {
+            return Ok(f64::INFINITY);
+        };
+        let is_enabled = self.output(program, instance, demand, View::Allowed)?.now;
+        Ok(if is_enabled { demand } else { f64::INFINITY })
+    }
+
+    /// When the strategy allows a controllable output together with those who can receive.
+    pub(super) fn partners(
+        &mut self,
+        program: &Program<'a>,
+        sender: &Instance<'a>,
+        ahead: f64,
+        view: View,
+    ) -> Result<Mask, Failure> {
+        let own = entry(sender);
+        let Some(channel) = self.channel(sender)? else {
+            return Ok(self.allowed(&[own], ahead, view));
+        };
+        let is_broadcast = self.network().channels[channel as usize].broadcast;
+        let mut ready = Mask::constant(false);
+        let mut audience = Vec::new();
+        for &process in program.listeners(channel) {
+            if process == sender.process {
+                continue;
+            }
+            let location = self.locations[process as usize];
+            let inputs = program.spot(process as usize, location).inputs;
+            for receiver in program.range(inputs) {
+                if self.channel(receiver)? != Some(channel) {
+                    continue;
+                }
+                let mut mask = self.mask_of(program, receiver.guard, &receiver.values, ahead)?;
+                if is_broadcast {
+                    audience.push(Ready {
+                        entry: entry(receiver),
+                        controllable: receiver.edge.controllable,
+                        mask,
+                    });
+                } else if receiver.edge.controllable {
+                    mask = mask.and(self.allowed(&[own, entry(receiver)], ahead, view));
+                }
+                ready = ready.or(mask);
+            }
+        }
+        Ok(match &self.advice {
+            Some(advice) if is_broadcast => advice.allows_broadcast(own, &audience, ahead, view),
+            _ => ready,
+        })
+    }
+
+    /// When the strategy allows a move of these participants, all controllable.
+    fn allowed(&self, movers: &[Entry], ahead: f64, view: View) -> Mask {
+        let advice = self.advice.as_ref();
+        advice.map_or(Mask::constant(true), |advice| {
+            advice.allows(movers, ahead, view)
+        })
+    }
+
+    /// Whether the strategy allows the movers to move now.
+    pub(super) fn allows_move(&self, program: &Program<'a>) -> bool {
+        let Some(advice) = self.advice.as_ref().filter(|one| one.has_decisions()) else {
+            return true;
+        };
+        let mut movers = self.movers.iter().map(|&(one, _)| program.instance(one));
+        if movers.clone().any(|one| !one.edge.controllable) {
+            return true;
+        }
+        let movers: Vec<Entry> = movers.by_ref().map(entry).collect();
+        advice.allows_now(&movers)
+    }
+}
+
+/// The edge of an instance with the number of its values.
+fn entry(instance: &Instance<'_>) -> Entry {
+    let select = instance.edge.select.iter().zip(&instance.values);
+    let select = select.fold(0, |number, (range, value)| {
+        number * (range.high - range.low + 1) as u32 + (value - range.low) as u32
+    });
+    Entry {
+        process: instance.process,
+        edge: instance.id.0,
+        select,
+    }
+}
