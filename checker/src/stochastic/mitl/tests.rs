@@ -31,7 +31,7 @@ fn random_run(stream: &mut Stream<'_>) -> Run {
         holds: Vec::new(),
     };
     let mut half = 0;
-    for state in 0..1 + u64::from(stream.below(5)) {
+    for state in 0..=u64::from(stream.below(5)) {
         let end = half + 2 * i64::from(stream.below(4));
         // Now and then conditions change within a state, as those of clocks do.
         let changes = stream.below(3) == 0;
