@@ -66,7 +66,7 @@ impl LoadedModel {
         let mut symbolic_refusal = None;
         let errors: Vec<Diagnostic> = more.iter().filter(|one| one.is_error()).cloned().collect();
         let mut stochastic_errors = Vec::new();
-        if !errors.is_empty() && errors.iter().all(semantics::is_symbolic) {
+        if errors.iter().any(semantics::is_symbolic) {
             let (stochastic, found) = analysed(Reading::Stochastic);
             model = stochastic;
             stochastic_errors.extend(found.into_iter().filter(Diagnostic::is_error));

@@ -169,6 +169,29 @@ fn a_model_without_meaning_is_refused_for_what_statistical_queries_cannot_read()
         panic!("there is one mistake: {:?}", rejection.rendered);
     };
     assert!(only.contains("E0285") && only.contains("y' == 2"), "{only}");
+    // Only the second of the mistakes in the symbolic reading is one in both.
+    let (guard, code) = ("x >= d && y >= missing", "E0201");
+    let text = format!(
+        "clock x, y; double d = 0.5;
+             process P() {{
+                 state a {{ x <= 2.5 }};
+                 init a;
+                 trans a -> a {{ guard {guard}; }};
+             }}
+             system P;"
+    );
+    let Err(rejection) = LoadedModel::load("model.xta", text.into_bytes()) else {
+        panic!("{guard} is accepted");
+    };
+    let errors = rejection
+        .rendered
+        .iter()
+        .filter(|one| one.contains("error["));
+    let errors: Vec<&String> = errors.collect();
+    let [only] = errors[..] else {
+        panic!("{guard}: there is one mistake: {errors:?}");
+    };
+    assert!(only.contains(code), "{guard}: {only}");
 }
 
 #[test]
