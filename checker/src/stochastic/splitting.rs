@@ -16,7 +16,7 @@
 //! greatest level that a share of [`PILOT_SHARE`] of the parts reach.
 //!
 //! Sources: M. J. J. Garvels, "The splitting method in rare event simulation", University of Twente
-//! 2000, sections 2.2 and 3.3, on fixed effort and its mean; F. Cérou and A. Guyader, "Adaptive
+//! 2000, on fixed effort and its mean; F. Cérou and A. Guyader, "Adaptive
 //! multilevel splitting for rare event analysis", Stochastic Analysis and Applications 25 (2007),
 //! on thresholds from quantiles; C. E. Budde, P. R. D'Argenio and A. Hartmanns, "Better automated
 //! importance splitting for transient rare events", SETTA 2017, on a pilot before it.

@@ -17,8 +17,8 @@
 //! only makes it wider.
 //!
 //! Source: I. Waudby-Smith and A. Ramdas, "Estimating means of bounded random variables by
-//! betting", JRSS B 86 (2024), section 3: theorem 2 for the intervals, and equations (15) and (17)
-//! for the weights.
+//! betting", JRSS B 86 (2024), section 3: theorem 2, with its weights for one number of values and
+//! for all.
 
 use super::binomial::Interval;
 

@@ -15,9 +15,9 @@
 //! The share k/n always lies within: there the capital is at most 1.
 //!
 //! Sources: H. Robbins, "Statistical methods related to the law of the iterated logarithm", Annals
-//! of Mathematical Statistics 41 (1970), section 3, on mixtures; I. Waudby-Smith and A. Ramdas,
-//! "Estimating means of bounded random variables by betting", JRSS B 86 (2024), sections 2 and 4,
-//! on capital; R. Krichevsky and V. Trofimov, "The performance of universal encoding", IEEE
+//! of Mathematical Statistics 41 (1970), on mixtures; I. Waudby-Smith and A. Ramdas,
+//! "Estimating means of bounded random variables by betting", JRSS B 86 (2024), section 4, on
+//! capital; R. Krichevsky and V. Trofimov, "The performance of universal encoding", IEEE
 //! Transactions on Information Theory 27 (1981), on the density: the capital is within a factor of
 //! sqrt(n) of what the best probability in hindsight wins.
 
