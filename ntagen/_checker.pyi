@@ -18,6 +18,7 @@ __all__ = [
     "Simulation",
     "Strategy",
     "check",
+    "check_jointly",
     "explanations",
     "form_of_query",
     "load",
