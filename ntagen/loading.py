@@ -41,6 +41,7 @@ def load(
     *,
     include: Sequence[str | Path] = (),
     overflow: OverflowRule = "wrap",
+    allow_external: Sequence[str | Path] = (),
 ) -> Model:
     """Loads a model.
 
@@ -51,6 +52,8 @@ def load(
         include: Folders below which an environment may include files, besides its own folder.
         overflow: What happens if a result of integer arithmetic does not fit into 32 bits; see
             `Model.overflow`.
+        allow_external: The libraries that a UPPAAL model may import: their files, or folders that
+            hold them. Their code runs in this process, so allow only what you trust.
 
     Returns:
         The model: `Model.check` answers queries, and its attributes describe the model.
@@ -61,9 +64,10 @@ def load(
         OSError: The file cannot be read.
     """
     if isinstance(source, str) and any(sign in source for sign in "\n;<"):
-        model = checker.load(source)
+        model = checker.load(source, allow_external=allow_external)
     elif isinstance(source, str | os.PathLike):
-        model = load_file(Path(source), include=include).model
+        loaded = load_file(Path(source), include=include, allow_external=allow_external)
+        model = loaded.model
     else:
         model = _load_value(source).model
     model.overflow = overflow
@@ -80,8 +84,13 @@ def load_strategy(path: str | Path, model: Model) -> Strategy:
     return model.load_strategy(path)
 
 
-def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
-    """Loads the model of a file, and the scene if it is an environment; `include` as in `load`.
+def load_file(
+    path: Path,
+    *,
+    include: Sequence[str | Path] = (),
+    allow_external: Sequence[str | Path] = (),
+) -> Loaded:
+    """Loads the model of a file, and the scene if it is an environment; the rest as in `load`.
 
     Raises:
         InputError: The file is wrong.
@@ -89,7 +98,7 @@ def load_file(path: Path, *, include: Sequence[str | Path] = ()) -> Loaded:
     """
     if path.suffix.lower() != ".nsl":
         try:
-            return Loaded(checker.load_file(path))
+            return Loaded(checker.load_file(path, allow_external=allow_external))
         except checker.RejectedError as error:
             if message := _other_kind(path, error):
                 raise InputError(message) from None

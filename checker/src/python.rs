@@ -11,6 +11,7 @@ mod plans;
 mod play;
 mod walks;
 
+use std::path::PathBuf;
 use std::sync::Mutex;
 
 use pyo3::prelude::*;
@@ -20,6 +21,7 @@ use crate::diagnostics::Severity;
 use crate::engine::LoadedModel;
 use crate::engine::format::explain;
 use crate::engine::query_form;
+use crate::exec::Libraries;
 use crate::tuning::PARTS;
 
 use answer::{Answer, InterruptedError, check, check_jointly};
@@ -28,14 +30,21 @@ use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
 
 /// Loads a model from its bytes, which come in pieces so that they are in memory once; `path` names
-/// it in diagnostics.
+/// it in diagnostics. Libraries that it imports may come from these files and folders.
 #[pyfunction]
-fn load(py: Python<'_>, path: &str, pieces: &Bound<'_, PyAny>) -> PyResult<Model> {
+fn load(
+    py: Python<'_>,
+    path: &str,
+    pieces: &Bound<'_, PyAny>,
+    allow_external: Vec<PathBuf>,
+) -> PyResult<Model> {
+    let libraries = Libraries::new(allow_external);
     let mut bytes = Vec::new();
     for piece in pieces.try_iter()? {
         bytes.extend_from_slice(piece?.cast::<PyBytes>()?.as_bytes());
     }
-    let model = until_signal(py, || LoadedModel::load(path, bytes))?.map_err(rejected)?;
+    let model =
+        until_signal(py, || LoadedModel::load_with(path, bytes, &libraries))?.map_err(rejected)?;
     Ok(Model {
         inner: Mutex::new(model),
     })

@@ -515,27 +515,29 @@ class Model:
         return self._edges
 
 
-def load(text: str, path: str = "") -> Model:
+def load(text: str, path: str = "", *, allow_external: Sequence[str | Path] = ()) -> Model:
     """Loads a model from its text (UPPAAL XML or XTA).
 
     Args:
         text: The whole file.
         path: The name of the file in diagnostics.
+        allow_external: The libraries that the model may import: their files, or folders that hold
+            them. Their code runs in this process.
 
     Raises:
         RejectedError: The engine does not accept it.
     """
-    return _load(path, _encoded(text))
+    return _load(path, _encoded(text), allow_external)
 
 
-def load_file(path: Path) -> Model:
-    """Loads a model from a file (UPPAAL XML or XTA).
+def load_file(path: Path, *, allow_external: Sequence[str | Path] = ()) -> Model:
+    """Loads a model from a file (UPPAAL XML or XTA); `allow_external` as in `load`.
 
     Raises:
         RejectedError: The engine does not accept it.
         OSError: The file cannot be read.
     """
-    return _load(str(path), read_pieces(path, MODEL_BYTES))
+    return _load(str(path), read_pieces(path, MODEL_BYTES), allow_external)
 
 
 def diagnostic_pages() -> list[tuple[str, str, str, str]]:
@@ -543,9 +545,9 @@ def diagnostic_pages() -> list[tuple[str, str, str, str]]:
     return _checker.explanations()
 
 
-def _load(path: str, pieces: Iterable[bytes]) -> Model:
+def _load(path: str, pieces: Iterable[bytes], allow_external: Sequence[str | Path]) -> Model:
     with rejecting():
-        return Model(_checker.load(path, pieces))
+        return Model(_checker.load(path, pieces, [Path(one) for one in allow_external]))
 
 
 def _encoded(text: str) -> Iterator[bytes]:

@@ -21,6 +21,7 @@ from ntagen.cli.evidence import Outputs, write_evidence
 from ntagen.cli.joint import joint_answers
 from ntagen.cli.models import (
     constant_option,
+    external_option,
     include_option,
     load_model,
     pointing_to_explanations,
@@ -166,6 +167,7 @@ class _CheckCommand(click.Command):
 @overflow_rule()
 @constant_option()
 @include_option()
+@external_option()
 def command(
     model_path: Path,
     second_path: Path | None,
@@ -186,6 +188,7 @@ def command(
     overflow: Any,  # noqa: ANN401
     constants: dict[str, str],
     include: tuple[Path, ...],
+    allow_external: tuple[Path, ...],
 ) -> int:
     """Answer the queries of a model or an environment.
 
@@ -248,7 +251,7 @@ def command(
     shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
     outcomes: list[Outcome] = []
     with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
-        loaded = load_model(model_path, include, overflow, constants)
+        loaded = load_model(model_path, include, overflow, constants, allow_external)
         shown_already = len(loaded.model.warnings)
         todo = queries_of(loaded.model, asked, query_path)
         if loaded.task is not None:

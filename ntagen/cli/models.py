@@ -36,6 +36,19 @@ def include_option() -> Decorator:
     )
 
 
+def external_option() -> Decorator:
+    """The option ``--allow-external``."""
+    return click.option(
+        "--allow-external",
+        metavar="PATH",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        help="Allow a UPPAAL model to import this library, or those of this folder, in statistical "
+        "queries. Their code runs with your rights, so allow only what you trust. You can give "
+        "this option several times.",
+    )
+
+
 def constant_option() -> Decorator:
     """The option ``--constant``: pairs of a name and a value."""
 
@@ -76,6 +89,7 @@ def load_model(
     include: Sequence[Path],
     overflow: OverflowRule = "wrap",
     constants: Mapping[str, str] | None = None,
+    allow_external: Sequence[Path] = (),
 ) -> Loaded:
     """Loads the model of a file. Prints warnings to standard error.
 
@@ -84,6 +98,7 @@ def load_model(
         include: The folders below which an environment may include files, besides its own.
         overflow: What happens if a result of integer arithmetic does not fit into 32 bits.
         constants: Other values for constants of the model.
+        allow_external: The libraries that the model may import, or their folders.
 
     Raises:
         InputError: The file or a value is wrong.
@@ -91,9 +106,11 @@ def load_model(
     """
     from ntagen.loading import load_file
 
-    loaded = load_file(path, include=include)
+    loaded = load_file(path, include=include, allow_external=allow_external)
     if loaded.task is None:
         say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
+    else:
+        say_idle({"allow_external": "--allow-external"}, "here: environments import no libraries")
     if constants:
         if loaded.task is not None:
             raise InputError(

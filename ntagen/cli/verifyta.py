@@ -92,7 +92,10 @@ def _checked(line: CommandLine, path: Path) -> int:
     from ntagen.verifyta.output import header
     from ntagen.verifyta.places import places_of_queries
 
-    model = load_file(path).model
+    allowed = (
+        line.value("--allow-external").split(os.pathsep) if line.has("--allow-external") else []
+    )
+    model = load_file(path, allow_external=allowed).model
     if os.environ.get(COMPILE_ONLY):
         from ntagen.verifyta.compiled import compiled_text
 

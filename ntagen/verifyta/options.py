@@ -134,6 +134,14 @@ OPTIONS: Final = (
     Option("", "--u1", ">1", "honoured", "The greatest one."),
     Option("-D", "--discretization", ">0", "honoured", "The step of equations of clocks."),
     Option("", "--runs", "N>0", "honoured", "How many random runs are made."),
+    Option(
+        "",
+        "--allow-external",
+        "PATHS",
+        "honoured",
+        "Let the model import these libraries, or those in these folders; several are separated as "
+        "in the variable PATH. Only ntagen has this option: it loads no library without it.",
+    ),
     *_refused(
         (
             "learning-method",

@@ -11,7 +11,7 @@ use super::constants;
 use super::options::{CodeEngine, Options};
 use super::rejection::Rejection;
 use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
-use crate::exec::Executor;
+use crate::exec::{Executor, Libraries};
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
 use crate::semantics::{self, Model, Reading};
@@ -46,6 +46,8 @@ pub struct LoadedModel {
     /// Why only statistical queries can be asked, if that is so; `model` is then in the stochastic
     /// reading too.
     symbolic_refusal: Option<Rejection>,
+    /// The libraries that the model may import.
+    pub(super) libraries: Libraries,
     /// The model in the stochastic reading, once a statistical query was asked.
     pub(super) stochastic: Option<StochasticModel>,
 }
@@ -53,6 +55,15 @@ pub struct LoadedModel {
 impl LoadedModel {
     /// Reads and checks a model. `path` names it in diagnostics.
     pub fn load(path: &str, bytes: impl Into<Vec<u8>>) -> Result<LoadedModel, Rejection> {
+        LoadedModel::load_with(path, bytes, &Libraries::default())
+    }
+
+    /// The same with the libraries that the model may import.
+    pub fn load_with(
+        path: &str,
+        bytes: impl Into<Vec<u8>>,
+        libraries: &Libraries,
+    ) -> Result<LoadedModel, Rejection> {
         let start = Instant::now();
         let mut sources = SourceMap::default();
         let prelude = syntax::prelude(&mut sources);
@@ -61,7 +72,9 @@ impl LoadedModel {
         if diagnostics.iter().any(Diagnostic::is_error) {
             return Err(Rejection::new(diagnostics, &sources));
         }
-        let analysed = |reading| semantics::analyse(&parsed.document, &prelude, &sources, reading);
+        let analysed = |reading| {
+            semantics::analyse_with(&parsed.document, &prelude, &sources, reading, libraries)
+        };
         let (mut model, more) = analysed(Reading::Symbolic);
         let mut symbolic_refusal = None;
         let errors: Vec<Diagnostic> = more.iter().filter(|one| one.is_error()).cloned().collect();
@@ -106,6 +119,7 @@ impl LoadedModel {
             load_seconds,
             code: None,
             symbolic_refusal,
+            libraries: libraries.clone(),
             stochastic: None,
         })
     }
@@ -113,7 +127,7 @@ impl LoadedModel {
     /// The same model with other values of some of its constants: see [`constants::replaced`].
     pub fn with_constants(&self, values: &[(String, String)]) -> Result<LoadedModel, Rejection> {
         let text = constants::replaced(&self.path, &self.text, values)?;
-        let mut model = LoadedModel::load(&self.path, text)?;
+        let mut model = LoadedModel::load_with(&self.path, text, &self.libraries)?;
         model.set_overflow(self.model.network.overflow);
         Ok(model)
     }
@@ -224,11 +238,12 @@ impl LoadedModel {
             let prelude = syntax::prelude(&mut self.sources);
             let text = self.text.as_bytes().to_vec();
             let parsed = syntax::read_model(&self.path, text, &mut self.sources);
-            let (model, found) = semantics::analyse(
+            let (model, found) = semantics::analyse_with(
                 &parsed.document,
                 &prelude,
                 &self.sources,
                 Reading::Stochastic,
+                &self.libraries,
             );
             let Some(model) = model else {
                 let errors = found.into_iter().filter(Diagnostic::is_error).collect();

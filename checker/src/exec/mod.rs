@@ -7,6 +7,8 @@
 pub(crate) mod arithmetic;
 
 mod executor;
+mod external_words;
+mod libraries;
 mod rounds;
 mod wraps;
 
@@ -19,9 +21,11 @@ mod validate;
 mod jit;
 
 pub use executor::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
+pub use external_words::LibraryError;
 pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
+pub use libraries::{Libraries, call_hook};
 pub use optimise::optimise;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};

@@ -17,10 +17,12 @@
 
 use std::fmt;
 
+use super::libraries;
 use crate::builtins::MOST_PARAMETERS;
 use crate::ir::{
-    Access, Address, Base, Block, BlockId, ClockOperand, Function, FunctionId, Instruction,
-    Operand, Register, RegisterType, Terminator,
+    Access, Address, Base, Block, BlockId, ClockOperand, ExternalArgument, ExternalId,
+    ExternalParameter, ExternalType, Function, FunctionId, Instruction, Operand, Register,
+    RegisterType, Terminator,
 };
 
 use RegisterType::{Double, Integer};
@@ -217,6 +219,12 @@ impl FunctionCheck<'_> {
                     &[Double; MOST_PARAMETERS][..distribution.arity()],
                 )
             }
+            I::External {
+                target,
+                function,
+                ref arguments,
+                ..
+            } => self.external(target, function, arguments),
             I::Call {
                 target,
                 function,
@@ -278,6 +286,41 @@ impl FunctionCheck<'_> {
         self.arguments(arguments, &callee.registers[..callee.parameters as usize])?;
         match (target, callee.result) {
             (Some(target), Some(result)) => self.wants(target, result),
+            (Some(_), None) => Err("the result of a function that returns nothing"),
+            (None, _) => Ok(()),
+        }
+    }
+
+    fn external(
+        &self,
+        target: Option<Register>,
+        function: ExternalId,
+        arguments: &[ExternalArgument],
+    ) -> Verdict {
+        let register_type = |kind| match kind {
+            ExternalType::Integer | ExternalType::Bool => Integer,
+            ExternalType::Double => Double,
+        };
+        let signature = libraries::signature_of(function).ok_or("a function of no library")?;
+        if arguments.len() != signature.parameters.len() {
+            return Err("a call with another number of arguments");
+        }
+        for (argument, parameter) in arguments.iter().zip(&signature.parameters) {
+            match (argument, parameter) {
+                (ExternalArgument::Value(register), ExternalParameter::Value(kind)) => {
+                    self.wants(*register, register_type(*kind))?;
+                }
+                (
+                    ExternalArgument::Memory {
+                        words, is_written, ..
+                    },
+                    parameter,
+                ) if parameter.memory() == Some((*words, *is_written)) => {}
+                _ => return Err("an argument of another kind than the library wants"),
+            }
+        }
+        match (target, signature.result) {
+            (Some(target), Some(result)) => self.wants(target, register_type(result)),
             (Some(_), None) => Err("the result of a function that returns nothing"),
             (None, _) => Ok(()),
         }

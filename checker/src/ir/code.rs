@@ -13,7 +13,7 @@
 //!   alike, so that the two agree bit for bit.
 //! * Functions never call themselves, directly or indirectly.
 
-use super::ids::{ClockId, FunctionId, SiteId};
+use super::ids::{ClockId, ExternalId, FunctionId, SiteId};
 use crate::builtins::Code;
 pub use crate::builtins::{Distribution, MathFunction, STREAM_WORDS, Stream};
 
@@ -265,6 +265,14 @@ pub enum Instruction {
         function: FunctionId,
         arguments: Vec<Register>,
     },
+    /// Calls a function of a library. An argument is a value or, where the signature has a pointer,
+    /// a place in memory.
+    External {
+        target: Option<Register>,
+        function: ExternalId,
+        arguments: Vec<ExternalArgument>,
+        site: SiteId,
+    },
     /// Emits the constraint `left - right ≺ bound` (guards and invariants only).
     Constrain {
         left: ClockOperand,
@@ -292,6 +300,22 @@ pub enum Instruction {
         condition: Register,
         kind: RunTimeErrorKind,
         site: SiteId,
+    },
+}
+
+/// An argument of a function of a library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ExternalArgument {
+    /// A value.
+    Value(Register),
+    /// A place in memory.
+    Memory {
+        /// Where it begins.
+        address: Address,
+        /// How many words it has.
+        words: u32,
+        /// Whether the function may change them.
+        is_written: bool,
     },
 }
 
@@ -411,6 +435,8 @@ pub enum RunTimeErrorKind {
     NotAnInteger,
     /// A parameter of a random function out of its domain.
     Parameter(Distribution),
+    /// A call of a function of a library that was not loaded.
+    NotLoaded,
     /// A clock set to a negative value, or a clock bound beyond the limits of the engine.
     ClockValue,
     /// An `assert` that does not hold.

@@ -27,3 +27,8 @@ pub struct FunctionId(pub u32);
 /// Index of a site in [`super::Network::sites`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SiteId(pub u32);
+
+/// A function of a library, by a number that the process gives once: models that import the same
+/// function have the same number for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ExternalId(pub u32);

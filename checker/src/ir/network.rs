@@ -3,6 +3,7 @@
 use super::chances::{Chances, LocationChances};
 use super::code::{Function, Overflow};
 use super::constants::Constants;
+use super::external::ExternalLibrary;
 use super::ids::{ChannelId, ClockId, EdgeId, FunctionId, LocationId, ProcessId, SiteId};
 use super::labels::{Guard, Update};
 use crate::diagnostics::Span;
@@ -42,6 +43,8 @@ pub struct Network {
     pub scalar_sets: Vec<ScalarSet>,
     /// What there is in the stochastic reading only.
     pub chances: Chances,
+    /// The libraries that the model imports.
+    pub externals: Vec<ExternalLibrary>,
 }
 
 impl Network {

@@ -4,7 +4,8 @@
 //! A new kind of instruction has one row here.
 
 use super::code::{
-    Address, Base, BlockId, ClockOperand, Function, Instruction, Register, STREAM_WORDS, Terminator,
+    Address, Base, BlockId, ClockOperand, ExternalArgument, Function, Instruction, Register,
+    STREAM_WORDS, Terminator,
 };
 use super::ids::{FunctionId, SiteId};
 
@@ -86,6 +87,20 @@ macro_rules! operand_walk {
                 Instruction::Call { target, arguments, .. } => {
                     for argument in arguments {
                         visit(Source(argument));
+                    }
+                    if let Some(target) = target {
+                        visit(Target(target));
+                    }
+                }
+                Instruction::External { target, arguments, .. } => {
+                    for argument in arguments {
+                        match argument {
+                            ExternalArgument::Value(register) => visit(Source(register)),
+                            ExternalArgument::Memory { address, words, is_written } => {
+                                let access = if *is_written { Update(*words) } else { Read(*words) };
+                                visit(Memory(address, access));
+                            }
+                        }
                     }
                     if let Some(target) = target {
                         visit(Target(target));
@@ -199,6 +214,7 @@ impl Instruction {
             | Instruction::DoubleToInteger { site, .. }
             | Instruction::Math { site, .. }
             | Instruction::Random { site, .. }
+            | Instruction::External { site, .. }
             | Instruction::CheckRange { site, .. }
             | Instruction::ScaleIndex { site, .. }
             | Instruction::CountRound { site }

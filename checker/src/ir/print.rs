@@ -6,8 +6,8 @@
 use std::fmt::{Display, Formatter, Result};
 
 use super::{
-    Address, Base, BlockId, ClockOperand, DoubleOperator, Function, FunctionId, Instruction,
-    IntegerOperator, Register, RegisterType, Relation, SiteId, Terminator,
+    Address, Base, BlockId, ClockOperand, DoubleOperator, ExternalArgument, Function, FunctionId,
+    Instruction, IntegerOperator, Register, RegisterType, Relation, SiteId, Terminator,
 };
 
 impl Display for Function {
@@ -226,6 +226,27 @@ impl Display for Instruction {
             } => {
                 let (name, arguments) = (distribution.name(), RegisterList(arguments));
                 write!(f, "{target} = {name}({arguments}) from {stream}  {site}")
+            }
+            Instruction::External {
+                target,
+                function,
+                arguments,
+                site,
+            } => {
+                if let Some(target) = target {
+                    write!(f, "{target} = ")?;
+                }
+                write!(f, "external {}(", function.0)?;
+                for (number, argument) in arguments.iter().enumerate() {
+                    let comma = if number > 0 { ", " } else { "" };
+                    match argument {
+                        ExternalArgument::Value(register) => write!(f, "{comma}{register}")?,
+                        ExternalArgument::Memory { address, words, .. } => {
+                            write!(f, "{comma}{address} of {words}")?;
+                        }
+                    }
+                }
+                write!(f, ")  {site}")
             }
             Instruction::AddIndices { .. }
             | Instruction::ScaleIndex { .. }

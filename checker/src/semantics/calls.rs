@@ -170,6 +170,9 @@ impl Checker<'_> {
         if argument.is_error() || parameter.ty.is_error() {
             return None;
         }
+        if parameter.ty == Type::String {
+            return self.text(argument);
+        }
         if !parameter.reference {
             return self.converted(read(argument), &parameter.ty);
         }

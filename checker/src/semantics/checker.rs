@@ -13,7 +13,7 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
-use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
+use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, Libraries, RunTimeError};
 use crate::ir::{
     Channel, Clock, Coordinate, Function, FunctionId, Instruction, Network, ProcessId,
     RunTimeErrorKind, SiteId, Variable,
@@ -35,6 +35,8 @@ pub(super) struct Checker<'a> {
     pub(super) sources: &'a SourceMap,
     /// What clocks are.
     pub(super) reading: Reading,
+    /// Where libraries may come from.
+    pub(super) libraries: Libraries,
     /// From provisional offsets to those of the layout, while a query is checked.
     pub(super) relocation: Relocation,
     /// What lasts.
@@ -103,6 +105,7 @@ impl<'a> Checker<'a> {
         Checker {
             sources,
             reading,
+            libraries: Libraries::default(),
             relocation: Relocation::default(),
             world,
             scopes: vec![Scope::default()],

@@ -161,6 +161,14 @@ codes! {
     NOT_A_STATEMENT = "E0291" "not-a-statement";
     /// A channel that is chosen by `?:`.
     CHANNEL_CHOSEN = "E0292" "channel-chosen";
+    /// An imported function with a parameter or result that C does not have.
+    EXTERNAL_SIGNATURE = "E0293" "external-signature";
+    /// A library that cannot be loaded.
+    EXTERNAL_LIBRARY = "E0294" "external-library";
+    /// A function that its library does not have.
+    EXTERNAL_MISSING = "E0295" "external-missing";
+    /// An imported function that something depends on which symbolic queries need.
+    EXTERNAL_SYMBOLIC = "E0296" "external-symbolic";
     /// An expression whose value is dropped and that changes nothing.
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.

@@ -115,12 +115,13 @@ impl Checker<'_> {
 
     fn report_failure(&mut self, kind: RunTimeErrorKind, span: Span) {
         let reason = reason(kind);
-        self.error(
-            codes::CONSTANT_WITHOUT_VALUE,
-            span,
-            format!("this constant has no value: {reason}"),
-            "correct the expression",
-        );
+        let help = if kind == RunTimeErrorKind::NotLoaded {
+            "allow the library with --allow-external and its file or folder, if you trust its code"
+        } else {
+            "correct the expression"
+        };
+        let message = format!("this constant has no value: {reason}");
+        self.error(codes::CONSTANT_WITHOUT_VALUE, span, message, help);
     }
 
     /// The value of an integer that must be known now.
@@ -171,6 +172,7 @@ pub(super) fn reason(kind: RunTimeErrorKind) -> &'static str {
         RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
         RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
         RunTimeErrorKind::Parameter(_) => "a parameter of a random function out of its domain",
+        RunTimeErrorKind::NotLoaded => "a call of an external function whose library is not loaded",
         RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
         RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",
         RunTimeErrorKind::StepLimit | RunTimeErrorKind::Interrupted => {

@@ -25,6 +25,7 @@ impl Checker<'_> {
                 } => self.typedef(ty, name, dimensions),
                 Declaration::Variable(variable) => self.variable_declaration(variable),
                 Declaration::Function(function) => self.function(function),
+                Declaration::Import(import) => self.import(import),
                 Declaration::ChannelPriority { .. }
                 | Declaration::BeforeUpdate(..)
                 | Declaration::AfterUpdate(..) => {}
@@ -52,7 +53,9 @@ impl Checker<'_> {
             self.misplaced_type(variable.ty.span, &ty);
         }
         self.expect_values(&ty, variable.ty.span);
-        let entity = if ty.is_error() || ty == Type::Void || ty == Type::String {
+        let entity = if ty == Type::String && carried.constant {
+            self.text_constant(variable, parts)
+        } else if ty.is_error() || ty == Type::Void || ty == Type::String {
             Entity::Broken
         } else if carried.constant {
             self.constant(variable, &ty, parts)
@@ -85,6 +88,30 @@ impl Checker<'_> {
         match self.initial_words(&mut parts, ty) {
             Some(words) => self.constant_entity(words, ty, free, variable.name.span),
             None => Entity::Broken,
+        }
+    }
+
+    /// A text, which only imported functions take.
+    fn text_constant(
+        &mut self,
+        variable: &ast::Variable,
+        parts: Option<Vec<InitialPart>>,
+    ) -> Entity {
+        let Some(parts) = parts else {
+            self.error(
+                codes::CONSTANT_NOT_INITIALISED,
+                variable.name.span,
+                format!("the constant '{}' has no value", variable.name.text),
+                "write = and a value",
+            );
+            return Entity::Broken;
+        };
+        match parts.first().and_then(InitialPart::expr) {
+            Some(text) if matches!(text.kind, Kind::Text(_)) => Entity::Constant {
+                value: text.clone(),
+                free: false,
+            },
+            _ => Entity::Broken,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::checker::Checker;
 use super::codes;
+use super::externals::unescaped;
 use super::offsets::{known_offset, possible_offsets};
 use super::operators::{is_clock_term, to_double};
 use super::scope::Entity;
@@ -24,7 +25,7 @@ impl Checker<'_> {
             ExprKind::Int(value) => self.integer_literal(*value, span),
             ExprKind::Double(value) => Expr::new(Kind::Double(*value), Type::Double, span),
             ExprKind::Bool(value) => Expr::bool(*value, span),
-            ExprKind::String(_) => Expr::new(Kind::Text, Type::String, span),
+            ExprKind::String(text) => Expr::new(Kind::Text(unescaped(text)), Type::String, span),
             ExprKind::Name(name) => self.name(name, span),
             ExprKind::Field(record, name) => self.field(record, name, span),
             ExprKind::Index(array, index) => self.index(array, index, span),

@@ -18,7 +18,7 @@ use crate::syntax::ast::{self, Declaration, Name};
 
 /// The function of a declaration that could not be lowered; never called, because nothing is
 /// lowered after a mistake.
-const NO_FUNCTION: FunctionId = FunctionId(u32::MAX);
+pub(super) const NO_FUNCTION: FunctionId = FunctionId(u32::MAX);
 
 impl Checker<'_> {
     /// Checks a function, lowers it, and declares its name.
@@ -49,6 +49,7 @@ impl Checker<'_> {
             parameters,
             result,
             effects: Effects::default(),
+            is_external: false,
             unknown: None,
         };
         if self.unknowns.len() > unknowns {
@@ -88,7 +89,7 @@ impl Checker<'_> {
         id
     }
 
-    fn result_type(&mut self, ty: &ast::TypeExpr) -> Type {
+    pub(super) fn result_type(&mut self, ty: &ast::TypeExpr) -> Type {
         let result = self.type_of(ty);
         let is_value = result.is_number()
             || matches!(
@@ -111,6 +112,11 @@ impl Checker<'_> {
     fn function_parameter(&mut self, parameter: &ast::Parameter) -> Parameter {
         let ty = self.dimensioned(&parameter.ty, &parameter.dimensions);
         self.check_parameter_type(parameter, &ty);
+        self.parameter_of_type(parameter, ty)
+    }
+
+    /// A parameter of this type; its name is declared.
+    pub(super) fn parameter_of_type(&mut self, parameter: &ast::Parameter, ty: Type) -> Parameter {
         let local = self.new_local(ty.clone());
         self.locals[local.0 as usize].reference = parameter.reference;
         let constant = self.carried(&parameter.ty).constant;
@@ -181,6 +187,7 @@ impl Checker<'_> {
                 }
                 // The parser has refused these.
                 Declaration::Function(_)
+                | Declaration::Import(_)
                 | Declaration::ChannelPriority { .. }
                 | Declaration::BeforeUpdate(..)
                 | Declaration::AfterUpdate(..) => {}

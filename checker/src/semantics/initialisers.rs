@@ -156,7 +156,7 @@ impl Checker<'_> {
             self.misplaced_initialiser(expr.span, ty);
             None
         } else if *ty == Type::String {
-            None
+            self.text(value)
         } else {
             self.converted(value, ty)
         };

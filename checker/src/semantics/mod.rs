@@ -64,6 +64,8 @@ mod scalars;
 
 mod functions;
 
+mod externals;
+
 mod lower;
 
 mod labels;
@@ -89,6 +91,7 @@ mod statistical;
 
 use self::left_out::LeftOut;
 use crate::diagnostics::{Diagnostic, SourceMap};
+use crate::exec::Libraries;
 use crate::ir;
 use crate::syntax::ast;
 
@@ -121,11 +124,24 @@ pub fn analyse(
     sources: &SourceMap,
     reading: Reading,
 ) -> (Option<Model>, Vec<Diagnostic>) {
+    let libraries = Libraries::default();
+    analyse_with(document, prelude, sources, reading, &libraries)
+}
+
+/// The same with the libraries that the model may import.
+pub fn analyse_with(
+    document: &ast::Document,
+    prelude: &[ast::Declaration],
+    sources: &SourceMap,
+    reading: Reading,
+    libraries: &Libraries,
+) -> (Option<Model>, Vec<Diagnostic>) {
     let mut causes = left_out::Causes::default();
     let mut rounds = 1;
     let (checker, relocation) = loop {
         let world = checker::World::default();
         let mut checker = checker::Checker::new(sources, reading, world);
+        checker.libraries = libraries.clone();
         checker.left_out = LeftOut::of(causes);
         let relocation = checker.document(document, prelude);
         if !checker.has_errors() || rounds == left_out::MOST_ROUNDS {
@@ -160,6 +176,7 @@ pub fn is_symbolic(diagnostic: &Diagnostic) -> bool {
         codes::CLOCK_WITH_DOUBLE,
         codes::CLOCK_SET_TO_DIFFERENCE,
         codes::HYBRID_CLOCK_COMPARED,
+        codes::EXTERNAL_SYMBOLIC,
     ]
     .contains(&diagnostic.code)
 }

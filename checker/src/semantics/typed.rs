@@ -72,8 +72,8 @@ pub(super) enum Kind {
     Int(i32),
     /// A double.
     Double(f64),
-    /// A text.
-    Text,
+    /// A text, which imported functions take.
+    Text(std::sync::Arc<str>),
     /// A variable.
     Variable(Place),
     /// A part of an array, or a member of a process set's variable.
@@ -193,6 +193,8 @@ pub(super) struct Signature {
     pub(super) result: Type,
     /// What it does to the state.
     pub(super) effects: Effects,
+    /// Whether it stands in a library: what else a call may do is not known.
+    pub(super) is_external: bool,
     /// Set if its result depends on values that only statistical queries know. Then it is not
     /// lowered.
     pub(super) unknown: Option<Unknown>,
@@ -418,7 +420,7 @@ impl Expr {
             Kind::Error
             | Kind::Int(_)
             | Kind::Double(_)
-            | Kind::Text
+            | Kind::Text(_)
             | Kind::Variable(_)
             | Kind::Deadlock => {}
             Kind::Field { record: inner, .. }
@@ -565,6 +567,7 @@ impl Signature {
         self.unknown
             .as_ref()
             .is_some_and(|unknown| unknown.may_write)
+            || (self.is_external && self.result == Type::Void)
             || !self.effects.writes.is_empty()
             || !self.effects.assignments.is_empty()
             || self.parameters.iter().any(Parameter::may_be_written)
@@ -572,6 +575,14 @@ impl Signature {
 }
 
 impl Unknown {
+    /// That of a function of a library, whose result only statistical queries know.
+    pub(super) fn of_external(diagnostic: Diagnostic, may_write: bool) -> Unknown {
+        Unknown {
+            diagnostic,
+            may_write,
+        }
+    }
+
     /// That of a function with this body.
     pub(super) fn of(body: &Statement, diagnostic: Diagnostic) -> Unknown {
         Unknown {

@@ -43,6 +43,8 @@ pub enum Failure {
     ValueOutOfBounds(f64),
     /// The strategy demands a move that is not possible.
     ImpossibleDemand,
+    /// The same run went another way when it was made again.
+    NotRepeatable,
     /// A comparison changes more often than numbers can tell apart.
     NoProgress(Stand),
 }

@@ -30,8 +30,7 @@ pub struct Document {
     pub system: System,
     /// The queries of the file, in order; empty and comment-only formulas are left out.
     pub queries: Vec<QueryText>,
-    /// Constructs that were read and are not supported: LSC templates, dynamic templates, external
-    /// functions.
+    /// Constructs that were read and are not supported: LSC templates, dynamic templates.
     pub unsupported: Vec<Unsupported>,
 }
 
@@ -193,10 +192,34 @@ pub enum Declaration {
         /// Where.
         span: Span,
     },
+    /// `import "library" { … };`
+    Import(Import),
     /// `before_update { … }`
     BeforeUpdate(Vec<Expr>, Span),
     /// `after_update { … }`
     AfterUpdate(Vec<Expr>, Span),
+}
+
+/// A library and the functions that the model uses of it.
+#[derive(Clone, Debug)]
+pub struct Import {
+    /// The library, as written between the quotes.
+    pub library: Name,
+    /// The functions.
+    pub functions: Vec<ImportedFunction>,
+}
+
+/// A function of a library: `[name =] type symbol(parameters);`
+#[derive(Clone, Debug)]
+pub struct ImportedFunction {
+    /// The type of what it returns.
+    pub return_type: TypeExpr,
+    /// Its name in the model.
+    pub name: Name,
+    /// Its name in the library.
+    pub symbol: Name,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
 }
 
 /// One declared variable, constant, clock or channel.

@@ -2,8 +2,8 @@
 //! supported is recorded.
 
 use super::ast::{
-    Block, Declaration, Expr, Function, Initialiser, TypeExpr, Unsupported, UnsupportedPart,
-    Variable,
+    Block, Declaration, Expr, Function, Import, ImportedFunction, Initialiser, Name, TypeExpr,
+    Unsupported, UnsupportedPart, Variable,
 };
 use super::codes;
 use super::keywords::Dialect;
@@ -51,7 +51,7 @@ impl Parser<'_> {
         match self.word() {
             "typedef" if is_new => self.typedef(declarations),
             "before_update" | "after_update" if is_new => self.update_hook(declarations),
-            "import" if is_new => self.import(),
+            "import" if is_new => self.import(declarations),
             "dynamic" if is_new => self.dynamic_template(),
             "chan" if is_new && self.word_at(1) == "priority" => {
                 self.channel_priority(declarations);
@@ -171,23 +171,59 @@ impl Parser<'_> {
     }
 
     /// `import "library" { … };`
-    fn import(&mut self) {
+    fn import(&mut self, declarations: &mut Vec<Declaration>) {
         let before = self.progress();
-        let span = self.here();
         self.bump();
-        self.expect(TokenKind::String, "with the name of the library");
-        if self.eat(TokenKind::LeftBrace) {
-            self.skip_to(&[TokenKind::RightBrace]);
+        let named = self.at(TokenKind::String).then(|| self.bump());
+        let Some(named) = named else {
+            self.expected("the name of the library, in quotes");
+            self.recover();
+            return;
+        };
+        let text = self.text_of(named);
+        let library = Name {
+            text: text[1..text.len() - 1].to_owned(),
+            span: self.span_of(named),
+        };
+        let mut functions = Vec::new();
+        if self.expect(TokenKind::LeftBrace, "before the imported functions") {
+            while !self.at_end() && !self.at(TokenKind::RightBrace) {
+                let start = self.progress();
+                functions.push(self.imported_function());
+                if self.progress() == start {
+                    self.bump();
+                }
+            }
             self.expect(TokenKind::RightBrace, "after the imported functions");
-        } else {
-            self.skip_to(&[TokenKind::Semicolon]);
         }
-        self.unsupported.push(Unsupported {
-            text: "external functions (`import`)".to_owned(),
-            span,
-            part: UnsupportedPart::Whole,
-        });
+        declarations.push(Declaration::Import(Import { library, functions }));
         self.end_of_declaration("after the import", before);
+    }
+
+    /// `[name =] type symbol(parameters);`
+    fn imported_function(&mut self) -> ImportedFunction {
+        let before = self.progress();
+        let has_name = self.is_name_at(0) && self.peek(1).kind == TokenKind::Assign;
+        let name = has_name.then(|| {
+            let name = self.declared_name("the name of the function");
+            self.bump();
+            name
+        });
+        let return_type = self.type_expr();
+        let symbol = if has_name {
+            // It names nothing in the model.
+            self.name("the name of the function in the library")
+        } else {
+            self.declared_name("the name of the function")
+        };
+        let parameters = self.parameter_list();
+        self.end_of_declaration("after the imported function", before);
+        ImportedFunction {
+            return_type,
+            name: name.unwrap_or_else(|| symbol.clone()),
+            symbol,
+            parameters,
+        }
     }
 
     /// `const n 3`: a name that is not followed by another one cannot be a type.

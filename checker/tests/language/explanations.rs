@@ -9,8 +9,9 @@ use checker::syntax::ast::QueryText;
 
 use crate::checks::interpreted;
 
-/// Codes that no short text can give: a file of 256 MiB, and a machine without compiler.
-const WITHOUT_EXAMPLE: [&str; 2] = ["E0129", "E0803"];
+/// Codes that no short text can give: a file of 256 MiB, a machine without compiler, and libraries
+/// that are not as the model says.
+const WITHOUT_EXAMPLE: [&str; 4] = ["E0129", "E0803", "E0294", "E0295"];
 
 /// A code that comes with others only: the hundred mistakes before it.
 const NEVER_ALONE: &str = "E0111";

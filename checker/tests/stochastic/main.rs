@@ -18,6 +18,8 @@ mod certainties;
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
 mod comparisons;
+#[cfg(unix)]
+mod externals;
 mod flows;
 mod formulas;
 mod intervals;

@@ -13,13 +13,15 @@ use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 use crate::engine::query::watched_runs::WatchedRuns;
 use crate::engine::rejection::Rejection;
-use crate::ir::{EdgeId, Network, Statistical, StatisticalQuery};
+use crate::exec::call_hook;
+use crate::ir::{EdgeId, Network, RunTimeErrorKind, Statistical, StatisticalQuery};
 use crate::network;
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
     Behaviour, Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand,
-    ValuesOfRuns, ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, simulate,
+    ValuesOfRuns, ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, is_repeatable,
+    simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -92,7 +94,12 @@ impl LoadedModel {
             fixed_step: options.precision.discretisation,
         };
         let precision = Precision {
-            threads: options.thread_count(),
+            // Libraries need not stand several calls at a time.
+            threads: if network.externals.iter().any(|one| one.is_loaded) {
+                1
+            } else {
+                options.thread_count()
+            },
             ..options.precision
         };
         if let Some((message, help)) = contradiction(&compiled.kind, &precision) {
@@ -105,6 +112,13 @@ impl LoadedModel {
         let observer = options.run_observer.clone();
         let result = watch.bound(|watch| {
             let mut runs = WatchedRuns::new(&compiled.kind, precision.alpha, watch, observer);
+            let externals = || network.externals.iter();
+            externals().filter_map(|one| one.begin).for_each(call_hook);
+            if externals().any(|one| one.is_loaded)
+                && !is_repeatable(behaviour, &compiled.kind, precision.seed)?
+            {
+                return Err(Failure::NotRepeatable);
+            }
             match &compiled.kind {
                 Statistical::Simulation(asked) => {
                     let ends = |number| runs.ends(number);
@@ -144,6 +158,8 @@ impl LoadedModel {
                 }
             }
         });
+        let ended = network.externals.iter().filter_map(|one| one.end);
+        ended.for_each(call_hook);
         let answer = match result {
             Err((reason, counters)) => {
                 let mut answer = Answer::new(Verdict::Unknown(reason), counters);
@@ -197,6 +213,13 @@ impl LoadedModel {
         error: crate::exec::RunTimeError,
     ) -> Rejection {
         let span = network.sites[error.site.0 as usize].span;
+        if error.kind == RunTimeErrorKind::NotLoaded {
+            let message = "a random run calls this function of a library that is not allowed";
+            let missing = network.externals.iter().filter(|one| !one.is_loaded);
+            let names: Vec<&str> = missing.map(|one| one.name.as_str()).collect();
+            let help = allowing(&names, !self.libraries.allowed().is_empty());
+            return self.failing(span, message.to_owned(), &help);
+        }
         let what = crate::engine::format::text::run_time_error(error.kind);
         let message = format!("a random run ends in an error: {what}");
         self.failing(
@@ -317,6 +340,15 @@ impl LoadedModel {
                 "the value of the expression is no finite number in some run".to_owned(),
                 "keep arguments of functions in their domains, and divisors away from 0",
             ),
+            Failure::NotRepeatable => (
+                query.span,
+                format!(
+                    "a run with the same random numbers went another way: of {}, some function is \
+                     not deterministic",
+                    imported(network)
+                ),
+                "let functions of libraries return the same for the same arguments",
+            ),
             Failure::NoProgress(stand) => (
                 span(stand),
                 format!(
@@ -413,4 +445,25 @@ pub(super) fn remark(
         }
         _ => None,
     }
+}
+
+/// How to allow libraries of these names.
+fn allowing(names: &[&str], is_given: bool) -> String {
+    let found = if is_given {
+        "none of what is allowed holds it; "
+    } else {
+        ""
+    };
+    format!(
+        "{found}allow it with --allow-external and its file or folder: {}; this runs the code of the \
+         library, so do it only if you trust it",
+        names.join(", ")
+    )
+}
+
+/// The functions that a model imports, for a sentence.
+fn imported(network: &Network) -> String {
+    let functions = network.externals.iter().flat_map(|one| &one.functions);
+    let names: Vec<String> = functions.map(|name| format!("'{name}'")).collect();
+    names.join(", ")
 }

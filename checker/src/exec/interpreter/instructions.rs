@@ -4,10 +4,13 @@ use crate::builtins::{MOST_PARAMETERS, Number};
 use crate::cancellation;
 use crate::exec::arithmetic::Wrapping;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
+use crate::exec::external_words::{ExternalWords, ends_text};
+use crate::exec::libraries;
 use crate::exec::{EmittedAssignment, EmittedConstraint, RunTimeError, arithmetic};
 use crate::ir::{
-    Address, ClockId, ClockOperand, Distribution, Instruction, MathFunction, Overflow, Register,
-    RegisterType, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream,
+    Address, ClockId, ClockOperand, Distribution, ExternalArgument, ExternalId, ExternalParameter,
+    Instruction, MathFunction, Overflow, Register, RegisterType, RunTimeErrorKind, STREAM_WORDS,
+    SiteId, Stream,
 };
 
 use super::machine::Activation;
@@ -40,6 +43,7 @@ impl Execution<'_, '_> {
             | Instruction::DoubleToInteger { site, .. }
             | Instruction::Math { site, .. }
             | Instruction::Random { site, .. }
+            | Instruction::External { site, .. }
             | Instruction::CheckRange { site, .. }
             | Instruction::ScaleIndex { site, .. }
             | Instruction::CountRound { site }
@@ -156,6 +160,12 @@ impl Execution<'_, '_> {
                 stream,
                 ..
             } => self.draw(active, *distribution, *target, arguments, *stream)?,
+            Instruction::External {
+                target,
+                function,
+                arguments,
+                ..
+            } => self.call_external(active, *function, arguments, *target)?,
             &Instruction::CheckRange {
                 value, low, high, ..
             } => {
@@ -261,6 +271,54 @@ impl Execution<'_, '_> {
             .sample(&mut stream, &doubles[..arguments.len()])
             .ok_or(RunTimeErrorKind::Parameter(distribution))?;
         self.set_double(active, target, value);
+        Ok(())
+    }
+
+    /// A call of a function of a library.
+    fn call_external(
+        &mut self,
+        active: Activation,
+        function: ExternalId,
+        arguments: &[ExternalArgument],
+        target: Option<Register>,
+    ) -> Result<(), RunTimeErrorKind> {
+        let signature = libraries::signature_of(function).ok_or(RunTimeErrorKind::NotLoaded)?;
+        let mut places = Vec::with_capacity(arguments.len());
+        let mut given = Vec::with_capacity(arguments.len());
+        for (argument, parameter) in arguments.iter().zip(&signature.parameters) {
+            match *argument {
+                ExternalArgument::Value(register) => {
+                    given.push(ExternalWords::Value(self.register(active, register)));
+                    places.push(None);
+                }
+                ExternalArgument::Memory {
+                    address,
+                    words,
+                    is_written,
+                } => {
+                    let place = self.place(active, address);
+                    let mut read: Vec<i32> = Vec::new();
+                    if *parameter == ExternalParameter::Text {
+                        while read.last().is_none_or(|word| !ends_text(*word)) {
+                            read.push(self.word(place.plus(read.len())));
+                        }
+                    } else {
+                        read.extend((0..words as usize).map(|word| self.word(place.plus(word))));
+                    }
+                    given.push(ExternalWords::Memory(read));
+                    places.push(is_written.then_some(place));
+                }
+            }
+        }
+        let result = libraries::call(function, &mut given)?;
+        for (words, place) in given.iter().zip(places) {
+            if let (ExternalWords::Memory(words), Some(place)) = (words, place) {
+                self.words_mut(place, words.len()).copy_from_slice(words);
+            }
+        }
+        if let Some(target) = target {
+            self.set_register(active, target, result);
+        }
         Ok(())
     }
 

@@ -19,6 +19,7 @@
 
 mod compiler;
 mod error;
+pub(super) mod external;
 mod needs;
 mod pool;
 mod runtime;

@@ -8,10 +8,15 @@
 use crate::builtins::{IntegerResult, MOST_PARAMETERS};
 use crate::cancellation;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
+use crate::exec::external_words::{ExternalWords, ends_text};
 use crate::exec::{
     Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, Wraps, arithmetic,
 };
-use crate::ir::{ClockId, Distribution, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream};
+use crate::ir::{
+    ClockId, Distribution, ExternalParameter, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream,
+};
+
+use super::external::External;
 
 /// The first argument of every compiled function. Compiled code reads and writes `rounds_left` and
 /// reads `constants`.
@@ -51,7 +56,7 @@ impl<'call> NativeContext<'call> {
 }
 
 /// The kinds of errors but for [`RunTimeErrorKind::Parameter`].
-const KINDS: [RunTimeErrorKind; 11] = [
+const KINDS: [RunTimeErrorKind; 12] = [
     RunTimeErrorKind::Overflow,
     RunTimeErrorKind::DivisionByZero,
     RunTimeErrorKind::ShiftDistance,
@@ -59,6 +64,7 @@ const KINDS: [RunTimeErrorKind; 11] = [
     RunTimeErrorKind::OutOfRange,
     RunTimeErrorKind::IndexOutOfBounds,
     RunTimeErrorKind::NotAnInteger,
+    RunTimeErrorKind::NotLoaded,
     RunTimeErrorKind::ClockValue,
     RunTimeErrorKind::AssertionFailed,
     RunTimeErrorKind::StepLimit,
@@ -198,4 +204,57 @@ pub(super) unsafe extern "C" fn equal_words(
         )
     };
     (left == right).into()
+}
+
+/// Calls a function of a library. The arguments are words: values, or the addresses of words of the
+/// model. Returns a status; the result is left at its address.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn call_external(
+    external: *const External,
+    arguments: *const u64,
+    result: *mut u64,
+    site: u32,
+) -> i64 {
+    // SAFETY: compiled code passes the address of an `External`, which lives for ever, and those of
+    // two places on its stack: the arguments, as many as the signature has parameters, and the
+    // result.
+    let (external, arguments) = unsafe {
+        let external = &*external;
+        let count = external.signature().parameters.len();
+        (external, std::slice::from_raw_parts(arguments, count))
+    };
+    let parameters = &external.signature().parameters;
+    let read = |(&argument, parameter): (&u64, &ExternalParameter)| match parameter.memory() {
+        None => ExternalWords::Value(argument),
+        Some((words, _)) => {
+            let source = argument as *const i32;
+            let count = if *parameter == ExternalParameter::Text {
+                // SAFETY: a text lies in constant memory, up to a word that ends it.
+                let ends = |&word: &usize| ends_text(unsafe { source.add(word).read() });
+                (0..usize::MAX).find(ends).map_or(0, |last| last + 1)
+            } else {
+                words as usize
+            };
+            // SAFETY: the place was checked to have the words of the signature, and nothing writes
+            // them while they are copied.
+            ExternalWords::Memory(unsafe { std::slice::from_raw_parts(source, count) }.to_vec())
+        }
+    };
+    let mut given: Vec<ExternalWords> = arguments.iter().zip(parameters).map(read).collect();
+    match external.call(&mut given) {
+        Err(kind) => failure_status(kind, SiteId(site)),
+        Ok(value) => {
+            for ((words, &argument), parameter) in given.iter().zip(arguments).zip(parameters) {
+                if let (ExternalWords::Memory(words), Some((_, true))) = (words, parameter.memory())
+                {
+                    let target = argument as *mut i32;
+                    // SAFETY: the same words as above, which the function may change.
+                    unsafe { target.copy_from(words.as_ptr(), words.len()) }
+                }
+            }
+            // SAFETY: the place of the result is on the stack of the caller.
+            unsafe { result.write(value) }
+            0
+        }
+    }
 }

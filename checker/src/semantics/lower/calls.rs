@@ -55,6 +55,11 @@ impl Builder<'_> {
         changes_follow: bool,
         registers: &mut Vec<Register>,
     ) -> Option<ClockSet> {
+        if parameter.ty == Type::String {
+            let text = self.text(argument);
+            registers.push(text);
+            return None;
+        }
         if parameter.reference {
             return self.reference(argument, parameter, registers);
         }

@@ -16,6 +16,7 @@ mod assignments;
 mod calls;
 pub(super) mod clocks;
 mod expressions;
+mod externals;
 pub(super) mod horizons;
 mod places;
 mod quantifiers;
@@ -124,7 +125,13 @@ impl<'n> Builder<'n> {
         let mut copies = Vec::new();
         for (i, parameter) in parameters.iter().enumerate() {
             let local = LocalId(i as u32);
-            let home = if parameter.reference {
+            let home = if parameter.ty == Type::String {
+                let address = Some(self.register(RegisterType::Address));
+                Home::Reference {
+                    address,
+                    clock: None,
+                }
+            } else if parameter.reference {
                 let size = parameter.ty.size();
                 let has_words = parameter.ty.has_words();
                 let address = has_words.then(|| self.register(RegisterType::Address));

@@ -13,6 +13,7 @@
 //! functions need.
 
 mod arithmetic;
+mod external;
 mod failures;
 mod memory;
 
@@ -217,6 +218,12 @@ impl Translator<'_> {
             Instruction::CheckRange { .. }
             | Instruction::CountRound { .. }
             | Instruction::Require { .. } => self.check(instruction),
+            Instruction::External {
+                target,
+                function,
+                arguments,
+                site,
+            } => self.call_external(*target, *function, arguments, *site),
             Instruction::Constrain { .. }
             | Instruction::SetClock { .. }
             | Instruction::CopyClock { .. } => self.emit(instruction),

@@ -75,6 +75,7 @@ impl Numbering<'_, '_> {
             | Instruction::StoreDouble { .. }
             | Instruction::CopyWords { .. }
             | Instruction::Random { .. }
+            | Instruction::External { .. }
             | Instruction::Call { .. } => self.simplify_access(instruction),
             other => match self.fold(&other) {
                 Some(literal) => Simplified::Literal(literal),
