@@ -14,7 +14,7 @@ use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
 use crate::exec::{Executor, Libraries};
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
-use crate::semantics::{self, Model, Reading};
+use crate::semantics::{self, FIRST_POOL, Model, Reading};
 use crate::syntax::{
     self,
     ast::{QueryText, Template},
@@ -48,6 +48,8 @@ pub struct LoadedModel {
     symbolic_refusal: Option<Rejection>,
     /// The libraries that the model may import.
     pub(super) libraries: Libraries,
+    /// How many slots dynamic templates have in the stochastic reading.
+    pub(super) pool: u32,
     /// The model in the stochastic reading, once a statistical query was asked.
     pub(super) stochastic: Option<StochasticModel>,
 }
@@ -73,7 +75,14 @@ impl LoadedModel {
             return Err(Rejection::new(diagnostics, &sources));
         }
         let analysed = |reading| {
-            semantics::analyse_with(&parsed.document, &prelude, &sources, reading, libraries)
+            semantics::analyse_with(
+                &parsed.document,
+                &prelude,
+                &sources,
+                reading,
+                libraries,
+                FIRST_POOL,
+            )
         };
         let (mut model, more) = analysed(Reading::Symbolic);
         let mut symbolic_refusal = None;
@@ -120,6 +129,7 @@ impl LoadedModel {
             code: None,
             symbolic_refusal,
             libraries: libraries.clone(),
+            pool: FIRST_POOL,
             stochastic: None,
         })
     }
@@ -244,6 +254,7 @@ impl LoadedModel {
                 &self.sources,
                 Reading::Stochastic,
                 &self.libraries,
+                self.pool,
             );
             let Some(model) = model else {
                 let errors = found.into_iter().filter(Diagnostic::is_error).collect();

@@ -437,6 +437,8 @@ pub enum RunTimeErrorKind {
     Parameter(Distribution),
     /// A call of a function of a library that was not loaded.
     NotLoaded,
+    /// A new instance of a dynamic template for which there is no slot.
+    NoRoom,
     /// A clock set to a negative value, or a clock bound beyond the limits of the engine.
     ClockValue,
     /// An `assert` that does not hold.

@@ -134,7 +134,11 @@ fn in_expr(expr: &Expr, names: &mut HashSet<String>) {
             in_expr(left, names);
             in_expr(right, names);
         }
-        ExprKind::Call(_, arguments) => arguments.iter().for_each(|e| in_expr(e, names)),
+        ExprKind::Call(_, arguments) | ExprKind::Spawn(_, arguments) => {
+            for argument in arguments {
+                in_expr(argument, names);
+            }
+        }
         ExprKind::Ternary(condition, then, otherwise) => {
             in_expr(condition, names);
             in_expr(then, names);

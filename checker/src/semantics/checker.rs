@@ -69,6 +69,10 @@ pub(super) struct Checker<'a> {
     pub(super) needs_unrolling: bool,
     /// Whether a query is checked.
     pub(super) is_query: bool,
+    /// How many slots a dynamic template has.
+    pub(super) pool: u32,
+    /// What counts the instances of the template that is being checked, if it is a dynamic one.
+    pub(super) leaving: Option<Place>,
     /// The name of the function that is being checked.
     pub(super) function_span: Span,
     /// The process whose declarations are being checked.
@@ -92,6 +96,8 @@ pub(super) struct World {
     pub(super) query_scopes: Vec<Scope>,
     /// The processes by the name in the system line.
     pub(super) processes: super::processes::Processes,
+    /// The dynamic templates.
+    pub(super) dynamics: Vec<super::pools::Dynamic>,
 }
 
 /// What was reported at a time.
@@ -122,6 +128,8 @@ impl<'a> Checker<'a> {
             hides_system: false,
             needs_unrolling: false,
             is_query: false,
+            pool: 1,
+            leaving: None,
             function_span: Span::default(),
             process: None,
         }

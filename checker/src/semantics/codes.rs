@@ -169,6 +169,10 @@ codes! {
     EXTERNAL_MISSING = "E0295" "external-missing";
     /// An imported function that something depends on which symbolic queries need.
     EXTERNAL_SYMBOLIC = "E0296" "external-symbolic";
+    /// Something that dynamic templates do not allow.
+    DYNAMIC_MISUSED = "E0297" "dynamic-misused";
+    /// A dynamic template, which symbolic queries do not know.
+    DYNAMIC_SYMBOLIC = "E0298" "dynamic-symbolic";
     /// An expression whose value is dropped and that changes nothing.
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.

@@ -172,6 +172,7 @@ pub(super) fn reason(kind: RunTimeErrorKind) -> &'static str {
         RunTimeErrorKind::IndexOutOfBounds => "an index outside its array",
         RunTimeErrorKind::NotAnInteger => "a double that fits into no integer",
         RunTimeErrorKind::Parameter(_) => "a parameter of a random function out of its domain",
+        RunTimeErrorKind::NoRoom => "too many instances of a dynamic template",
         RunTimeErrorKind::NotLoaded => "a call of an external function whose library is not loaded",
         RunTimeErrorKind::ClockValue => "a clock value beyond the limits",
         RunTimeErrorKind::AssertionFailed => "an assertion that does not hold",

@@ -26,6 +26,7 @@ impl Checker<'_> {
                 Declaration::Variable(variable) => self.variable_declaration(variable),
                 Declaration::Function(function) => self.function(function),
                 Declaration::Import(import) => self.import(import),
+                Declaration::Dynamic(dynamic) => self.dynamic_template(dynamic),
                 Declaration::ChannelPriority { .. }
                 | Declaration::BeforeUpdate(..)
                 | Declaration::AfterUpdate(..) => {}

@@ -141,6 +141,7 @@ impl Checker<'_> {
             ty,
             reference: parameter.reference,
             constant,
+            passes_channel: false,
             declared,
         }
     }
@@ -188,6 +189,7 @@ impl Checker<'_> {
                 // The parser has refused these.
                 Declaration::Function(_)
                 | Declaration::Import(_)
+                | Declaration::Dynamic(_)
                 | Declaration::ChannelPriority { .. }
                 | Declaration::BeforeUpdate(..)
                 | Declaration::AfterUpdate(..) => {}

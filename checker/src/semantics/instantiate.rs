@@ -10,8 +10,8 @@ use super::assigned::assigned_names;
 use super::checker::Checker;
 use super::codes;
 use super::expressions::read;
+use super::groups::{Group, parameter_count};
 use super::offsets::known_offset;
-use super::processes::{Group, parameter_count};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{DEFAULT_INT, Memory, Size, Type};
@@ -57,6 +57,7 @@ impl Checker<'_> {
             }
         }
         self.expect_processes(document);
+        self.instances(document, &mut used);
         for (template, _) in document
             .templates
             .iter()
@@ -489,7 +490,7 @@ impl Checker<'_> {
         }
     }
 
-    fn warn_of_unused(&mut self, span: Span, what: &str, note: String) {
+    pub(super) fn warn_of_unused(&mut self, span: Span, what: &str, note: String) {
         self.report(
             Diagnostic::new(
                 codes::UNSUPPORTED_UNUSED,
@@ -506,7 +507,6 @@ impl Checker<'_> {
     fn unsupported_parts(&mut self, document: &Document, used: &[bool]) {
         for construct in &document.unsupported {
             let name = match &construct.part {
-                UnsupportedPart::DynamicTemplate(name) => Some(name.as_str()),
                 UnsupportedPart::Template(i) => Some(document.templates[*i].name.text.as_str()),
                 UnsupportedPart::Whole => None,
                 UnsupportedPart::Chart(_) => continue,
@@ -556,7 +556,9 @@ impl Checker<'_> {
             };
             self.declare(&formal.name, entity);
         }
+        self.leaving = self.counter_of(template);
         self.template(template, 0);
+        self.leaving = None;
         self.scopes.pop();
         self.hides_system = false;
         self.is_generic = false;

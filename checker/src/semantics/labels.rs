@@ -306,7 +306,11 @@ impl Checker<'_> {
     ) -> Update {
         let mut checked = Vec::new();
         for expr in exprs {
-            let expr = self.effect_expression(expr);
+            let expr = if matches!(expr.kind, ast::ExprKind::Exit) {
+                self.exit(expr.span)
+            } else {
+                self.effect_expression(expr)
+            };
             if !matches!(expr.kind, Kind::Int(_)) {
                 checked.push(expr);
             }

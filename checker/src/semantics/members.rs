@@ -6,21 +6,14 @@
 
 use super::checker::Checker;
 use super::codes;
+use super::groups::{Group, Member};
 use super::operators::compare_integers;
-use super::processes::Group;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::Span;
 use crate::ir::Relation;
 use crate::syntax::ast::{self, ExprKind, Name};
-
-/// A process, or one of a set that the state chooses.
-struct Member {
-    group: Group,
-    /// The arguments; none for a single process.
-    arguments: Vec<Expr>,
-}
 
 impl Checker<'_> {
     /// `record.name` where `record` is a process; `None` if it is not.
@@ -84,6 +77,9 @@ impl Checker<'_> {
         };
         match self.lookup(callee) {
             None | Some(Entity::Template(_) | Entity::Instantiation(_)) => {}
+            Some(Entity::Instance(member)) if arguments.is_empty() => {
+                return Some(Ok(Member::clone(&member)));
+            }
             Some(_) => return None,
         }
         let Some(group) = self.world.processes.groups.get(callee).cloned() else {
@@ -153,7 +149,11 @@ impl Checker<'_> {
                 return Err(());
             }
         }
-        Ok(Member { group, arguments })
+        Ok(Member {
+            group,
+            arguments,
+            is_instance: false,
+        })
     }
 
     /// What a name stands for in a process.
@@ -188,6 +188,12 @@ impl Checker<'_> {
                 }
             }
             Some(Entity::Constant { value, .. }) if process.is_some() => Expr { span, ..value },
+            // It is the same in all slots, unless a channel is meant.
+            Some(Entity::Constant { value, .. })
+                if member.is_instance && value.variable().is_none() =>
+            {
+                Expr { span, ..value }
+            }
             Some(Entity::Constant { .. }) => self.unroll_members(span),
             Some(Entity::Broken) => Expr::error(span),
             Some(_) | None => {
@@ -222,7 +228,12 @@ impl Checker<'_> {
     }
 
     /// The number of the location that a process is in.
-    fn location_number(&mut self, member: &Member, process: Option<u32>, span: Span) -> Expr {
+    pub(super) fn location_number(
+        &mut self,
+        member: &Member,
+        process: Option<u32>,
+        span: Span,
+    ) -> Expr {
         let first = member.group.first;
         let count = self.world.network.processes[first as usize].locations.len();
         let ty = Type::Int {

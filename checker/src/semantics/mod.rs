@@ -30,6 +30,10 @@ mod typed;
 
 mod scope;
 
+mod groups;
+
+mod pools;
+
 mod processes;
 
 mod offsets;
@@ -63,6 +67,8 @@ mod declarations;
 mod scalars;
 
 mod functions;
+
+mod dynamic;
 
 mod externals;
 
@@ -117,6 +123,9 @@ pub enum Reading {
     Stochastic,
 }
 
+/// How many slots a dynamic template has at first.
+pub const FIRST_POOL: u32 = 16;
+
 /// Checks and lowers a model; `None` if there are mistakes. The diagnostics are sorted by place.
 pub fn analyse(
     document: &ast::Document,
@@ -125,16 +134,18 @@ pub fn analyse(
     reading: Reading,
 ) -> (Option<Model>, Vec<Diagnostic>) {
     let libraries = Libraries::default();
-    analyse_with(document, prelude, sources, reading, &libraries)
+    analyse_with(document, prelude, sources, reading, &libraries, FIRST_POOL)
 }
 
-/// The same with the libraries that the model may import.
+/// The same with the libraries that the model may import, and with this number of slots for the
+/// instances of each dynamic template; symbolic readings have one.
 pub fn analyse_with(
     document: &ast::Document,
     prelude: &[ast::Declaration],
     sources: &SourceMap,
     reading: Reading,
     libraries: &Libraries,
+    pool: u32,
 ) -> (Option<Model>, Vec<Diagnostic>) {
     let mut causes = left_out::Causes::default();
     let mut rounds = 1;
@@ -142,6 +153,9 @@ pub fn analyse_with(
         let world = checker::World::default();
         let mut checker = checker::Checker::new(sources, reading, world);
         checker.libraries = libraries.clone();
+        if reading == Reading::Stochastic {
+            checker.pool = pool;
+        }
         checker.left_out = LeftOut::of(causes);
         let relocation = checker.document(document, prelude);
         if !checker.has_errors() || rounds == left_out::MOST_ROUNDS {
@@ -177,6 +191,7 @@ pub fn is_symbolic(diagnostic: &Diagnostic) -> bool {
         codes::CLOCK_SET_TO_DIFFERENCE,
         codes::HYBRID_CLOCK_COMPARED,
         codes::EXTERNAL_SYMBOLIC,
+        codes::DYNAMIC_SYMBOLIC,
     ]
     .contains(&diagnostic.code)
 }

@@ -18,6 +18,9 @@ impl Checker<'_> {
         body: &ast::Expr,
         span: Span,
     ) -> Expr {
+        if let Some(checked) = self.over_instances(quantifier, (name, ty), body, span) {
+            return checked;
+        }
         let Some((range_type, range)) = self.iterated(ty) else {
             self.scopes.push(super::scope::Scope::default());
             self.declare(name, Entity::Broken);
@@ -77,7 +80,7 @@ impl Checker<'_> {
     }
 
     /// The type of a quantified expression with this body; reports a body that does not fit.
-    fn quantified_type(&mut self, quantifier: Quantifier, body: &Expr) -> Option<Type> {
+    pub(super) fn quantified_type(&mut self, quantifier: Quantifier, body: &Expr) -> Option<Type> {
         if quantifier == Quantifier::Sum {
             if body.ty == Type::Double {
                 return Some(Type::Double);

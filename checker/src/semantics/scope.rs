@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
+use super::groups::Member;
 use super::typed::{Expr, Place, Signature};
 use super::types::Type;
 use crate::diagnostics::Span;
@@ -35,6 +36,8 @@ pub(super) enum Entity {
     Chart,
     /// A location of the template.
     Location(u32),
+    /// An instance of a dynamic template, in a quantifier.
+    Instance(Arc<Member>),
     /// Something about which a mistake was reported, or of which nothing is known.
     Broken,
 }
@@ -49,6 +52,7 @@ impl Entity {
             Entity::Instantiation(_) => "a process",
             Entity::Chart => "a live sequence chart",
             Entity::Location(_) => "a location",
+            Entity::Instance(_) => "an instance of a template",
             Entity::Constant { .. } => "a constant",
             Entity::Variable { .. } => "a variable",
             Entity::Broken => "unknown",

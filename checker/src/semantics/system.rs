@@ -44,6 +44,7 @@ impl Checker<'_> {
         self.system_is_open = true;
         self.system(document);
         self.whole_system(document);
+        self.spawned_writes();
         let relocation = self.finish();
         self.hooks();
         self.world.query_scopes = std::mem::take(&mut self.scopes);

@@ -5,6 +5,7 @@ use rustc_hash::FxHashMap;
 use super::Reading;
 use super::checker::Checker;
 use super::codes;
+use super::dynamic::exits;
 use super::labels::Select;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
@@ -276,7 +277,10 @@ impl Checker<'_> {
         });
         let update = self.update(&edge.update, &locals, &format!("{place}, update"));
         self.scopes.pop();
-        let branches = self.branches(template, edge, nodes, selects.len(), &place);
+        let mut branches = self.branches(template, edge, nodes, selects.len(), &place);
+        for branch in &mut branches {
+            branch.target = self.unless_exit(template, &edge.update, 0, branch.target);
+        }
         ir::Edge {
             source,
             select: selects.into_iter().map(|select| select.range).collect(),
@@ -373,8 +377,10 @@ impl Checker<'_> {
                 continue;
             };
             let updates = self.leg(leg, parameters, place);
+            let others = exits(&edge.update);
+            let target = self.unless_exit(template, &leg.update, others, LocationId(target));
             branches.extend(updates.into_iter().map(|(update, weight)| ir::Branch {
-                target: LocationId(target),
+                target,
                 update,
                 weight,
             }));

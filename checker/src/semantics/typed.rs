@@ -220,6 +220,8 @@ pub(super) struct Parameter {
     pub(super) reference: bool,
     /// Whether it may not be assigned.
     pub(super) constant: bool,
+    /// Whether it is a channel that is passed by its number, to an instance of a template.
+    pub(super) passes_channel: bool,
     /// Where it was declared, if it could be left out.
     pub(super) declared: Span,
 }

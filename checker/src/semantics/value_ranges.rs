@@ -7,11 +7,15 @@
 use super::typed::{Expr, Kind};
 use crate::ir::DoubleOperator;
 
-/// The range of an expression; `None` if it is not known, or as wide as that of all integers.
+/// How much the greatest value of an `int` without a declared range is above the least.
+const WIDTH_OF_INT: i64 = 65_535;
+
+/// The range of an expression; `None` if it is not known. The range of `int` says nothing of a
+/// value: it is there because no other one was declared.
 pub(super) fn range(expr: &Expr) -> Option<(f64, f64)> {
     if expr.ty.is_integral() {
         let (low, high) = expr.interval;
-        let is_known = low > i32::MIN && high < i32::MAX && low <= high;
+        let is_known = low <= high && i64::from(high) - i64::from(low) < WIDTH_OF_INT;
         return is_known.then_some((f64::from(low), f64::from(high)));
     }
     match &expr.kind {

@@ -22,6 +22,8 @@ pub(super) struct Collector {
     wanted: Option<u64>,
     runs: u64,
     satisfied: u64,
+    /// The mean of the results.
+    mean: Expectation,
     /// The number of runs at which a confidence sequence is looked at again.
     next_look: u64,
     kind: Kind,
@@ -36,7 +38,7 @@ enum Kind {
         at_least: bool,
         decision: Option<Decision>,
     },
-    Student(Expectation),
+    Student,
     Bounded(BoundedMean),
     Distribution(Distribution),
 }
@@ -84,6 +86,7 @@ impl Collector {
             wanted: precision.runs.or(bound.runs),
             runs: 0,
             satisfied: 0,
+            mean: Expectation::default(),
             next_look: 1,
             kind,
         }
@@ -107,7 +110,7 @@ impl Collector {
                 let planned = wanted.filter(|_| !precision.is_sequential());
                 Kind::Bounded(BoundedMean::new(bounds, precision.alpha, planned))
             }
-            (MeanMethod::Student, _) | (_, None) => Kind::Student(Expectation::default()),
+            (MeanMethod::Student, _) | (_, None) => Kind::Student,
         }
     }
 
@@ -122,6 +125,9 @@ impl Collector {
         {
             return Err(Failure::ValueOutOfBounds(value));
         }
+        if self.is_mean() {
+            self.mean.push(value);
+        }
         let is_enough = match &mut self.kind {
             Kind::Fixed(rule) => self.wanted.is_none() && rule.push(satisfied),
             Kind::Test {
@@ -133,10 +139,7 @@ impl Collector {
                 decision.is_some()
             }
             Kind::Sequence => false,
-            Kind::Student(mean) => {
-                mean.push(value);
-                false
-            }
+            Kind::Student => false,
             Kind::Bounded(mean) => {
                 mean.push(value);
                 false
@@ -174,7 +177,7 @@ impl Collector {
             }
             Kind::Bounded(mean) => {
                 let Some(part) = relative else { return false };
-                let (mean, interval) = (mean.mean(), mean.interval());
+                let (mean, interval) = (self.mean.mean(), mean.interval());
                 let half = (mean - interval.lower).max(interval.upper - mean);
                 half <= part * mean.abs()
             }
@@ -185,7 +188,7 @@ impl Collector {
     fn is_mean(&self) -> bool {
         matches!(
             self.kind,
-            Kind::Student(_) | Kind::Bounded(_) | Kind::Distribution(_)
+            Kind::Student | Kind::Bounded(_) | Kind::Distribution(_)
         )
     }
 
@@ -206,9 +209,9 @@ impl Collector {
                 let sequence = ProbabilitySequence::after(runs, self.satisfied);
                 (share, sequence.interval(alpha), Method::ConfidenceSequence)
             }
-            Kind::Student(mean) => {
-                let interval = mean.student(alpha).unwrap_or(unknown);
-                (mean.mean(), interval, Method::Student)
+            Kind::Student => {
+                let interval = self.mean.student(alpha).unwrap_or(unknown);
+                (self.mean.mean(), interval, Method::Student)
             }
             Kind::Bounded(mean) => {
                 let method = if self.precision.is_sequential() {
@@ -216,10 +219,10 @@ impl Collector {
                 } else {
                     Method::EmpiricalBernstein
                 };
-                (mean.mean(), mean.interval(), method)
+                (self.mean.mean(), mean.interval(), method)
             }
             Kind::Distribution(values) => (
-                values.mean(),
+                self.mean.mean(),
                 values.interval(alpha),
                 Method::DvoretzkyKieferWolfowitz,
             ),

@@ -77,6 +77,9 @@ pub(super) struct Program<'a> {
     weights: Vec<Number>,
     /// By branch of an edge: the processes that plan anew after it, beside those that move.
     concerned: Vec<Box<[u32]>>,
+    /// By branch of an edge: the processes whose locations its updates may set, as those of dynamic
+    /// templates do.
+    placed: Vec<Box<[u32]>>,
     /// By channel: the processes that may receive on it.
     listeners: Vec<Vec<u32>>,
     /// By the first word of a clock: whose plans depend on its rate.
@@ -101,6 +104,7 @@ impl<'a> Program<'a> {
             comparisons: Vec::new(),
             weights: Vec::new(),
             concerned: Vec::new(),
+            placed: Vec::new(),
             listeners: vec![Vec::new(); network.channels.len()],
             rate_readers: FxHashMap::default(),
             followers: Vec::new(),
@@ -329,6 +333,8 @@ impl<'a> Program<'a> {
             .collect();
         let mut known: FxHashMap<(u32, u32), u32> = FxHashMap::default();
         let (concerned, weights) = (&mut self.concerned, &mut self.weights);
+        let placed = &mut self.placed;
+        let processes = network.processes.len() as u32;
         for instance in &mut self.instances {
             let edge = instance.edge;
             let of_edge = known.entry((instance.process, instance.id.0));
@@ -340,11 +346,16 @@ impl<'a> Program<'a> {
                     Some(weight) if has_bindings => Number::Computed(weight),
                     Some(weight) => number(weight, &[], machine),
                 }));
-                concerned.extend(edge.branches.iter().map(|branch| {
+                for branch in &edge.branches {
                     let updates: [&Update; 2] = [&edge.update, &branch.update];
                     let writes = updates.into_iter().flat_map(|update| &update.writes);
-                    union_of(&readers, writes.chain(&around).copied())
-                }));
+                    let writes: Vec<(u32, u32)> = writes.chain(&around).copied().collect();
+                    let words = writes
+                        .iter()
+                        .flat_map(|&(start, count)| start..start + count);
+                    placed.push(words.filter(|&word| word < processes).collect());
+                    concerned.push(union_of(&readers, writes));
+                }
                 first
             });
         }
@@ -388,6 +399,11 @@ impl<'a> Program<'a> {
     /// The processes that plan anew after a branch of an instance, beside those that move.
     pub(super) fn concerned(&self, instance: &Instance<'_>, branch: usize) -> &[u32] {
         &self.concerned[instance.branches as usize + branch]
+    }
+
+    /// The processes whose locations the updates of a branch may set.
+    pub(super) fn placed(&self, instance: &Instance<'_>, branch: usize) -> &[u32] {
+        &self.placed[instance.branches as usize + branch]
     }
 
     /// The processes that may receive on a channel, ascending.

@@ -30,7 +30,7 @@ pub struct Document {
     pub system: System,
     /// The queries of the file, in order; empty and comment-only formulas are left out.
     pub queries: Vec<QueryText>,
-    /// Constructs that were read and are not supported: LSC templates, dynamic templates.
+    /// Constructs that were read and are not supported, such as LSC templates.
     pub unsupported: Vec<Unsupported>,
 }
 
@@ -52,8 +52,6 @@ pub enum UnsupportedPart {
     Whole,
     /// A template, by its place in [`Document::templates`].
     Template(usize),
-    /// It declares a dynamic template of this name.
-    DynamicTemplate(String),
     /// It is a live sequence chart of this name.
     Chart(Name),
 }
@@ -194,10 +192,21 @@ pub enum Declaration {
     },
     /// `import "library" { … };`
     Import(Import),
+    /// `dynamic T(parameters);`
+    Dynamic(DynamicTemplate),
     /// `before_update { … }`
     BeforeUpdate(Vec<Expr>, Span),
     /// `after_update { … }`
     AfterUpdate(Vec<Expr>, Span),
+}
+
+/// The declaration that instances of a template may come and go while the model runs.
+#[derive(Clone, Debug)]
+pub struct DynamicTemplate {
+    /// The name of the template.
+    pub name: Name,
+    /// The parameters.
+    pub parameters: Vec<Parameter>,
 }
 
 /// A library and the functions that the model uses of it.
@@ -382,6 +391,12 @@ pub enum ExprKind {
         /// The body.
         body: Box<Expr>,
     },
+    /// `spawn T(arguments)`: a new instance of a dynamic template.
+    Spawn(Name, Vec<Expr>),
+    /// `exit()`: the instance that takes the edge ends.
+    Exit,
+    /// `numOf(T)`: how many instances of a dynamic template there are.
+    NumberOf(Name),
     /// `deadlock`, in queries.
     Deadlock,
     /// An expression that could not be read; a diagnostic was reported.

@@ -2,8 +2,8 @@
 //! supported is recorded.
 
 use super::ast::{
-    Block, Declaration, Expr, Function, Import, ImportedFunction, Initialiser, Name, TypeExpr,
-    Unsupported, UnsupportedPart, Variable,
+    Block, Declaration, DynamicTemplate, Expr, Function, Import, ImportedFunction, Initialiser,
+    Name, TypeExpr, Variable,
 };
 use super::codes;
 use super::keywords::Dialect;
@@ -52,7 +52,7 @@ impl Parser<'_> {
             "typedef" if is_new => self.typedef(declarations),
             "before_update" | "after_update" if is_new => self.update_hook(declarations),
             "import" if is_new => self.import(declarations),
-            "dynamic" if is_new => self.dynamic_template(),
+            "dynamic" if is_new => self.dynamic_template(declarations),
             "chan" if is_new && self.word_at(1) == "priority" => {
                 self.channel_priority(declarations);
             }
@@ -157,16 +157,12 @@ impl Parser<'_> {
     }
 
     /// `dynamic T(parameters);`
-    fn dynamic_template(&mut self) {
+    fn dynamic_template(&mut self, declarations: &mut Vec<Declaration>) {
         let before = self.progress();
         self.bump();
         let name = self.name("the name of the template");
-        self.parameter_list();
-        self.unsupported.push(Unsupported {
-            text: format!("dynamic template `{}`", name.text),
-            span: name.span,
-            part: UnsupportedPart::DynamicTemplate(name.text),
-        });
+        let parameters = self.parameter_list();
+        declarations.push(Declaration::Dynamic(DynamicTemplate { name, parameters }));
         self.end_of_declaration("after the declaration", before);
     }
 

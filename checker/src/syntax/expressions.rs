@@ -462,37 +462,51 @@ impl Parser<'_> {
         self.node(start, kind, type_height)
     }
 
-    /// `spawn T(…)`, `exit()`, `numOf(T)`, `foreach (i : T) e`: read and recorded.
+    /// `spawn T(…)`, `exit()`, `numOf(T)`; `foreach (i : T) e` is read and recorded.
     fn dynamic(&mut self) -> Expr {
         let span = self.here();
         let word = self.word();
         self.bump();
-        match word {
+        self.height = 1;
+        let kind = match word {
             "spawn" => {
-                self.name("the name of a dynamic template");
+                let template = self.name("the name of a dynamic template");
+                let arguments = if self.at(TokenKind::LeftParenthesis) {
+                    self.arguments()
+                } else {
+                    self.expected("`(` before the arguments of the new instance");
+                    Vec::new()
+                };
+                ExprKind::Spawn(template, arguments)
             }
-            "foreach" => {
-                self.skip_to(&[TokenKind::LeftParenthesis, TokenKind::Semicolon]);
-                self.eat(TokenKind::LeftParenthesis);
-                self.skip_to(&[TokenKind::RightParenthesis, TokenKind::Semicolon]);
-                self.eat(TokenKind::RightParenthesis);
-                self.expression();
+            "foreach" => self.for_each(span),
+            _ => {
+                self.expect(TokenKind::LeftParenthesis, "after the word");
+                let kind = if word == "exit" {
+                    ExprKind::Exit
+                } else {
+                    ExprKind::NumberOf(self.name("the name of a dynamic template"))
+                };
+                self.closing(TokenKind::RightParenthesis, "at the end");
+                kind
             }
-            _ => {}
-        }
-        if word != "foreach" && self.at(TokenKind::LeftParenthesis) {
-            self.arguments();
-        }
+        };
+        let height = self.height;
+        self.node(span, kind, height)
+    }
+
+    fn for_each(&mut self, span: Span) -> ExprKind {
+        self.skip_to(&[TokenKind::LeftParenthesis, TokenKind::Semicolon]);
+        self.eat(TokenKind::LeftParenthesis);
+        self.skip_to(&[TokenKind::RightParenthesis, TokenKind::Semicolon]);
+        self.eat(TokenKind::RightParenthesis);
+        self.expression();
         self.unsupported.push(Unsupported {
-            text: format!("dynamic templates (`{word}`)"),
+            text: "`foreach` over the instances of a dynamic template".to_owned(),
             span,
             part: UnsupportedPart::Whole,
         });
-        self.height = 1;
-        Expr {
-            kind: ExprKind::Unsupported,
-            span: self.since(span),
-        }
+        ExprKind::Unsupported
     }
 
     fn nested_path_quantifier(&mut self) -> Expr {

@@ -65,6 +65,12 @@ impl Printer {
             ExprKind::String(text) => self.display(format_args!("\"{text}\"")),
             ExprKind::Name(name) => self.push(name),
             ExprKind::Deadlock => self.push("deadlock"),
+            ExprKind::Exit => self.push("exit()"),
+            ExprKind::NumberOf(name) => self.display(format_args!("numOf({})", name.text)),
+            ExprKind::Spawn(name, arguments) => {
+                self.display(format_args!("spawn {}", name.text));
+                self.arguments(arguments);
+            }
             ExprKind::Error | ExprKind::Unsupported => self.push("<error>"),
             ExprKind::Field(object, name) => {
                 self.expr(object, level::POSTFIX, false);
@@ -123,6 +129,10 @@ impl Printer {
 
     fn call(&mut self, function: &Expr, arguments: &[Expr]) {
         self.expr(function, level::POSTFIX, false);
+        self.arguments(arguments);
+    }
+
+    fn arguments(&mut self, arguments: &[Expr]) {
         self.push("(");
         for (index, argument) in arguments.iter().enumerate() {
             self.push(if index == 0 { "" } else { ", " });

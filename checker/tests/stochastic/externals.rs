@@ -449,8 +449,8 @@ fn signatures_without_a_meaning_in_c_are_refused() {
 }
 
 #[test]
-fn conditions_on_clocks_that_a_library_computes_are_refused() {
+fn conditions_on_clocks_that_a_library_computes_need_the_library() {
     let model = r#"import "libnone.so" { bool f(double x); }; clock x;
         process P() { state a { ; 1 }, b; init a; trans a -> b { guard f(x); }; } system P;"#;
-    refused(model, &[], "Pr[<=2](<> P.b)", &["E0283"]);
+    refused(model, &[], "Pr[<=2](<> P.b)", &["E0806", "libnone.so"]);
 }

@@ -18,6 +18,7 @@ mod certainties;
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
 mod comparisons;
+mod dynamic;
 #[cfg(unix)]
 mod externals;
 mod flows;

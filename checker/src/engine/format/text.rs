@@ -493,6 +493,7 @@ pub(crate) fn run_time_error(kind: RunTimeErrorKind) -> &'static str {
         RunTimeErrorKind::IndexOutOfBounds => "array index out of bounds",
         RunTimeErrorKind::NotAnInteger => "the number does not fit into an integer",
         RunTimeErrorKind::Parameter(distribution) => distribution.failure(),
+        RunTimeErrorKind::NoRoom => "too many instances of a dynamic template",
         RunTimeErrorKind::NotLoaded => "call of an external function whose library is not loaded",
         RunTimeErrorKind::ClockValue => {
             "negative value of a clock, or clock bound beyond the limits"

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::statistical::{contradiction, remark, verdict};
+use super::statistical::{GREATEST_POOL, contradiction, remark, verdict};
 use crate::diagnostics::Diagnostic;
 use crate::engine::answer::{Answer, Verdict};
 use crate::engine::code::PreparedCode;
@@ -12,7 +12,7 @@ use crate::engine::limits::LimitWatch;
 use crate::engine::loaded_model::{LoadedModel, StochasticModel};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
-use crate::ir::{Statistical, StatisticalQuery};
+use crate::ir::{RunTimeErrorKind, Statistical, StatisticalQuery};
 use crate::search::limits::{Counters, Watch as _};
 use crate::stochastic::{Behaviour, Estimate, Failure, Precision, bound_of, estimate_jointly};
 use crate::syntax::ast::QueryText;
@@ -26,7 +26,11 @@ impl LoadedModel {
     ) -> Result<Vec<Answer>, Rejection> {
         self.stochastic()?;
         let mut stochastic = self.stochastic.take().expect("it was just made");
+        let pool = self.pool;
         let answers = self.joint_answers(&mut stochastic, queries, options);
+        if self.pool > pool {
+            return self.check_jointly(queries, options);
+        }
         self.stochastic = Some(stochastic);
         answers
     }
@@ -96,6 +100,10 @@ impl LoadedModel {
                 return Ok(queries.iter().map(unknown).collect());
             }
             Ok(Err((Failure::RunTime(error), _))) => {
+                if error.kind == RunTimeErrorKind::NoRoom && self.pool < GREATEST_POOL {
+                    // All begins again with more slots.
+                    self.pool *= 2;
+                }
                 return Err(self.run_time_error(network, error));
             }
             Ok(Err((failure, index))) => {

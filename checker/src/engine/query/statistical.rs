@@ -26,6 +26,9 @@ use crate::stochastic::{
 use crate::syntax;
 use crate::syntax::ast;
 
+/// The most slots of a dynamic template.
+pub(super) const GREATEST_POOL: u32 = 4096;
+
 /// What runs show.
 #[derive(Default)]
 struct Found {
@@ -166,6 +169,13 @@ impl LoadedModel {
                 answer.remark(NO_RUN);
                 Ok(answer)
             }
+            Ok(Err(Failure::RunTime(error)))
+                if error.kind == RunTimeErrorKind::NoRoom && self.pool < GREATEST_POOL =>
+            {
+                // No run depends on the number of slots, so that all begins again with more.
+                self.pool *= 2;
+                return self.check_statistical(query, options);
+            }
             Ok(Err(Failure::RunTime(error))) => {
                 let failure = network::Failure::from(error);
                 match failure {
@@ -213,6 +223,15 @@ impl LoadedModel {
         error: crate::exec::RunTimeError,
     ) -> Rejection {
         let span = network.sites[error.site.0 as usize].span;
+        if error.kind == RunTimeErrorKind::NoRoom {
+            let template = self.sources.text(span);
+            let message = format!(
+                "a random run has more than {GREATEST_POOL} instances of '{template}' at a time"
+            );
+            let help =
+                "let instances end with exit(), or bound the run: spawn seems to have no end";
+            return self.failing(span, message, help);
+        }
         if error.kind == RunTimeErrorKind::NotLoaded {
             let message = "a random run calls this function of a library that is not allowed";
             let missing = network.externals.iter().filter(|one| !one.is_loaded);

@@ -56,7 +56,7 @@ impl<'call> NativeContext<'call> {
 }
 
 /// The kinds of errors but for [`RunTimeErrorKind::Parameter`].
-const KINDS: [RunTimeErrorKind; 12] = [
+const KINDS: [RunTimeErrorKind; 13] = [
     RunTimeErrorKind::Overflow,
     RunTimeErrorKind::DivisionByZero,
     RunTimeErrorKind::ShiftDistance,
@@ -65,6 +65,7 @@ const KINDS: [RunTimeErrorKind; 12] = [
     RunTimeErrorKind::IndexOutOfBounds,
     RunTimeErrorKind::NotAnInteger,
     RunTimeErrorKind::NotLoaded,
+    RunTimeErrorKind::NoRoom,
     RunTimeErrorKind::ClockValue,
     RunTimeErrorKind::AssertionFailed,
     RunTimeErrorKind::StepLimit,

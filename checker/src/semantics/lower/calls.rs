@@ -1,9 +1,11 @@
 //! Calls and their arguments.
 
 use super::super::typed::{ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature};
-use super::super::types::Type;
+use super::super::types::{Memory, Type};
 use super::{Builder, register_type};
-use crate::ir::{Address, ClockAtom, FunctionId, Instruction, Register, RegisterType};
+use crate::ir::{
+    Address, ClockAtom, FunctionId, Instruction, IntegerOperator, Register, RegisterType,
+};
 
 impl Builder<'_> {
     /// Calls a function. An array or struct that it returns goes to `result`.
@@ -58,6 +60,15 @@ impl Builder<'_> {
         if parameter.ty == Type::String {
             let text = self.text(argument);
             registers.push(text);
+            return None;
+        }
+        if parameter.passes_channel {
+            let (first, _, index) = self.offset(argument, Memory::Channels);
+            let mut number = self.integer(first as i32);
+            if let Some(index) = index {
+                number = self.arithmetic(IntegerOperator::Add, number, index, argument.span);
+            }
+            registers.push(number);
             return None;
         }
         if parameter.reference {

@@ -20,6 +20,7 @@ mod externals;
 pub(super) mod horizons;
 mod places;
 mod quantifiers;
+mod spawn;
 mod statements;
 
 use std::hash::BuildHasher;
@@ -131,6 +132,8 @@ impl<'n> Builder<'n> {
                     address,
                     clock: None,
                 }
+            } else if parameter.passes_channel {
+                Home::Register(self.register(RegisterType::Integer))
             } else if parameter.reference {
                 let size = parameter.ty.size();
                 let has_words = parameter.ty.has_words();

@@ -101,24 +101,34 @@ impl<'a> Race<'a> {
 
     /// Lets a mover enter the target of its branch, and finds who plans anew.
     pub(super) fn enter(&mut self, program: &Program<'a>, mover: &Instance<'a>, branch: usize) {
-        let process = mover.process as usize;
-        let id = ProcessId(mover.process);
-        let target = mover.edge.branches[branch].target;
         self.make_stale(mover.process);
         for &concerned in program.concerned(mover, branch) {
             self.make_stale(concerned);
         }
-        let before = self.locations[process];
-        if target == before {
+        for &placed in program.placed(mover, branch) {
+            let location = self.machine.location(placed as usize);
+            self.place(program, placed, location);
+        }
+        let target = mover.edge.branches[branch].target;
+        self.machine.enter(ProcessId(mover.process), target);
+        self.place(program, mover.process, target);
+    }
+
+    /// Notes where a process is now.
+    fn place(&mut self, program: &Program<'a>, process: u32, location: LocationId) {
+        let before = self.locations[process as usize];
+        if location == before {
             return;
         }
-        let is_committed =
-            |location| usize::from(program.spot(process, location).urgency == Urgency::Committed);
-        self.committed += is_committed(target);
+        let is_committed = |location| {
+            let spot = program.spot(process as usize, location);
+            usize::from(spot.urgency == Urgency::Committed)
+        };
+        self.committed += is_committed(location);
         self.committed -= is_committed(before);
-        self.locations[process] = target;
-        self.machine.enter(id, target);
-        for &follower in program.followers(id) {
+        self.locations[process as usize] = location;
+        self.make_stale(process);
+        for &follower in program.followers(ProcessId(process)) {
             self.make_stale(follower);
         }
     }

@@ -223,8 +223,8 @@ fn unsupported_queries_are_named() {
     check("sat: Scenario", "unsupported: live sequence chart scenario");
     check("A[ p U q ]", "unsupported: `A[p U q]` outside `control:`");
     check(
-        "E<> numOf(T) > 3",
-        "unsupported: dynamic templates (`numOf`)",
+        "E<> foreach (c : T) c.n > 3",
+        "unsupported: `foreach` over the instances of a dynamic template",
     );
 }
 

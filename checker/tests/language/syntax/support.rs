@@ -120,6 +120,9 @@ pub(crate) fn shape(expr: &Expr) -> String {
             type_shape(ty),
             shape(body)
         ),
+        ExprKind::Spawn(name, arguments) => format!("(spawn {}{})", name.text, shapes(arguments)),
+        ExprKind::Exit => "exit".to_owned(),
+        ExprKind::NumberOf(name) => format!("(numOf {})", name.text),
         ExprKind::Deadlock => "deadlock".to_owned(),
         ExprKind::Error | ExprKind::Unsupported => "error".to_owned(),
     }
