@@ -204,7 +204,7 @@ impl<'a> Advice<'a> {
                 return false;
             };
             let mut ready = receivers.iter().filter(|one| is_ready(one, behind));
-            let takes_part = |one: &Ready| others.iter().any(|other| *other == one.entry);
+            let takes_part = |one: &Ready| others.contains(&one.entry);
             let has_part = |one: &Ready| {
                 others
                     .iter()

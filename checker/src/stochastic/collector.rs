@@ -138,8 +138,7 @@ impl Collector {
                 *decision = test.push(satisfied == *at_least);
                 decision.is_some()
             }
-            Kind::Sequence => false,
-            Kind::Student => false,
+            Kind::Sequence | Kind::Student => false,
             Kind::Bounded(mean) => {
                 mean.push(value);
                 false

@@ -28,7 +28,7 @@ fn split(
     };
     let asked = (bound, path);
     estimate_rare(
-        Behaviour::new(&network, &*jit),
+        Behaviour::new(network, &*jit),
         asked,
         &splitting,
         precision,

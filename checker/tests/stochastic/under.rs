@@ -47,7 +47,7 @@ fn expect(model: &mut LoadedModel, choice: UnderChoice, path: &str, probability:
     const RUNS: u64 = 10_000;
     let query = format!("{path} under S");
     let found = estimate(model, &query, &options(choice, RUNS));
-    let margin = if probability == 0.0 || probability == 1.0 {
+    let margin = if probability.fract() == 0.0 {
         0.0
     } else {
         // Two-sided, at a risk of one in a million.
@@ -366,7 +366,7 @@ fn game(random: &mut Random) -> String {
                 }
                 None => format!("s{place} {{ ; {rate} }}"),
             });
-            for _ in 0..1 + random.below(3) {
+            for _ in 0..=random.below(3) {
                 let arrow = random.one_of(&["->", "->", "-u->"]);
                 let other = random.one_of(&["x", "y"]);
                 let relation = random.one_of(&["<", "<=", ">", ">=", ">="]);

@@ -69,10 +69,9 @@ impl<'a> Race<'a> {
         if let Some((standstill, process)) = self.standstill
             && standstill < first
         {
-            let all = 0..self.attempts.len();
             let is_now = standstill <= TOLERANCE;
             let winner = if is_now {
-                self.one_with_outputs(program, all)?
+                self.one_with_outputs(program, false)?
             } else {
                 // What it can do then is found then.
                 Some(process)

@@ -300,8 +300,7 @@ impl<'a> Race<'a> {
         let stopped_by = self.bounds.iter().position(|&bound| bound <= least);
         let mut winner = None;
         if least <= TOLERANCE {
-            let all = 0..self.attempts.len();
-            winner = self.one_with_outputs(program, all)?;
+            winner = self.one_with_outputs(program, false)?;
         }
         Ok(Next {
             delay: least,
@@ -312,32 +311,30 @@ impl<'a> Race<'a> {
 
     /// What comes next where a committed location must be left.
     fn next_committed(&mut self, program: &Program<'a>) -> Result<Next, Failure> {
-        let all = 0..self.attempts.len();
-        let is_committed = |race: &Race<'_>, one: usize| race.urgency(one) == Urgency::Committed;
-        let committed: Vec<usize> = all.clone().filter(|&one| is_committed(self, one)).collect();
-        let by = committed[0];
-        let mut winner = self.one_with_outputs(program, committed)?;
+        let mut winner = self.one_with_outputs(program, true)?;
         if winner.is_none() {
             // Somebody else may send to a committed location.
-            winner = self.one_with_outputs(program, all)?;
+            winner = self.one_with_outputs(program, false)?;
         }
+        let mut all = 0..self.locations.len();
         Ok(Next {
             delay: 0.0,
             winner,
-            stopped_by: Some(by),
+            stopped_by: all.find(|&one| self.urgency(one) == Urgency::Committed),
         })
     }
 
-    /// One of the processes with an output that is enabled now.
+    /// One of the processes with an output that is enabled now, or of those in committed locations.
     fn one_with_outputs(
         &mut self,
         program: &Program<'a>,
-        processes: impl IntoIterator<Item = usize> + Clone,
+        only_committed: bool,
     ) -> Result<Option<usize>, Failure> {
         let (mut winner, mut ties) = (None, 0);
         loop {
-            for process in processes.clone() {
-                if !self.find_outputs(program, process)? {
+            for process in 0..self.locations.len() {
+                let is_asked = !only_committed || self.urgency(process) == Urgency::Committed;
+                if !is_asked || !self.find_outputs(program, process)? {
                     continue;
                 }
                 ties += 1;

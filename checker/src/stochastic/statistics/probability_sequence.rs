@@ -86,8 +86,6 @@ impl ProbabilitySequence {
 
 #[cfg(test)]
 mod tests {
-    #![expect(clippy::float_cmp, reason = "the ends of the interval are exact")]
-
     use super::ProbabilitySequence;
 
     /// The probability that one of the intervals of the first `most` runs misses `p`, by dynamic
