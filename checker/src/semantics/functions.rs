@@ -207,7 +207,7 @@ impl Checker<'_> {
         let mut parts = variable
             .initialiser
             .as_ref()
-            .map(|initialiser| self.initialiser(initialiser, &ty));
+            .map(|initialiser| self.local_initialiser(initialiser, &ty));
         self.expect_values(&ty, variable.ty.span);
         let prefixes = self.carried(&variable.ty);
         let size = ty.size();

@@ -100,6 +100,29 @@ impl Checker<'_> {
     pub(super) fn initialiser(&mut self, initialiser: &Initialiser, ty: &Type) -> Vec<InitialPart> {
         let mut parts = Vec::new();
         self.initial_parts(initialiser, ty, Size::default(), &mut parts);
+        for part in &parts {
+            if let InitialValue::Expr(value) = &part.value {
+                self.expect_pure(value, "an initial value");
+            }
+        }
+        parts
+    }
+
+    /// The same for a local of a function, whose initial value may be drawn at random.
+    pub(super) fn local_initialiser(
+        &mut self,
+        initialiser: &Initialiser,
+        ty: &Type,
+    ) -> Vec<InitialPart> {
+        let mut parts = Vec::new();
+        self.initial_parts(initialiser, ty, Size::default(), &mut parts);
+        for part in &parts {
+            if let InitialValue::Expr(value) = &part.value
+                && value.changes()
+            {
+                self.expect_pure(value, "an initial value");
+            }
+        }
         parts
     }
 
@@ -149,7 +172,6 @@ impl Checker<'_> {
     /// value.
     fn initial_value(&mut self, expr: &ast::Expr, ty: &Type) -> Expr {
         let value = self.expression(expr);
-        self.expect_pure(&value, "an initial value");
         let value = if ty.is_clock() {
             self.initial_clock(value, ty)
         } else if ty.size().channels > 0 || *ty == Type::Void {

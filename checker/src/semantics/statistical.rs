@@ -68,17 +68,7 @@ impl Checker<'_> {
                 maximum,
                 value,
             } => {
-                let span = bound.span;
                 let bound = self.run_bound(bound)?;
-                if bound.runs.is_none() {
-                    self.error(
-                        codes::VALUE_NOT_CONSTANT,
-                        span,
-                        "an expected value needs a number of runs",
-                        "write it behind the bound: E[<=10; 1000](max: x)",
-                    );
-                    return None;
-                }
                 let value = self.expression(value);
                 self.expect_pure(&value, "a query");
                 if !value.is_error() && !value.ty.is_number() {

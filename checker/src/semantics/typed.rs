@@ -485,14 +485,16 @@ impl Expr {
         }
     }
 
-    /// Whether it changes a variable or a clock.
+    /// Whether it changes a variable or a clock, or draws a random number.
     pub(super) fn has_effect(&self) -> bool {
+        self.changes() || self.any(&|e| matches!(e.kind, Kind::Random(..)))
+    }
+
+    /// Whether it changes a variable or a clock.
+    pub(super) fn changes(&self) -> bool {
         self.any(&|e| match &e.kind {
             Kind::Assign(target, _) => !target.is_left_out(),
-            Kind::Compound(..)
-            | Kind::Step { .. }
-            | Kind::AssignClock { .. }
-            | Kind::Random(..) => true,
+            Kind::Compound(..) | Kind::Step { .. } | Kind::AssignClock { .. } => true,
             Kind::Call { signature, .. } => signature.may_write(),
             _ => false,
         })

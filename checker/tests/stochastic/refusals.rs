@@ -145,7 +145,6 @@ fn bounds_are_known_numbers() {
     refused(model, "Pr[<=n](<> P.a)", "E0213");
     refused(model, "Pr[<=0-1](<> P.a)", "E0");
     refused(model, "Pr[n<=3](<> P.a)", "E0268");
-    refused(model, "E[<=3](max: x)", "E0");
     refused(model, "E[<=3; 10](max: x >= 2 ? P : 1)", "E0");
     let model = format!("double f() {{ return random(3); }} {model}");
     refused(&model, "Pr[<=random(3)](<> P.a)", "E0213");

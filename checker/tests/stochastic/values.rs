@@ -475,3 +475,18 @@ fn a_strict_guard_does_not_hold_at_its_bound() {
     expect(model, "Pr[<=2](<> P.b && R.f)", 1.0);
     expect(model, "Pr[<=2](<> Q.d)", 0.0);
 }
+
+#[test]
+fn locals_of_functions_begin_with_random_numbers() {
+    let model = "
+        double d = 0.0;
+        int dice() { double drawn = random(6), half = drawn / 2; return fint(half * 2 + 1); }
+        int n = 0;
+        process P() {
+            state a { ; 1 }, b;
+            init a;
+            trans a -> b { assign n = dice(); };
+        }
+        system P;";
+    expect(model, "Pr[<=100](<> n == 6)", 1.0 / 6.0);
+}

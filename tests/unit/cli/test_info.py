@@ -74,7 +74,7 @@ def test_json_is_one_object_and_nothing_else(
         *("features", "scalar_sets", "state", "queries", "warnings", "load_seconds"),
     }
     assert found["templates"][0]["edges"][0]["sync"] == "go[id]!"
-    query = {"text": "E<> Worker(0).Busy", "comment": "", "expect": None}
+    query = {"text": "E<> Worker(0).Busy", "comment": "", "expect": None, "options": {}}
     assert found["queries"] == [query | {"path": str(worker), "line": 9, "column": 9}]
 
 

@@ -391,9 +391,15 @@ pub(super) fn contradiction(
     query: &Statistical,
     precision: &Precision,
 ) -> Option<(&'static str, &'static str)> {
-    let Statistical::Expectation { range, .. } = query else {
+    let Statistical::Expectation { bound, range, .. } = query else {
         return None;
     };
+    if precision.runs.or(bound.runs).is_none() && precision.relative.is_none() {
+        return Some((
+            "an expected value needs a number of runs",
+            "write it behind the bound, E[<=10; 1000](max: x), or give it: --runs 1000",
+        ));
+    }
     let has_bounds = precision.value_bounds.or(*range).is_some();
     let is_sequential = precision.anytime || precision.relative.is_some();
     match precision.mean_method {
