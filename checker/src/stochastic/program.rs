@@ -86,8 +86,8 @@ pub(super) struct Program<'a> {
     pub(super) rate_readers: FxHashMap<u32, Box<[u32]>>,
     /// By process: whose plans depend on where it is, the process itself left out.
     followers: Vec<Box<[u32]>>,
-    /// Whether some location sets the rate of a clock.
-    pub(super) has_rates: bool,
+    /// The processes of which some location sets the rate of a clock.
+    pub(super) rated: Vec<u32>,
     /// Whether the rate of some clock may change as time passes.
     pub(super) has_flows: bool,
 }
@@ -108,7 +108,7 @@ impl<'a> Program<'a> {
             listeners: vec![Vec::new(); network.channels.len()],
             rate_readers: FxHashMap::default(),
             followers: Vec::new(),
-            has_rates: false,
+            rated: Vec::new(),
             has_flows: false,
         };
         for process in 0..network.processes.len() {
@@ -126,7 +126,9 @@ impl<'a> Program<'a> {
             let outputs = self.add_instances((process, &location.edges), true, machine);
             let inputs = self.add_instances((process, &location.edges), false, machine);
             let chances = &location.chances;
-            self.has_rates |= chances.rates.is_some();
+            if chances.rates.is_some() && self.rated.last() != Some(&(process as u32)) {
+                self.rated.push(process as u32);
+            }
             self.has_flows |= chances.flows.contains(&true);
             let known = &self.instances[outputs.0 as usize..outputs.1 as usize];
             let is_controllable = known.iter().any(|one| one.edge.controllable);

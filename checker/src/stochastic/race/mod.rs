@@ -179,7 +179,7 @@ impl<'a> Race<'a> {
             self.is_stale[process] = true;
             self.stale.push(process as u32);
         }
-        if program.has_rates {
+        if !program.rated.is_empty() {
             self.rated_by.fill(None);
             for &clock in &self.machine.network.chances.clocks {
                 self.machine.set_rate(clock, 1.0);
@@ -198,21 +198,18 @@ impl<'a> Race<'a> {
             return;
         }
         let network = self.network();
-        let flows = network
-            .processes
-            .iter()
-            .enumerate()
-            .filter_map(|(process, known)| {
-                let stand = self.stand(process);
-                let chances = &known.locations[stand.location.0 as usize].chances;
-                let rated = chances.rated_clocks.iter().zip(&chances.flows);
-                let clocks: Vec<u32> = rated
-                    .filter(|(_, flows)| **flows)
-                    .map(|(&clock, _)| clock)
-                    .collect();
-                let rates = chances.rates.filter(|_| !clocks.is_empty())?;
-                Some((rates, stand, clocks))
-            });
+        let flows = program.rated.iter().filter_map(|&process| {
+            let stand = self.stand(process as usize);
+            let known = &network.processes[process as usize];
+            let chances = &known.locations[stand.location.0 as usize].chances;
+            let rated = chances.rated_clocks.iter().zip(&chances.flows);
+            let clocks: Vec<u32> = rated
+                .filter(|(_, flows)| **flows)
+                .map(|(&clock, _)| clock)
+                .collect();
+            let rates = chances.rates.filter(|_| !clocks.is_empty())?;
+            Some((rates, stand, clocks))
+        });
         let flows: Vec<_> = flows.collect();
         self.motion.set_flows(flows);
     }

@@ -85,7 +85,9 @@ impl<'a> Race<'a> {
         if let Some(update) = &network.after_update {
             self.machine.update(update, &[])?;
         }
-        if program.has_rates {
+        // Whoever sets rates that may have changed is stale.
+        let mut rated = program.rated.iter();
+        if rated.any(|&process| self.is_stale[process as usize]) {
             self.renew_rates(program)?;
         }
         Ok(())
@@ -183,8 +185,8 @@ impl<'a> Race<'a> {
                 self.machine.set_rate(clock, 1.0);
             }
         }
-        for process in 0..self.locations.len() {
-            self.set_rates(process)?;
+        for &process in &program.rated {
+            self.set_rates(process as usize)?;
         }
         self.find_flows(program);
         for (&clock, before) in clocks.iter().zip(before) {
