@@ -270,7 +270,12 @@ impl<'a> Runner<'a> {
             };
             // Moves at the very moment of the bound still count. If nobody moves then, it does not
             // matter any more that time cannot pass.
-            let slack = TOLERANCE * bound.value.max(1.0);
+            // Once the bound is reached, what rounding has put behind it comes too late.
+            let slack = if rest > 0.0 {
+                TOLERANCE * bound.value.max(1.0)
+            } else {
+                TOLERANCE
+            };
             let is_over = rest + slack < next.delay
                 || (next.winner.is_none() && rest.is_finite() && rest <= next.delay + slack);
             let delay = next.delay.min(rest).max(0.0);

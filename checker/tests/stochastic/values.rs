@@ -490,3 +490,16 @@ fn locals_of_functions_begin_with_random_numbers() {
         system P;";
     expect(model, "Pr[<=100](<> n == 6)", 1.0 / 6.0);
 }
+
+/// Rounding may put a move a little behind the bound, where the run ends all the same.
+#[test]
+fn moves_a_little_behind_the_bound_end_a_run() {
+    let model = "
+        clock x, y;
+        int n = 0;
+        process P() { state a { x <= 10000 }; init a; trans a -> a { guard x == 10000; assign x = 0; }; }
+        process Q() { state a { y <= 30000 }; init a; trans a -> a { guard y == 30000; assign y = 0, n++; }; }
+        process R() { state a { ; 1:500 }; init a; trans a -> a { }; }
+        system P, Q, R;";
+    expect(model, "Pr[<=300000](<> n >= 9)", 1.0);
+}
