@@ -142,12 +142,6 @@ impl<'a> Machine<'a> {
         (self.double(offset), self.double(offset + 2))
     }
 
-    /// Gives a clock a value.
-    #[inline]
-    pub(super) fn set_value(&mut self, clock: u32, value: f64) {
-        self.set_double(clock, value);
-    }
-
     #[inline]
     pub(super) fn set_rate(&mut self, clock: u32, rate: f64) {
         self.set_double(clock + 2, rate);

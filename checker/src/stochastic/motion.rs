@@ -104,7 +104,7 @@ impl Motion {
         self.integrator.at(time, &mut slopes, &mut self.values)?;
         linear(machine, &self.base, time);
         for (&clock, &value) in self.flowing.iter().zip(&self.values) {
-            machine.set_value(clock, value);
+            machine.set_double(clock, value);
         }
         Ok(())
     }
@@ -112,7 +112,7 @@ impl Motion {
     /// Makes the words of the machine those of time 0 again.
     fn go_back(&self, machine: &mut Machine<'_>) {
         for &(clock, value, rate) in &self.base {
-            machine.set_value(clock, value);
+            machine.set_double(clock, value);
             machine.set_rate(clock, rate);
         }
     }
@@ -250,7 +250,7 @@ fn bisected(
 /// Makes the words of all clocks those of a time, as if none flowed.
 fn linear(machine: &mut Machine<'_>, base: &[(u32, f64, f64)], time: f64) {
     for &(clock, value, rate) in base {
-        machine.set_value(clock, value + rate * time);
+        machine.set_double(clock, value + rate * time);
     }
 }
 
@@ -267,7 +267,7 @@ fn slopes_at(
 ) -> Result<(), Failure> {
     linear(machine, base, time);
     for (&clock, &value) in flowing.iter().zip(values) {
-        machine.set_value(clock, value);
+        machine.set_double(clock, value);
     }
     for &(function, _) in rates {
         machine.call(function, &[])?;
