@@ -80,6 +80,7 @@ parts! {
     // Code.
     unrolling: "Write out loops of few rounds.";
     value_numbering: "Compute equal values once.";
+    compiled_runs: "Compile whole random runs once many moves were made.";
     interpret_first: "Compile functions only once they have run for a while.";
 }
 

@@ -277,11 +277,27 @@ distributions! {
     Triangular "random_tri" triangular(low, mode, high),
     /// Both parameters are positive.
     Weibull "random_weibull" weibull(shape, scale),
+    // Those of the delays and choices of runs, by names that no model can call.
+    /// The rate is positive.
+    Exponential "an exponential delay" exponential(rate),
+    /// An integer less than `count`, each with the same probability; `count` is at least 1, and
+    /// below 2^32.
+    Below "a choice" below(count),
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "the table wants it so")]
 fn uniform(stream: &mut Stream<'_>, max: f64) -> Option<f64> {
     Some(max * stream.uniform())
+}
+
+fn exponential(stream: &mut Stream<'_>, rate: f64) -> Option<f64> {
+    (rate > 0.0).then(|| stream.exponential(rate))
+}
+
+fn below(stream: &mut Stream<'_>, count: f64) -> Option<f64> {
+    (1.0..=f64::from(u32::MAX))
+        .contains(&count)
+        .then(|| stream.below(count as u32).into())
 }
 
 fn normal(stream: &mut Stream<'_>, mean: f64, deviation: f64) -> Option<f64> {

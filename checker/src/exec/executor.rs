@@ -1,7 +1,9 @@
 //! What all engines that run code have in common: one trait, and what a call reads and writes.
 
 use super::Wraps;
-use crate::ir::{ClockId, FixedConstraint, FunctionId, RunTimeErrorKind, SiteId};
+use crate::ir::{
+    ClockId, Constants, FixedConstraint, Function, FunctionId, RunTimeErrorKind, SiteId,
+};
 
 /// What a call reads and writes in addition to its arguments.
 #[derive(Debug)]
@@ -68,6 +70,21 @@ pub trait Executor: Send + Sync {
         arguments: &[i32],
         context: &mut Context<'_>,
     ) -> Result<i32, RunTimeError>;
+
+    /// An executor of the same kind for further functions, where `entry` is called often; both
+    /// arguments are the whole of it, and begin with what this one has. `None` if it cannot run
+    /// them.
+    fn with_code(
+        &self,
+        functions: &[Function],
+        constants: &Constants,
+        entry: FunctionId,
+    ) -> Option<Box<dyn Executor>>;
+
+    /// Whether whole random runs, as code, are made faster by it than move by move.
+    fn compiles_runs(&self) -> bool {
+        false
+    }
 
     /// Where results wrapped round since this was cleared.
     fn wraps(&self) -> &Wraps;

@@ -65,6 +65,13 @@ pub(super) struct Spot {
     pub(super) is_plain: bool,
 }
 
+impl Spot {
+    /// Whether a plan here depends on the value of a clock.
+    pub(super) fn waits_for_a_clock(&self) -> bool {
+        !self.is_plain || self.invariant.is_timed()
+    }
+}
+
 /// A network, prepared for runs.
 #[derive(Debug)]
 pub(super) struct Program<'a> {
@@ -279,7 +286,7 @@ impl<'a> Program<'a> {
     }
 
     /// Who could receive from a sender.
-    fn partners(&self, sender: &Instance<'_>) -> Vec<u32> {
+    pub(super) fn partners(&self, sender: &Instance<'_>) -> Vec<u32> {
         let mut partners: Vec<u32> = Vec::new();
         for channel in sender.edge.sync.map_or(0..0, channels_of) {
             partners.extend(&self.listeners[channel as usize]);
@@ -363,7 +370,8 @@ impl<'a> Program<'a> {
         }
     }
 
-    fn spots_of(&self, process: usize) -> &[Spot] {
+    /// A process in each of its locations.
+    pub(super) fn spots_of(&self, process: usize) -> &[Spot] {
         let first = self.first_spots[process] as usize;
         &self.spots[first..first + self.network.processes[process].locations.len()]
     }
@@ -406,6 +414,11 @@ impl<'a> Program<'a> {
     /// The processes whose locations the updates of a branch may set.
     pub(super) fn placed(&self, instance: &Instance<'_>, branch: usize) -> &[u32] {
         &self.placed[instance.branches as usize + branch]
+    }
+
+    /// Whether updates may set locations of processes that do not move.
+    pub(super) fn places_others(&self) -> bool {
+        self.placed.iter().any(|placed| !placed.is_empty())
     }
 
     /// The processes that may receive on a channel, ascending.

@@ -155,7 +155,7 @@ impl Parts for RunParts<'_, '_> {
     ) -> Result<Part<Halt>, Failure> {
         match from {
             None => {
-                let Runner { program, race } = &mut *self.runner;
+                let Runner { program, race, .. } = &mut *self.runner;
                 race.start(program, (self.seed, numbers))?;
             }
             Some(halt) => halt.resume(self.runner, self.seed, numbers)?,

@@ -6,24 +6,20 @@ use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::condition::Condition;
+use super::constants::{TOLERANCE, UNITS_FOR_MOVE};
 use super::extreme::Extreme;
 use super::failure::Failure;
 use super::machine::{Machine, Mask};
 use super::mitl::Watch;
 use super::program::Program;
 use super::race::Race;
+use super::race_code::{Asked, End, RaceCode, Stages, Watched};
 use crate::cancellation;
 use crate::exec::Executor;
 use crate::ir::{Formula, FunctionId, Network, Path, RunBound, RunLimit, Simulation};
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
-
-/// Moves so near to the bound, as a part of it, come at the bound.
-const TOLERANCE: f64 = 1e-12;
-
-/// What a move takes: see [`cancellation::work`].
-const UNITS_FOR_MOVE: usize = 256;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,6 +93,9 @@ impl Trajectory {
 pub struct Runner<'a> {
     pub(super) program: Arc<Program<'a>>,
     pub(super) race: Race<'a>,
+    executor: &'a dyn Executor,
+    /// Runs as code; none where what restricts them is not known to the code.
+    stages: Option<Stages>,
 }
 
 impl<'a> Runner<'a> {
@@ -108,9 +107,46 @@ impl<'a> Runner<'a> {
     /// What makes runs in which the controller does only what a strategy allows, or equations are
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
+        let is_free = behaviour.restriction.is_none();
         Runner {
             program: Arc::new(Program::new(behaviour.network, behaviour.executor)),
             race: Race::new(behaviour),
+            executor: behaviour.executor,
+            stages: is_free.then(|| Stages::new(behaviour.executor)),
+        }
+    }
+
+    /// Makes runs of what a path or a value asks as code of the network from now on, as otherwise
+    /// happens once that pays. Returns whether it can.
+    pub fn write_runs(&mut self, bound: &RunBound, asked: Asked<'_>) -> bool {
+        let watched = Watched::of(asked, &self.program).filter(|_| RaceCode::knows(bound));
+        let (Some(watched), Some(stages)) = (watched, &mut self.stages) else {
+            return false;
+        };
+        stages.begin(&self.program, self.executor, watched)
+    }
+
+    /// How many runs were made as code.
+    pub fn written_runs(&self) -> u64 {
+        self.stages.as_ref().map_or(0, Stages::runs)
+    }
+
+    /// Makes a run as code, if there is any.
+    fn written(&mut self, numbers: (u64, u64), bound: &RunBound, asked: Asked<'_>) -> Option<End> {
+        let stages = self.stages.as_mut().filter(|_| RaceCode::knows(bound))?;
+        let watched = Watched::of(asked, &self.program)?;
+        stages.run(
+            (&self.program, self.executor),
+            watched,
+            numbers,
+            bound.value,
+        )
+    }
+
+    /// Counts the moves of a run that was made move by move.
+    fn count_moves(&mut self) {
+        if let Some(stages) = &mut self.stages {
+            stages.count(self.race.moves);
         }
     }
 
@@ -124,11 +160,20 @@ impl<'a> Runner<'a> {
         if let Path::Formula(formula) = path {
             return self.formula((seed, run), bound, formula);
         }
+        if let Some(end) = self.written((seed, run), bound, Asked::Path(path)) {
+            return Ok(Outcome {
+                satisfied: end.decided.unwrap_or(matches!(path, Path::Always(_))),
+                time: end.time,
+                moves: end.moves,
+                at: end.time,
+            });
+        }
         let mut decided = None;
         self.until_bound((seed, run), bound, &mut |race, delay| {
             decided = watched(race, path, delay)?;
             Ok(decided.is_some())
         })?;
+        self.count_moves();
         let (satisfied, ahead) = decided.unwrap_or((matches!(path, Path::Always(_)), 0.0));
         Ok(Outcome {
             satisfied,
@@ -168,6 +213,11 @@ impl<'a> Runner<'a> {
         value: FunctionId,
         maximum: bool,
     ) -> Result<(f64, u64), Failure> {
+        let asked = Asked::Extreme(value, maximum);
+        if let Some(end) = self.written((seed, run), bound, asked) {
+            let sign = if maximum { 1.0 } else { -1.0 };
+            return Ok((sign * end.best, end.moves));
+        }
         let is_timed = self.program.is_timed(value);
         let mut extreme = Extreme::new(value, maximum);
         self.until_bound((seed, run), bound, &mut |race, delay| {
@@ -178,6 +228,7 @@ impl<'a> Runner<'a> {
             Ok(false)
         })?;
         extreme.look(&mut self.race.machine)?;
+        self.count_moves();
         Ok((extreme.value(), self.race.moves))
     }
 
@@ -249,7 +300,7 @@ impl<'a> Runner<'a> {
         bound: &RunBound,
         watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
-        let Runner { program, race } = self;
+        let Runner { program, race, .. } = self;
         loop {
             if bound.limit == RunLimit::Moves {
                 race.forget_moves();

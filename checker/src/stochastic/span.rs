@@ -5,12 +5,10 @@
 //! equal, as in the masks that compiled code returns.
 
 use super::condition::{Comparisons, Number};
+use super::constants::TOLERANCE;
 use super::failure::Failure;
 use super::machine::Machine;
 use crate::ir::Relation;
-
-/// What is counted as rounding when clocks are compared.
-const TOLERANCE: f64 = 1e-12;
 
 /// A closed interval of delays, not empty.
 #[derive(Clone, Copy, Debug, PartialEq)]

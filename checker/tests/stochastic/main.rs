@@ -26,6 +26,7 @@ mod formulas;
 mod intervals;
 mod known;
 mod networks;
+mod race_code;
 #[path = "../common/random.rs"]
 #[allow(dead_code, reason = "this program draws in some of the ways only")]
 mod random;

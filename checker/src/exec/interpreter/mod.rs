@@ -103,6 +103,17 @@ impl Executor for Interpreter {
         self.measure(ROUND_LIMIT, function, arguments, context).0
     }
 
+    fn with_code(
+        &self,
+        functions: &[Function],
+        constants: &Constants,
+        _: FunctionId,
+    ) -> Option<Box<dyn Executor>> {
+        let mut interpreter = Interpreter::default().with_overflow(self.overflow);
+        interpreter.extend(functions, constants.clone());
+        Some(Box::new(interpreter))
+    }
+
     fn wraps(&self) -> &Wraps {
         &self.wraps
     }

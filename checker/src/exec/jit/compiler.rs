@@ -65,6 +65,11 @@ impl Compiler {
         self.constants = constants.clone();
     }
 
+    /// What it does where results do not fit, and which heuristics it uses.
+    pub(super) fn rules(&self) -> (Overflow, Tuning) {
+        (self.overflow, self.tuning)
+    }
+
     /// How many instructions were compiled so far, counted after optimisation; those that another
     /// engine had compiled do not count.
     pub(super) fn compiled(&self) -> usize {

@@ -263,6 +263,23 @@ impl Executor for Jit {
         })
     }
 
+    fn with_code(
+        &self,
+        functions: &[Function],
+        constants: &Constants,
+        entry: FunctionId,
+    ) -> Option<Box<dyn Executor>> {
+        let (overflow, tuning) = locked(&self.compiler).rules();
+        let jit = Jit::tuned(functions, constants.clone(), overflow, tuning).ok()?;
+        jit.compile_function(entry).ok()?;
+        let code = jit.entries[entry.0 as usize].code.load(Ordering::Acquire);
+        (!code.is_null()).then(|| Box::new(jit) as Box<dyn Executor>)
+    }
+
+    fn compiles_runs(&self) -> bool {
+        locked(&self.compiler).rules().1.compiled_runs
+    }
+
     fn wraps(&self) -> &Wraps {
         self.interpreter.wraps()
     }

@@ -32,6 +32,7 @@ use rustc_hash::FxHashMap;
 use super::advice::Advice;
 use super::behaviour::Behaviour;
 use super::condition::Condition;
+use super::constants::{MOVES_OF_A_PLAN, TOLERANCE, ZENO_MOVES, ZENO_TIME};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::Motion;
@@ -39,23 +40,11 @@ use super::program::Program;
 use super::windows::Windows;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
-/// So many moves in less than [`ZENO_TIME`] are taken for a run that never gets on.
-pub const ZENO_MOVES: u64 = 100_000;
-/// The time that so many moves must take, in units of the model.
-pub const ZENO_TIME: f64 = 1e-6;
-
-/// Delays that differ by less than this part, and less than this, are the same.
-const TOLERANCE: f64 = 1e-12;
-
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 100_000;
 
 /// How much longer than the rest of a run an invariant is looked at.
 const FAR_BEYOND: f64 = 1000.0;
-
-/// After this number of moves plans that wait for a clock are drawn anew, so that the rounding of
-/// the delays in between does not add up.
-const MOVES_OF_A_PLAN: u32 = 4096;
 
 /// What comes next: the delay until then, and who moves; nobody if it is infinite.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,10 @@
 //! Which outputs and receivers are enabled, now and later.
 
-use super::{MOST_CHANGES, Race, TOLERANCE};
+use super::{MOST_CHANGES, Race};
 use crate::ir::Urgency;
 use crate::stochastic::advice::View;
 use crate::stochastic::condition::Condition;
+use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
 use crate::stochastic::program::{Channel, Instance, Program, Spot};

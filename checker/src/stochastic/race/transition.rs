@@ -1,9 +1,10 @@
 //! What a move does: receivers and branches are chosen, updates run, locations are entered, rates
 //! set, and those found who plan anew.
 
-use super::{MOVES_OF_A_PLAN, Race};
+use super::Race;
 use crate::ir::{Branch, LocationId, ProcessId, Update, Urgency};
 use crate::stochastic::condition::Number;
+use crate::stochastic::constants::MOVES_OF_A_PLAN;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 
@@ -13,7 +14,7 @@ impl<'a> Race<'a> {
         self.until_renewal = MOVES_OF_A_PLAN;
         for process in 0..self.locations.len() {
             let spot = program.spot(process, self.locations[process]);
-            if !spot.is_plain || spot.invariant.is_timed() {
+            if spot.waits_for_a_clock() {
                 self.make_stale(process as u32);
             }
         }

@@ -1,0 +1,103 @@
+//! Where the code of a race keeps what it knows: in words behind those of the state.
+
+use crate::ir::Urgency;
+use crate::stochastic::condition::Condition;
+use crate::stochastic::program::Program;
+
+/// The bits of a word that are used for processes.
+pub(super) const BITS: usize = 31;
+
+/// The words of a race. Doubles take two.
+#[derive(Debug)]
+pub(super) struct Layout {
+    /// By process: the double that says in how long it tries to move; none if it never does.
+    pub(super) attempts: Vec<Option<u32>>,
+    /// By process: the double that says how long it may stay, if it tries to move only later;
+    /// none if it may always stay for ever.
+    pub(super) stays: Vec<Option<u32>>,
+    /// Whether some process has such a limit now.
+    pub(super) has_stays: u32,
+    /// The first of the words whose bits say who plans anew.
+    pub(super) stale: u32,
+    /// How many words these are.
+    pub(super) stale_words: u32,
+    /// How many processes are in committed locations.
+    pub(super) committed: u32,
+    /// How long the run has lasted.
+    pub(super) time: u32,
+    /// How long it lasts.
+    pub(super) bound: u32,
+    /// How many moves may be made before the code returns.
+    pub(super) moves_left: u32,
+    /// The greatest value so far, if that is asked.
+    pub(super) best: u32,
+    /// Windows of a plan: their number, their low and their high ends, and the rate of the delay.
+    pub(super) windows: u32,
+    pub(super) lows: u32,
+    pub(super) highs: u32,
+    pub(super) rate: u32,
+    /// The most windows of a plan.
+    pub(super) most_windows: u32,
+    /// All words, those of the state included.
+    pub(super) words: u32,
+}
+
+impl Layout {
+    pub(super) fn of(program: &Program<'_>) -> Layout {
+        let network = program.network;
+        let mut words = network.initial.len() as u32;
+        let mut take = |count: u32| {
+            let first = words.next_multiple_of(2);
+            words = first + count;
+            first
+        };
+        let processes = network.processes.len();
+        let attempts = (0..processes).map(|process| {
+            let mut spots = program.spots_of(process).iter();
+            spots
+                .any(|spot| spot.outputs.0 < spot.outputs.1)
+                .then(|| take(2))
+        });
+        let attempts: Vec<_> = attempts.collect();
+        let stays = (0..processes).map(|process| {
+            let mut spots = program.spots_of(process).iter();
+            spots
+                .any(|spot| {
+                    spot.urgency != Urgency::Normal
+                        || matches!(spot.invariant, Condition::Compared(_))
+                })
+                .then(|| take(2))
+        });
+        let stays = stays.collect();
+        let most_windows = (0..processes)
+            .flat_map(|process| program.spots_of(process))
+            .map(|spot| spot.outputs.1 - spot.outputs.0)
+            .max()
+            .unwrap_or(0)
+            .max(1);
+        let stale_words = processes.div_ceil(BITS) as u32;
+        Layout {
+            attempts,
+            stays,
+            has_stays: take(1),
+            stale: take(stale_words),
+            stale_words,
+            committed: take(1),
+            time: take(2),
+            bound: take(2),
+            moves_left: take(1),
+            best: take(2),
+            windows: take(1),
+            lows: take(2 * most_windows),
+            highs: take(2 * most_windows),
+            rate: take(2),
+            most_windows,
+            words,
+        }
+    }
+
+    /// The word and the bit that say whether a process plans anew.
+    pub(super) fn stale_bit(&self, process: usize) -> (u32, i32) {
+        (self.stale + (process / BITS) as u32, 1 << (process % BITS))
+    }
+}

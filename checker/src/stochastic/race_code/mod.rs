@@ -1,0 +1,27 @@
+//! The race as code of the network, so that whole runs are compiled: for networks whose clocks run
+//! at rate 1 and whose processes synchronise by broadcast.
+//!
+//! The code makes the same runs as [`Race`](super::race::Race), bit by bit: the same random
+//! numbers in the same order, the same arithmetic. Whatever is rare or goes wrong it leaves to the
+//! race: it gives a run up, and the run is made again from its start.
+//!
+//! Invariants:
+//! * The words of a run are those of the state, and behind them those of [`layout::Layout`].
+//! * The code of a process is written out for all its locations, so its size grows with the
+//!   product of senders and receivers: beyond a limit there is no code.
+
+mod asked;
+mod conditions;
+mod layout;
+mod moves;
+mod plans;
+mod race_writer;
+mod rounds;
+mod runs;
+mod stages;
+mod writer;
+
+pub use asked::Asked;
+pub(super) use asked::{End, Watched};
+pub(super) use runs::RaceCode;
+pub(super) use stages::Stages;

@@ -1,0 +1,484 @@
+//! Code for what a move does, as `stochastic/race/transition.rs` says it.
+
+use super::race_writer::RaceWriter;
+use super::writer::Writer;
+use crate::ir::{
+    BlockId, Distribution, Function, IntegerOperator, Register, RegisterType, Relation, Update,
+    Urgency,
+};
+use crate::stochastic::condition::{Condition, Number};
+use crate::stochastic::program::{Channel, Instance, Spot};
+
+/// What the function of a move returns if no output of the process is enabled after all.
+pub(super) const MISSED: i32 = 0;
+/// What it returns if the process has moved.
+pub(super) const MOVED: i32 = 1;
+
+/// A process that may receive what is sent.
+struct Receiver<'p, 'a> {
+    /// By location: its inputs that may be on the channel.
+    inputs: Vec<(i32, Vec<&'p Instance<'a>>)>,
+    /// Which of all its inputs it takes, counted from 1; 0 if none.
+    chosen: Register,
+    /// Which branch of it.
+    branch: Register,
+}
+
+impl<'a> RaceWriter<'_, 'a> {
+    /// The function that lets a process move.
+    pub(super) fn movement(&self, process: usize) -> Function {
+        let result = (0, Some(RegisterType::Integer));
+        let mut w = self.writer(&format!("move of process {process}"), result);
+        let location = w.load(process as u32);
+        let start = w.block();
+        w.jump(start);
+        let spots = self.program.spots_of(process);
+        let mut places = Vec::new();
+        for (location, spot) in (0..).zip(spots) {
+            if spot.outputs.0 < spot.outputs.1 {
+                let block = w.block();
+                places.push((location, block));
+                w.at(block);
+                self.move_from(&mut w, (process, spot));
+            }
+        }
+        w.at(start);
+        w.select(location, &places);
+        w.finish()
+    }
+
+    fn move_from(&self, w: &mut Writer, (process, spot): (usize, &Spot)) {
+        let outputs = self.program.range(spot.outputs);
+        let missed = w.block();
+        if let [only] = outputs {
+            if !spot.is_plain {
+                self.conditions.require(w, only.guard, &only.values, missed);
+            }
+            self.carry_out(w, only);
+        } else {
+            let chosen = self.choose(w, outputs, missed);
+            let takes: Vec<(i32, BlockId)> = (0..)
+                .zip(outputs)
+                .map(|(number, _)| (number, w.block()))
+                .collect();
+            w.select(chosen, &takes);
+            for (output, &(_, block)) in outputs.iter().zip(&takes) {
+                w.at(block);
+                self.carry_out(w, output);
+            }
+        }
+        w.at(missed);
+        let (word, bit) = self.layout.stale_bit(process);
+        mark(w, word, bit);
+        let result = w.integer(MISSED);
+        w.return_value(Some(result));
+    }
+
+    /// Chooses one of the instances that are enabled, and returns its number; goes elsewhere if
+    /// there are none.
+    fn choose(&self, w: &mut Writer, instances: &[Instance<'a>], otherwise: BlockId) -> Register {
+        let count = w.integer(0);
+        let flags: Vec<Option<Register>> = instances
+            .iter()
+            .map(|instance| {
+                if instance.guard == Condition::Always {
+                    let one = w.integer(1);
+                    let more = w.add_integers(count, one);
+                    w.copy(count, more);
+                    return None;
+                }
+                let flag = w.integer(0);
+                self.when_enabled(w, instance, |w| {
+                    let one = w.integer(1);
+                    w.copy(flag, one);
+                    let more = w.add_integers(count, one);
+                    w.copy(count, more);
+                });
+                Some(flag)
+            })
+            .collect();
+        w.unless(count, otherwise);
+        let rest = w.integer(0);
+        let are_many = w.compare_to(count, Relation::Greater, 1);
+        w.when(are_many, |w| {
+            let drawn = w.draw_below(count);
+            w.copy(rest, drawn);
+        });
+        if flags.iter().all(Option::is_none) {
+            return rest;
+        }
+        let (chosen, found) = (w.integer(0), w.block());
+        let minus_one = w.integer(-1);
+        for (number, flag) in (0..).zip(flags) {
+            let next = w.block();
+            if let Some(flag) = flag {
+                w.unless(flag, next);
+            }
+            let this = w.integer(number);
+            w.copy(chosen, this);
+            let goes_on = w.block();
+            w.branch(rest, goes_on, found);
+            w.at(goes_on);
+            let less = w.add_integers(rest, minus_one);
+            w.copy(rest, less);
+            w.jump(next);
+            w.at(next);
+        }
+        w.jump(found);
+        w.at(found);
+        chosen
+    }
+
+    /// Lets a process take an output with all who receive, and returns.
+    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>) {
+        let channel = match sender.channel {
+            Channel::None => None,
+            Channel::Known(channel) => Some(w.integer(channel as i32)),
+            Channel::Computed(first, index) => {
+                let arguments = sender.values.iter().map(|&one| w.integer(one)).collect();
+                let offset = w.call_for(index, arguments);
+                let first = w.integer(first as i32);
+                Some(w.add_integers(first, offset))
+            }
+        };
+        let mut receivers = Vec::new();
+        if let Some(channel) = channel {
+            for process in self.program.partners(sender) {
+                if let Some(receiver) = self.receiver(w, sender, (process, channel)) {
+                    receivers.push(receiver);
+                }
+            }
+        }
+        let branch = self.branch(w, sender);
+        for receiver in &receivers {
+            self.branch_of_receiver(w, receiver);
+        }
+        self.apply(w, sender, branch);
+        for receiver in &receivers {
+            let done = w.block();
+            Self::for_chosen(w, receiver, done, |w, input| {
+                self.apply(w, input, receiver.branch);
+            });
+        }
+        let result = w.integer(MOVED);
+        w.return_value(Some(result));
+    }
+
+    /// Lets a process choose what it receives.
+    fn receiver<'p>(
+        &'p self,
+        w: &mut Writer,
+        sender: &Instance<'a>,
+        (process, channel): (u32, Register),
+    ) -> Option<Receiver<'p, 'a>> {
+        let sync = sender.edge.sync?;
+        let channels = match sender.channel {
+            Channel::Known(channel) => channel..channel + 1,
+            _ => sync.channel.0..sync.channel.0 + sync.count,
+        };
+        let may_receive = |input: &&Instance<'a>| match input.channel {
+            Channel::None => false,
+            Channel::Known(one) => channels.contains(&one),
+            Channel::Computed(first, _) => {
+                let count = input.edge.sync.map_or(0, |sync| sync.count);
+                first < channels.end && channels.start < first + count
+            }
+        };
+        let spots = self.program.spots_of(process as usize);
+        let inputs: Vec<(i32, Vec<&Instance<'a>>)> = (0..)
+            .zip(spots)
+            .map(|(location, spot)| {
+                let inputs = self.program.range(spot.inputs).iter();
+                (location, inputs.filter(may_receive).collect())
+            })
+            .collect();
+        if inputs.iter().all(|(_, inputs)| inputs.is_empty()) {
+            return None;
+        }
+        let (chosen, branch) = (w.integer(0), w.integer(0));
+        let next = w.block();
+        let location = w.load(process);
+        let start = w.block();
+        w.jump(start);
+        let mut places = Vec::new();
+        let mut first = 1;
+        for (location, inputs) in &inputs {
+            if inputs.is_empty() {
+                places.push((*location, next));
+                continue;
+            }
+            let block = w.block();
+            places.push((*location, block));
+            w.at(block);
+            self.choose_input(w, inputs, (channel, sender.channel), (chosen, first), next);
+            first += inputs.len() as i32;
+        }
+        w.at(start);
+        w.select(location, &places);
+        w.at(next);
+        Some(Receiver {
+            inputs,
+            chosen,
+            branch,
+        })
+    }
+
+    /// Chooses one of the inputs of a location that are enabled, if there are any.
+    fn choose_input(
+        &self,
+        w: &mut Writer,
+        inputs: &[&Instance<'a>],
+        (channel, known): (Register, Channel),
+        (chosen, first): (Register, i32),
+        next: BlockId,
+    ) {
+        let (count, taken) = (w.integer(0), w.integer(0));
+        let mut flags = Vec::new();
+        for (number, &input) in (first..).zip(inputs) {
+            let (flag, otherwise) = (w.integer(0), w.block());
+            match (input.channel, known) {
+                (Channel::Known(_), Channel::Known(_)) | (Channel::None, _) => {}
+                (Channel::Known(own), _) => {
+                    let is_it = w.compare_to(channel, Relation::Equal, own as i32);
+                    w.unless(is_it, otherwise);
+                }
+                (Channel::Computed(own, index), _) => {
+                    let arguments = input.values.iter().map(|&one| w.integer(one)).collect();
+                    let offset = w.call_for(index, arguments);
+                    let own = w.integer(own as i32);
+                    let own = w.add_integers(own, offset);
+                    let is_it = w.compare(channel, Relation::Equal, own);
+                    w.unless(is_it, otherwise);
+                }
+            }
+            self.conditions
+                .require(w, input.guard, &input.values, otherwise);
+            let one = w.integer(1);
+            w.copy(flag, one);
+            let number = w.integer(number);
+            w.copy(taken, number);
+            let more = w.add_integers(count, one);
+            w.copy(count, more);
+            w.jump(otherwise);
+            w.at(otherwise);
+            flags.push(flag);
+        }
+        if inputs.len() > 1 {
+            let are_many = w.compare_to(count, Relation::Greater, 1);
+            w.when(are_many, |w| {
+                let rest = w.draw_below(count);
+                let (found, minus_one) = (w.block(), w.integer(-1));
+                for (number, flag) in (first..).zip(flags) {
+                    let after = w.block();
+                    w.unless(flag, after);
+                    let this = w.integer(number);
+                    w.copy(taken, this);
+                    let goes_on = w.block();
+                    w.branch(rest, goes_on, found);
+                    w.at(goes_on);
+                    let less = w.add_integers(rest, minus_one);
+                    w.copy(rest, less);
+                    w.jump(after);
+                    w.at(after);
+                }
+                w.jump(found);
+                w.at(found);
+            });
+        }
+        w.copy(chosen, taken);
+        w.jump(next);
+    }
+
+    /// Writes what is done for each input that a receiver may have chosen, and goes on at `done`.
+    fn for_chosen(
+        w: &mut Writer,
+        receiver: &Receiver<'_, 'a>,
+        done: BlockId,
+        write: impl Fn(&mut Writer, &Instance<'a>),
+    ) {
+        let start = w.block();
+        w.jump(start);
+        let mut places = vec![(0, done)];
+        let inputs = receiver.inputs.iter().flat_map(|(_, inputs)| inputs);
+        for (number, input) in (1..).zip(inputs) {
+            let block = w.block();
+            places.push((number, block));
+            w.at(block);
+            write(w, input);
+            w.jump(done);
+        }
+        w.at(start);
+        w.select(receiver.chosen, &places);
+        w.at(done);
+    }
+
+    fn branch_of_receiver(&self, w: &mut Writer, receiver: &Receiver<'_, 'a>) {
+        let mut inputs = receiver.inputs.iter().flat_map(|(_, inputs)| inputs);
+        if inputs.any(|input| input.edge.branches.len() > 1) {
+            let done = w.block();
+            Self::for_chosen(w, receiver, done, |w, input| {
+                let branch = self.branch(w, input);
+                w.copy(receiver.branch, branch);
+            });
+        }
+    }
+
+    /// The branch that a mover takes: by weight.
+    fn branch(&self, w: &mut Writer, mover: &Instance<'_>) -> Register {
+        let branches = mover.edge.branches.len();
+        let chosen = w.integer(0);
+        if branches < 2 {
+            return chosen;
+        }
+        let wrong = w.block();
+        let (zero, infinity) = (w.double(0.0), w.double(f64::INFINITY));
+        let weights: Vec<Register> = (0..branches)
+            .map(|branch| {
+                let number = self.program.weight(mover, branch);
+                let weight = self.conditions.number(w, number, &mover.values);
+                if !matches!(number, Number::Known(one) if one >= 0.0 && one.is_finite()) {
+                    let is_weight = w.compare_doubles(weight, Relation::GreaterEqual, zero);
+                    w.unless(is_weight, wrong);
+                    let is_finite = w.compare_doubles(weight, Relation::Less, infinity);
+                    w.unless(is_finite, wrong);
+                }
+                weight
+            })
+            .collect();
+        let mut total = w.double(0.0);
+        for &weight in &weights {
+            total = w.add(total, weight);
+        }
+        let rest = w.draw(Distribution::Uniform, total);
+        let (none, found) = (w.integer(-1), w.block());
+        w.copy(chosen, none);
+        for (branch, weight) in (0..).zip(weights) {
+            let next = w.block();
+            let is_possible = w.compare_doubles(weight, Relation::Greater, zero);
+            w.unless(is_possible, next);
+            let this = w.integer(branch);
+            w.copy(chosen, this);
+            let is_beyond = w.compare_doubles(rest, Relation::GreaterEqual, weight);
+            w.unless(is_beyond, found);
+            let less = w.subtract(rest, weight);
+            w.copy(rest, less);
+            w.jump(next);
+            w.at(next);
+        }
+        let is_none = w.compare(chosen, Relation::Equal, none);
+        w.branch(is_none, wrong, found);
+        w.at(wrong);
+        w.give_up();
+        w.at(found);
+        chosen
+    }
+
+    /// Runs the updates of a mover, and lets it enter the target of its branch.
+    fn apply(&self, w: &mut Writer, mover: &Instance<'a>, branch: Register) {
+        update(w, &mover.edge.update, &mover.values);
+        let branches = &mover.edge.branches;
+        if branches.len() == 1 {
+            self.enter(w, mover, 0);
+            return;
+        }
+        let (start, done) = (w.block(), w.block());
+        w.jump(start);
+        let mut places = Vec::new();
+        for number in 0..branches.len() {
+            let block = w.block();
+            places.push((number as i32, block));
+            w.at(block);
+            self.enter(w, mover, number);
+            w.jump(done);
+        }
+        w.at(start);
+        w.select(branch, &places);
+        w.at(done);
+    }
+
+    fn enter(&self, w: &mut Writer, mover: &Instance<'a>, number: usize) {
+        let branch = &mover.edge.branches[number];
+        update(w, &branch.update, &mover.values);
+        let process = mover.process as usize;
+        let mut stale = vec![mover.process];
+        stale.extend(self.program.concerned(mover, number));
+        let (source, target) = (mover.edge.source, branch.target);
+        if source != target {
+            let place = w.integer(target.0 as i32);
+            w.store(mover.process, place);
+            let commits = |location| {
+                let spot = self.program.spot(process, location);
+                i32::from(spot.urgency == Urgency::Committed)
+            };
+            let change = commits(target) - commits(source);
+            if change != 0 {
+                let (committed, change) = (w.load(self.layout.committed), w.integer(change));
+                let committed = w.add_integers(committed, change);
+                w.store(self.layout.committed, committed);
+            }
+            stale.extend(self.program.followers(crate::ir::ProcessId(mover.process)));
+        }
+        let mut masks = vec![0; self.layout.stale_words as usize];
+        for process in stale {
+            let (word, bit) = self.layout.stale_bit(process as usize);
+            masks[(word - self.layout.stale) as usize] |= bit;
+        }
+        for (word, mask) in (self.layout.stale..).zip(masks) {
+            if mask != 0 {
+                mark(w, word, mask);
+            }
+        }
+    }
+
+    /// The function that says whether an output of a process is enabled now, where time stands
+    /// still; if its argument is not 0, only an output that leaves a committed location counts.
+    pub(super) fn ability(&self, process: usize) -> Function {
+        let result = (1, Some(RegisterType::Integer));
+        let mut w = self.writer(&format!("whether process {process} can move"), result);
+        let only_committed = Register(0);
+        let location = w.load(process as u32);
+        let (start, unable) = (w.block(), w.block());
+        w.jump(start);
+        let mut places = Vec::new();
+        for (location, spot) in (0..).zip(self.program.spots_of(process)) {
+            if spot.outputs.0 == spot.outputs.1 {
+                places.push((location, unable));
+                continue;
+            }
+            let block = w.block();
+            places.push((location, block));
+            w.at(block);
+            if spot.urgency != Urgency::Committed {
+                let any = w.compare_to(only_committed, Relation::Equal, 0);
+                w.unless(any, unable);
+            }
+            let some = w.integer(0);
+            for output in self.program.range(spot.outputs) {
+                self.when_enabled(&mut w, output, |w| {
+                    let one = w.integer(1);
+                    w.copy(some, one);
+                });
+            }
+            w.return_value(Some(some));
+        }
+        w.at(start);
+        w.select(location, &places);
+        w.at(unable);
+        let zero = w.integer(0);
+        w.return_value(Some(zero));
+        w.finish()
+    }
+}
+
+fn update(w: &mut Writer, update: &Update, values: &[i32]) {
+    if let Some(function) = update.function {
+        w.call(function, values);
+    }
+}
+
+/// Sets bits of a word.
+pub(super) fn mark(w: &mut Writer, word: u32, bits: i32) {
+    let (before, bits) = (w.load(word), w.integer(bits));
+    let after = w.arithmetic(IntegerOperator::Or, before, bits);
+    w.store(word, after);
+}

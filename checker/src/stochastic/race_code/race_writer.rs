@@ -1,0 +1,33 @@
+//! What all that write the code of a race share.
+
+use super::conditions::Conditions;
+use super::layout::Layout;
+use super::writer::Writer;
+use crate::ir::{FunctionId, Network, RegisterType};
+use crate::stochastic::program::Program;
+
+/// The functions of a race, by process.
+pub(super) struct Ids {
+    pub(super) plans: Vec<FunctionId>,
+    pub(super) moves: Vec<FunctionId>,
+    pub(super) abilities: Vec<Option<FunctionId>>,
+}
+
+/// Writes the functions of a race.
+pub(super) struct RaceWriter<'p, 'a> {
+    pub(super) program: &'p Program<'a>,
+    pub(super) layout: &'p Layout,
+    pub(super) conditions: Conditions<'p, 'a>,
+    /// Draws a delay in windows.
+    pub(super) in_windows: FunctionId,
+}
+
+impl<'a> RaceWriter<'_, 'a> {
+    pub(super) fn network(&self) -> &'a Network {
+        self.program.network
+    }
+
+    pub(super) fn writer(&self, name: &str, signature: (u32, Option<RegisterType>)) -> Writer {
+        Writer::new(name, signature, self.network().chances.stream)
+    }
+}

@@ -1,0 +1,426 @@
+//! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
+
+use super::asked::Watched;
+use super::conditions::require_words;
+use super::plans::tolerant;
+use super::race_writer::{Ids, RaceWriter};
+use super::writer::Writer;
+use crate::ir::{BlockId, Function, IntegerOperator, Register, RegisterType, Relation, Urgency};
+use crate::stochastic::condition::Condition;
+use crate::stochastic::constants::TOLERANCE;
+use crate::stochastic::program::Spot;
+
+/// What the code of a run returns: it goes on if it is called again;
+pub(super) const GOES_ON: i32 = 0;
+/// what was asked has been reached;
+pub(super) const REACHED: i32 = 1;
+/// what was asked cannot be reached any more;
+pub(super) const MISSED: i32 = 2;
+/// or its bound has been reached.
+pub(super) const IS_OVER: i32 = 3;
+
+/// The processes that may win, by their attempts, with the least of them.
+enum Tree {
+    Leaf(usize, Register),
+    Fork(Register, Box<Tree>, Box<Tree>),
+}
+
+impl Tree {
+    fn of(w: &mut Writer, attempts: &[(usize, Register)]) -> Tree {
+        if let [(process, attempt)] = *attempts {
+            return Tree::Leaf(process, attempt);
+        }
+        let (left, right) = attempts.split_at(attempts.len() / 2);
+        let (left, right) = (Tree::of(w, left), Tree::of(w, right));
+        let least = w.least(left.least(), right.least());
+        Tree::Fork(least, Box::new(left), Box::new(right))
+    }
+
+    fn least(&self) -> Register {
+        match *self {
+            Tree::Leaf(_, least) | Tree::Fork(least, ..) => least,
+        }
+    }
+
+    /// Goes to the place of the first process whose attempt comes until then.
+    fn find(&self, w: &mut Writer, latest: Register, places: &[BlockId]) {
+        match self {
+            Tree::Leaf(process, _) => w.jump(places[*process]),
+            Tree::Fork(_, left, right) => {
+                let is_left = w.compare_doubles(left.least(), Relation::LessEqual, latest);
+                let (then, otherwise) = (w.block(), w.block());
+                w.branch(is_left, then, otherwise);
+                w.at(then);
+                left.find(w, latest, places);
+                w.at(otherwise);
+                right.find(w, latest, places);
+            }
+        }
+    }
+}
+
+impl RaceWriter<'_, '_> {
+    /// The function that makes moves until the run has ended, or so many as its words say.
+    pub(super) fn rounds(&self, ids: &Ids, watched: &Watched) -> Function {
+        let layout = self.layout;
+        let mut w = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
+        let w = &mut w;
+        let processes = layout.attempts.len();
+        let (round, over) = (w.block(), w.block());
+        w.jump(round);
+        w.at(round);
+        self.plan_anew(w, ids);
+        // Where a process moves; the delay before it has passed.
+        let moves: Vec<BlockId> = (0..processes).map(|_| w.block()).collect();
+        let delay = w.double(0.0);
+        let racing = w.block();
+        self.settle_committed(w, ids, watched, &moves, racing);
+        w.at(racing);
+        let attempts: Vec<(usize, Register)> = (0..)
+            .zip(&layout.attempts)
+            .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
+            .collect();
+        let infinity = w.double(f64::INFINITY);
+        let tree = if attempts.is_empty() {
+            w.copy(delay, infinity);
+            None
+        } else {
+            let tree = Tree::of(w, &attempts);
+            w.copy(delay, tree.least());
+            Some(tree)
+        };
+        let bounded = w.block();
+        let has_stays = w.load(layout.has_stays);
+        let free = w.block();
+        w.branch(has_stays, bounded, free);
+        // Some process may not stay for ever, and tries to move later than it must.
+        w.at(bounded);
+        self.settle_stays(w, (ids, watched), delay, (&moves, free, over));
+        w.at(free);
+        self.watch(w, watched);
+        let (rest, slack) = self.rest(w);
+        let latest_end = w.add(rest, slack);
+        let is_late = w.compare_doubles(latest_end, Relation::Less, delay);
+        let in_time = w.block();
+        let late = w.block();
+        w.branch(is_late, late, in_time);
+        w.at(late);
+        w.copy(delay, rest);
+        w.jump(over);
+        w.at(in_time);
+        if let Some(tree) = tree {
+            let latest = tolerant(w, delay);
+            let passing = w.least(delay, rest);
+            self.wait(w, passing, &attempts);
+            let count = w.integer(0);
+            for &(_, attempt) in &attempts {
+                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
+                let more = w.add_integers(count, is_first);
+                w.copy(count, more);
+            }
+            let are_tied = w.compare_to(count, Relation::Greater, 1);
+            let (tied, alone) = (w.block(), w.block());
+            w.branch(are_tied, tied, alone);
+            w.at(tied);
+            let chosen = w.draw_below(count);
+            let minus_one = w.integer(-1);
+            for &(process, attempt) in &attempts {
+                let next = w.block();
+                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
+                w.unless(is_first, next);
+                let passed_over = w.block();
+                w.branch(chosen, passed_over, moves[process]);
+                w.at(passed_over);
+                let less = w.add_integers(chosen, minus_one);
+                w.copy(chosen, less);
+                w.jump(next);
+                w.at(next);
+            }
+            w.give_up();
+            w.at(alone);
+            tree.find(w, latest, &moves);
+        } else {
+            w.give_up();
+        }
+        let (moved, go_on) = (w.block(), w.block());
+        for (process, &block) in moves.iter().enumerate() {
+            w.at(block);
+            if layout.attempts[process].is_none() {
+                w.give_up();
+                continue;
+            }
+            let has_moved = w.call_for(ids.moves[process], Vec::new());
+            w.branch(has_moved, moved, round);
+        }
+        w.at(moved);
+        let left = w.load(layout.moves_left);
+        let minus_one = w.integer(-1);
+        let left = w.add_integers(left, minus_one);
+        w.store(layout.moves_left, left);
+        w.branch(left, round, go_on);
+        w.at(go_on);
+        let result = w.integer(GOES_ON);
+        w.return_value(Some(result));
+        w.at(over);
+        let zero = w.double(0.0);
+        let passing = w.greatest(delay, zero);
+        self.wait_until_the_end(w, passing);
+        if let Watched::Extreme(..) = watched {
+            self.watch(w, watched);
+        }
+        let result = w.integer(IS_OVER);
+        w.return_value(Some(result));
+        std::mem::replace(w, self.writer("", (0, None))).finish()
+    }
+
+    fn plan_anew(&self, w: &mut Writer, ids: &Ids) {
+        let layout = self.layout;
+        for word in layout.stale..layout.stale + layout.stale_words {
+            let mask = w.load(word);
+            w.when(mask, |w| {
+                for (process, &plan) in ids.plans.iter().enumerate() {
+                    let (own, bit) = layout.stale_bit(process);
+                    if own != word {
+                        continue;
+                    }
+                    let bit = w.integer(bit);
+                    let is_stale = w.arithmetic(IntegerOperator::And, mask, bit);
+                    w.when(is_stale, |w| w.call(plan, &[]));
+                }
+                w.store_integer(word, 0);
+            });
+        }
+    }
+
+    /// If there are committed locations, lets one of them be left; else goes to `racing`.
+    fn settle_committed(
+        &self,
+        w: &mut Writer,
+        ids: &Ids,
+        watched: &Watched,
+        moves: &[BlockId],
+        racing: BlockId,
+    ) {
+        let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
+        let may_commit = (0..moves.len())
+            .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
+        let may_commit: Vec<usize> = may_commit.collect();
+        if may_commit.is_empty() {
+            w.jump(racing);
+            return;
+        }
+        let committed = w.load(self.layout.committed);
+        let settling = w.block();
+        w.branch(committed, settling, racing);
+        w.at(settling);
+        self.let_one_move(w, (ids, watched), (may_commit, true), moves);
+    }
+
+    /// Lets one of those move who can now, all with the same chance.
+    fn let_one_move(
+        &self,
+        w: &mut Writer,
+        (ids, watched): (&Ids, &Watched),
+        (processes, only_committed): (Vec<usize>, bool),
+        moves: &[BlockId],
+    ) {
+        let (winner, ties) = (w.integer(-1), w.integer(0));
+        for &process in &processes {
+            let Some(ability) = ids.abilities[process] else {
+                continue;
+            };
+            let argument = w.integer(only_committed.into());
+            let is_able = w.call_for(ability, vec![argument]);
+            w.when(is_able, |w| {
+                let one = w.integer(1);
+                let more = w.add_integers(ties, one);
+                w.copy(ties, more);
+                let (wins, next) = (w.block(), w.block());
+                let is_first = w.compare(ties, Relation::Equal, one);
+                let drawing = w.block();
+                w.branch(is_first, wins, drawing);
+                w.at(drawing);
+                let drawn = w.draw_below(ties);
+                w.branch(drawn, next, wins);
+                w.at(wins);
+                let number = w.integer(process as i32);
+                w.copy(winner, number);
+                w.jump(next);
+                w.at(next);
+            });
+        }
+        let nobody = w.block();
+        w.unless(ties, nobody);
+        self.watch(w, watched);
+        let wins: Vec<(i32, BlockId)> = processes
+            .iter()
+            .map(|&process| (process as i32, moves[process]))
+            .collect();
+        w.select(winner, &wins);
+        w.at(nobody);
+        w.give_up();
+    }
+
+    /// If some process must leave before anybody tries to move, who can move then does, or the run
+    /// is over by then.
+    fn settle_stays(
+        &self,
+        w: &mut Writer,
+        (ids, watched): (&Ids, &Watched),
+        delay: Register,
+        (moves, free, over): (&[BlockId], BlockId, BlockId),
+    ) {
+        let infinity = w.double(f64::INFINITY);
+        let mut least = infinity;
+        for &word in self.layout.stays.iter().flatten() {
+            let stay = w.load_double(word);
+            least = w.least(least, stay);
+        }
+        let has_end = w.compare_doubles(least, Relation::Less, infinity);
+        w.when(has_end, |w| {
+            let latest = tolerant(w, least);
+            let is_beyond = w.compare_doubles(delay, Relation::Greater, latest);
+            w.unless(is_beyond, free);
+            let tolerance = w.double(TOLERANCE);
+            let is_now = w.compare_doubles(least, Relation::LessEqual, tolerance);
+            let (now, later, stuck) = (w.block(), w.block(), w.block());
+            w.branch(is_now, now, later);
+            w.at(now);
+            let zero = w.double(0.0);
+            let is_zero = w.compare_doubles(least, Relation::LessEqual, zero);
+            w.unless(is_zero, stuck);
+            let all = (0..moves.len()).collect();
+            self.let_one_move(w, (ids, watched), (all, false), moves);
+            w.at(later);
+            self.watch(w, watched);
+            let (rest, slack) = self.rest(w);
+            let end = w.add(rest, slack);
+            let is_over = w.compare_doubles(end, Relation::Less, least);
+            w.unless(is_over, stuck);
+            w.copy(delay, rest);
+            w.jump(over);
+            w.at(stuck);
+            w.give_up();
+            let unreached = w.block();
+            w.at(unreached);
+        });
+        w.store_integer(self.layout.has_stays, 0);
+        w.jump(free);
+    }
+
+    /// How much time the run still has, and how much later a move may come.
+    fn rest(&self, w: &mut Writer) -> (Register, Register) {
+        let (bound, time) = (
+            w.load_double(self.layout.bound),
+            w.load_double(self.layout.time),
+        );
+        let (zero, one) = (w.double(0.0), w.double(1.0));
+        let rest = w.subtract(bound, time);
+        let rest = w.greatest(rest, zero);
+        let tolerance = w.double(TOLERANCE);
+        let slack = w.double(TOLERANCE);
+        let has_rest = w.compare_doubles(rest, Relation::Greater, zero);
+        w.when(has_rest, |w| {
+            let size = w.greatest(bound, one);
+            let size = w.multiply(tolerance, size);
+            w.copy(slack, size);
+        });
+        (rest, slack)
+    }
+
+    /// Ends the run if what was asked is decided.
+    fn watch(&self, w: &mut Writer, watched: &Watched) {
+        let end_at = |w: &mut Writer, condition: Condition, result: i32, if_it_holds: bool| {
+            if if_it_holds && condition == Condition::Never
+                || !if_it_holds && condition == Condition::Always
+            {
+                return;
+            }
+            let (holds, fails) = (w.block(), w.block());
+            match condition {
+                Condition::Words(function) => {
+                    require_words(w, function, &[], fails);
+                    w.jump(holds);
+                }
+                Condition::Always => w.jump(holds),
+                _ => w.jump(fails),
+            }
+            let (ends, next) = if if_it_holds {
+                (holds, fails)
+            } else {
+                (fails, holds)
+            };
+            w.at(ends);
+            let result = w.integer(result);
+            w.return_value(Some(result));
+            w.at(next);
+        };
+        match *watched {
+            Watched::Eventually(goal) => end_at(w, goal, REACHED, true),
+            Watched::Always(keep) => end_at(w, keep, MISSED, false),
+            Watched::Until(keep, goal) => {
+                end_at(w, goal, REACHED, true);
+                end_at(w, keep, MISSED, false);
+            }
+            Watched::Extreme(value, sign) => {
+                w.call(value, &[]);
+                let value = w.load_double(self.network().chances.result);
+                let sign = w.double(sign);
+                let value = w.multiply(sign, value);
+                let infinity = w.double(f64::INFINITY);
+                let negative = w.negate(value);
+                let size = w.greatest(value, negative);
+                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
+                let wrong = w.block();
+                w.unless(is_finite, wrong);
+                let best = w.load_double(self.layout.best);
+                let best = w.greatest(value, best);
+                w.store_double(self.layout.best, best);
+                let next = w.block();
+                w.jump(next);
+                w.at(wrong);
+                w.give_up();
+                w.at(next);
+            }
+        }
+    }
+
+    /// Lets time pass, if it is more than none.
+    fn wait(&self, w: &mut Writer, delay: Register, attempts: &[(usize, Register)]) {
+        let zero = w.double(0.0);
+        let passes = w.compare_doubles(delay, Relation::Greater, zero);
+        w.when(passes, |w| {
+            self.advance(w, delay);
+            for &(process, attempt) in attempts {
+                let word = self.layout.attempts[process].expect("it has a word");
+                let rest = w.subtract(attempt, delay);
+                w.store_double(word, rest);
+            }
+            let has_stays = w.load(self.layout.has_stays);
+            w.when(has_stays, |w| {
+                for &word in self.layout.stays.iter().flatten() {
+                    let stay = w.load_double(word);
+                    let rest = w.subtract(stay, delay);
+                    w.store_double(word, rest);
+                }
+            });
+        });
+    }
+
+    fn wait_until_the_end(&self, w: &mut Writer, delay: Register) {
+        let zero = w.double(0.0);
+        let passes = w.compare_doubles(delay, Relation::Greater, zero);
+        w.when(passes, |w| self.advance(w, delay));
+    }
+
+    fn advance(&self, w: &mut Writer, delay: Register) {
+        for &clock in &self.network().chances.clocks {
+            let value = w.load_double(clock);
+            let value = w.add(value, delay);
+            w.store_double(clock, value);
+        }
+        let time = w.load_double(self.layout.time);
+        let time = w.add(time, delay);
+        w.store_double(self.layout.time, time);
+    }
+}

@@ -1,0 +1,229 @@
+//! The code of a race as a whole: whether there can be one, and runs that it makes.
+
+use super::asked::{End, Watched};
+use super::conditions::Conditions;
+use super::layout::Layout;
+use super::race_writer::{Ids, RaceWriter};
+use super::rounds::{GOES_ON, IS_OVER, MISSED, REACHED};
+use crate::analysis::function_reads::read_words;
+use crate::cancellation;
+use crate::exec::arithmetic::{double_of_words, double_words};
+use crate::exec::{Context, Executor};
+use crate::ir::{
+    Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
+};
+use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
+use crate::stochastic::program::Program;
+
+/// A race of more instructions is not written as code.
+const MOST_INSTRUCTIONS: usize = 100_000;
+
+/// The code of a race, written and not yet prepared to run.
+pub(super) struct WrittenRace {
+    layout: Layout,
+    /// The functions of the network, and those of the race behind them.
+    functions: Vec<Function>,
+    rounds: FunctionId,
+    /// How many instructions those of the race have.
+    pub(super) instructions: usize,
+}
+
+impl WrittenRace {
+    /// Writes the race of a network; `None` if it has what the code does not know.
+    pub(super) fn of(program: &Program<'_>, watched: &Watched) -> Option<WrittenRace> {
+        let network = program.network;
+        let layout = Layout::of(program);
+        let conditions = Conditions {
+            program,
+            result: network.chances.result,
+        };
+        if !is_known(program, &conditions) {
+            return None;
+        }
+        let mut functions = network.functions.clone();
+        let first = functions.len() as u32;
+        let writer = RaceWriter {
+            program,
+            layout: &layout,
+            conditions,
+            in_windows: FunctionId(first),
+        };
+        functions.push(writer.windows());
+        let mut instructions = 0;
+        let mut add = |function: Function| {
+            let size: usize = function
+                .blocks
+                .iter()
+                .map(|one| one.instructions.len() + 1)
+                .sum();
+            instructions += size;
+            functions.push(function);
+            let id = FunctionId(functions.len() as u32 - 1);
+            (instructions <= MOST_INSTRUCTIONS).then_some(id)
+        };
+        let processes = 0..network.processes.len();
+        let mut ids = Ids {
+            plans: Vec::new(),
+            moves: Vec::new(),
+            abilities: Vec::new(),
+        };
+        for process in processes {
+            ids.plans.push(add(writer.plan(process))?);
+            ids.moves.push(add(writer.movement(process))?);
+            let ability = match layout.attempts[process] {
+                None => None,
+                Some(_) => Some(add(writer.ability(process))?),
+            };
+            ids.abilities.push(ability);
+        }
+        let rounds = add(writer.rounds(&ids, watched))?;
+        Some(WrittenRace {
+            layout,
+            functions,
+            rounds,
+            instructions,
+        })
+    }
+
+    /// Makes it ready to run; `None` if the executor cannot.
+    pub(super) fn prepare(
+        self,
+        program: &Program<'_>,
+        executor: &dyn Executor,
+    ) -> Option<RaceCode> {
+        let network = program.network;
+        let executor = executor.with_code(&self.functions, &network.constants, self.rounds)?;
+        let mut initial = network.initial.clone();
+        initial.resize(self.layout.words as usize, 0);
+        for process in 0..network.processes.len() {
+            let (word, bit) = self.layout.stale_bit(process);
+            initial[word as usize] |= bit;
+            let location = LocationId(initial[process] as u32);
+            let is_committed = program.spot(process, location).urgency == Urgency::Committed;
+            initial[self.layout.committed as usize] += i32::from(is_committed);
+        }
+        let infinity = double_words(f64::INFINITY);
+        let places = self.layout.attempts.iter().chain(&self.layout.stays);
+        for &word in places.flatten() {
+            initial[word as usize..word as usize + 2].copy_from_slice(&infinity);
+        }
+        let best = self.layout.best as usize;
+        initial[best..best + 2].copy_from_slice(&double_words(f64::NEG_INFINITY));
+        Some(RaceCode {
+            executor,
+            words: initial.clone(),
+            initial,
+            layout: self.layout,
+            rounds: self.rounds,
+        })
+    }
+}
+
+/// Whether the code knows all that a network has.
+fn is_known(program: &Program<'_>, conditions: &Conditions<'_, '_>) -> bool {
+    let network = program.network;
+    let processes = network.processes.len() as u32;
+    let reads_places = |function: FunctionId| {
+        let read = read_words(network, [function], network.layout.words as usize);
+        read.is_none_or(|words| words.iter().any(|&word| word < processes))
+    };
+    let edges = network.processes.iter().flat_map(|process| &process.edges);
+    // The code lets a receiver enter its location before the next one runs its update.
+    let mut updates = edges.flat_map(|edge| {
+        let legs = edge.branches.iter().map(|branch| branch.update.function);
+        legs.chain([edge.update.function]).flatten()
+    });
+    let mut spots = (0..processes as usize).flat_map(|process| program.spots_of(process));
+    program.rated.is_empty()
+        && !program.has_flows
+        && !program.places_others()
+        && network.before_update.is_none()
+        && network.after_update.is_none()
+        && network.externals.is_empty()
+        && spots.all(|spot| conditions.can_write(spot))
+        && !updates.any(reads_places)
+}
+
+/// The code of a race, ready to make runs one after the other.
+pub(in crate::stochastic) struct RaceCode {
+    executor: Box<dyn Executor>,
+    layout: Layout,
+    rounds: FunctionId,
+    /// The words at the start of a run.
+    initial: Vec<i32>,
+    words: Vec<i32>,
+}
+
+impl RaceCode {
+    /// Whether it makes runs with such a bound.
+    pub(in crate::stochastic) fn knows(bound: &RunBound) -> bool {
+        bound.limit == RunLimit::Time && bound.value.is_finite()
+    }
+
+    fn double(&self, word: u32) -> f64 {
+        let word = word as usize;
+        double_of_words(self.words[word], self.words[word + 1])
+    }
+
+    /// Makes a run; `None` if the race must make it.
+    pub(super) fn run(
+        &mut self,
+        program: &Program<'_>,
+        executor: &dyn Executor,
+        (seed, run): (u64, u64),
+        bound: f64,
+    ) -> Option<End> {
+        self.words.copy_from_slice(&self.initial);
+        let stream = program.network.chances.stream as usize;
+        Stream::start(&mut self.words[stream..stream + STREAM_WORDS], seed, run);
+        let place = self.layout.bound as usize;
+        self.words[place..place + 2].copy_from_slice(&double_words(bound));
+        let mut moves = 0;
+        let result = loop {
+            let before = self.double(self.layout.time);
+            self.words[self.layout.moves_left as usize] = MOVES_OF_A_PLAN as i32;
+            let mut context = Context {
+                state: &mut self.words,
+                constraints: &mut Vec::new(),
+                assignments: &mut Vec::new(),
+            };
+            let result = self.executor.call(self.rounds, &[], &mut context).ok()?;
+            let left = self.words[self.layout.moves_left as usize] as u32;
+            let made = MOVES_OF_A_PLAN - left;
+            moves += u64::from(made);
+            cancellation::work(UNITS_FOR_MOVE * made as usize);
+            if result != GOES_ON {
+                break result;
+            }
+            if self.double(self.layout.time) - before < ZENO_TIME {
+                return None;
+            }
+            self.renew(program);
+        };
+        if let Some(site) = self.executor.wraps().first() {
+            executor.wraps().note(site);
+        }
+        Some(End {
+            decided: match result {
+                REACHED => Some(true),
+                MISSED => Some(false),
+                IS_OVER => None,
+                _ => return None,
+            },
+            time: self.double(self.layout.time),
+            moves,
+            best: self.double(self.layout.best),
+        })
+    }
+
+    /// Lets those plan anew who wait for a clock, so that rounding does not add up.
+    fn renew(&mut self, program: &Program<'_>) {
+        for process in 0..program.network.processes.len() {
+            let location = LocationId(self.words[process] as u32);
+            if program.spot(process, location).waits_for_a_clock() {
+                let (word, bit) = self.layout.stale_bit(process);
+                self.words[word as usize] |= bit;
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! When runs are made by code: once they have taken so long that writing and compiling it pays.
+
+use super::asked::{End, Watched};
+use super::runs::{RaceCode, WrittenRace};
+use crate::exec::Executor;
+use crate::stochastic::program::Program;
+
+/// The moves before it is looked at whether there is code for a race.
+const MOVES_BEFORE_WRITING: u64 = 20_000;
+/// The moves for each instruction that is to be compiled, which take about as long.
+const MOVES_OF_AN_INSTRUCTION: u64 = 10;
+/// The runs after which code is dropped that gives up one run in [`FEW`].
+const ENOUGH_RUNS: u64 = 64;
+const FEW: u64 = 4;
+
+/// Makes runs by code as soon as that pays.
+pub(in crate::stochastic) struct Stages {
+    stage: Stage,
+    /// What the code watches.
+    watched: Option<Watched>,
+    /// How many moves were made without code.
+    moves: u64,
+}
+
+enum Stage {
+    Waiting,
+    Written(Box<WrittenRace>),
+    Ready {
+        code: Box<RaceCode>,
+        runs: u64,
+        given_up: u64,
+    },
+    Without,
+}
+
+impl Stages {
+    pub(in crate::stochastic) fn new(executor: &dyn Executor) -> Stages {
+        Stages {
+            stage: if executor.compiles_runs() {
+                Stage::Waiting
+            } else {
+                Stage::Without
+            },
+            watched: None,
+            moves: 0,
+        }
+    }
+
+    /// Writes the code now, and makes all runs with it that it can make. Returns whether there is
+    /// any.
+    pub(in crate::stochastic) fn begin(
+        &mut self,
+        program: &Program<'_>,
+        executor: &dyn Executor,
+        watched: Watched,
+    ) -> bool {
+        self.watched = Some(watched);
+        let written = WrittenRace::of(program, &watched);
+        self.stage = match written.and_then(|written| written.prepare(program, executor)) {
+            None => Stage::Without,
+            Some(code) => Stage::ready(code),
+        };
+        matches!(self.stage, Stage::Ready { .. })
+    }
+
+    /// Makes a run by code; `None` if it must be made in another way.
+    pub(in crate::stochastic) fn run(
+        &mut self,
+        (program, executor): (&Program<'_>, &dyn Executor),
+        watched: Watched,
+        numbers: (u64, u64),
+        bound: f64,
+    ) -> Option<End> {
+        self.go_on(program, executor, watched);
+        if self.watched != Some(watched) {
+            return None;
+        }
+        let Stage::Ready {
+            code,
+            runs,
+            given_up,
+        } = &mut self.stage
+        else {
+            return None;
+        };
+        *runs += 1;
+        let end = code.run(program, executor, numbers, bound);
+        if end.is_none() {
+            *given_up += 1;
+            if *runs >= ENOUGH_RUNS && *given_up > *runs / FEW {
+                self.stage = Stage::Without;
+            }
+        }
+        end
+    }
+
+    /// Writes or compiles the code if it is time to do so.
+    fn go_on(&mut self, program: &Program<'_>, executor: &dyn Executor, watched: Watched) {
+        let moves = self.moves;
+        if matches!(self.stage, Stage::Waiting) && moves >= MOVES_BEFORE_WRITING {
+            self.watched = Some(watched);
+            self.stage = match WrittenRace::of(program, &watched) {
+                None => Stage::Without,
+                Some(written) => Stage::Written(Box::new(written)),
+            };
+        }
+        let is_due =
+            |written: &WrittenRace| moves >= MOVES_OF_AN_INSTRUCTION * written.instructions as u64;
+        if matches!(&self.stage, Stage::Written(written) if is_due(written))
+            && let Stage::Written(written) = std::mem::replace(&mut self.stage, Stage::Without)
+            && let Some(code) = written.prepare(program, executor)
+        {
+            self.stage = Stage::ready(code);
+        }
+    }
+
+    /// How many runs were made by code.
+    pub(in crate::stochastic) fn runs(&self) -> u64 {
+        match self.stage {
+            Stage::Ready { runs, given_up, .. } => runs - given_up,
+            _ => 0,
+        }
+    }
+
+    /// Counts the moves of a run that was made without code.
+    pub(in crate::stochastic) fn count(&mut self, moves: u64) {
+        self.moves += moves;
+    }
+}
+
+impl Stage {
+    fn ready(code: RaceCode) -> Stage {
+        Stage::Ready {
+            code: Box::new(code),
+            runs: 0,
+            given_up: 0,
+        }
+    }
+}

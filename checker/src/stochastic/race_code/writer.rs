@@ -1,0 +1,403 @@
+//! Writes functions: registers and blocks, in the order in which they run.
+
+use crate::ir::{
+    Address, Base, Block, BlockId, Distribution, DoubleOperator, Function, FunctionId, Instruction,
+    IntegerOperator, Register, RegisterType, Relation, RunTimeErrorKind, SiteId, Terminator,
+};
+
+/// Code that is written here fails nowhere but where it gives up, which needs no place.
+const NOWHERE: SiteId = SiteId(0);
+
+/// A function that is being written. What is written goes to the end of the current block.
+pub(super) struct Writer {
+    function: Function,
+    current: usize,
+    /// The double at which runs draw their random numbers begin.
+    stream: u32,
+}
+
+impl Writer {
+    /// A function of integers; its parameters are the first registers.
+    pub(super) fn new(
+        name: &str,
+        (parameters, result): (u32, Option<RegisterType>),
+        stream: u32,
+    ) -> Writer {
+        Writer {
+            function: Function {
+                name: name.into(),
+                registers: vec![RegisterType::Integer; parameters as usize],
+                parameters,
+                frame_words: 0,
+                result,
+                blocks: vec![empty_block()],
+            },
+            current: 0,
+            stream,
+        }
+    }
+
+    pub(super) fn finish(self) -> Function {
+        self.function
+    }
+
+    fn register(&mut self, kind: RegisterType) -> Register {
+        self.function.registers.push(kind);
+        Register(self.function.registers.len() as u32 - 1)
+    }
+
+    fn push(&mut self, instruction: Instruction) {
+        self.function.blocks[self.current]
+            .instructions
+            .push(instruction);
+    }
+
+    /// A block that nothing leads to yet.
+    pub(super) fn block(&mut self) -> BlockId {
+        self.function.blocks.push(empty_block());
+        BlockId(self.function.blocks.len() as u32 - 1)
+    }
+
+    /// What is written from here on goes into this block.
+    pub(super) fn at(&mut self, BlockId(block): BlockId) {
+        self.current = block as usize;
+    }
+
+    fn end(&mut self, terminator: Terminator) {
+        self.function.blocks[self.current].terminator = terminator;
+    }
+
+    pub(super) fn jump(&mut self, block: BlockId) {
+        self.end(Terminator::Jump(block));
+    }
+
+    pub(super) fn branch(&mut self, condition: Register, then: BlockId, otherwise: BlockId) {
+        self.end(Terminator::Branch(condition, then, otherwise));
+    }
+
+    /// Goes on if the condition holds, else elsewhere.
+    pub(super) fn unless(&mut self, condition: Register, otherwise: BlockId) {
+        let next = self.block();
+        self.branch(condition, next, otherwise);
+        self.at(next);
+    }
+
+    /// Writes what is done only if a condition holds.
+    pub(super) fn when(&mut self, condition: Register, write: impl FnOnce(&mut Writer)) {
+        let (then, next) = (self.block(), self.block());
+        self.branch(condition, then, next);
+        self.at(then);
+        write(self);
+        self.jump(next);
+        self.at(next);
+    }
+
+    /// Writes what is done as long as a condition holds.
+    pub(super) fn repeat(
+        &mut self,
+        condition: impl FnOnce(&mut Writer) -> Register,
+        write: impl FnOnce(&mut Writer),
+    ) {
+        let (head, body, next) = (self.block(), self.block(), self.block());
+        self.jump(head);
+        self.at(head);
+        let holds = condition(self);
+        self.branch(holds, body, next);
+        self.at(body);
+        write(self);
+        self.jump(head);
+        self.at(next);
+    }
+
+    pub(super) fn return_value(&mut self, value: Option<Register>) {
+        self.end(Terminator::Return(value));
+    }
+
+    /// Gives the run up: it is made in another way.
+    pub(super) fn give_up(&mut self) {
+        self.end(Terminator::Fail(RunTimeErrorKind::Interrupted, NOWHERE));
+    }
+
+    pub(super) fn integer(&mut self, value: i32) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::Integer { target, value });
+        target
+    }
+
+    pub(super) fn double(&mut self, value: f64) -> Register {
+        let target = self.register(RegisterType::Double);
+        let value = value.into();
+        self.push(Instruction::Double { target, value });
+        target
+    }
+
+    pub(super) fn copy(&mut self, target: Register, source: Register) {
+        self.push(Instruction::Copy { target, source });
+    }
+
+    pub(super) fn load(&mut self, word: u32) -> Register {
+        let target = self.register(RegisterType::Integer);
+        let address = word_of_state(word, None);
+        self.push(Instruction::LoadInteger { target, address });
+        target
+    }
+
+    pub(super) fn store(&mut self, word: u32, source: Register) {
+        let address = word_of_state(word, None);
+        self.push(Instruction::StoreInteger { address, source });
+    }
+
+    pub(super) fn store_integer(&mut self, word: u32, value: i32) {
+        let value = self.integer(value);
+        self.store(word, value);
+    }
+
+    pub(super) fn load_double(&mut self, word: u32) -> Register {
+        self.load_double_at(word, None)
+    }
+
+    /// Reads the double so many words behind a place, if that is given.
+    pub(super) fn load_double_at(&mut self, word: u32, index: Option<Register>) -> Register {
+        let target = self.register(RegisterType::Double);
+        let address = word_of_state(word, index);
+        self.push(Instruction::LoadDouble { target, address });
+        target
+    }
+
+    pub(super) fn store_double(&mut self, word: u32, source: Register) {
+        self.store_double_at(word, None, source);
+    }
+
+    pub(super) fn store_double_at(&mut self, word: u32, index: Option<Register>, source: Register) {
+        let address = word_of_state(word, index);
+        self.push(Instruction::StoreDouble { address, source });
+    }
+
+    pub(super) fn arithmetic(
+        &mut self,
+        operator: IntegerOperator,
+        left: Register,
+        right: Register,
+    ) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::Arithmetic {
+            operator,
+            target,
+            left,
+            right,
+            site: NOWHERE,
+        });
+        target
+    }
+
+    pub(super) fn add_integers(&mut self, left: Register, right: Register) -> Register {
+        self.arithmetic(IntegerOperator::Add, left, right)
+    }
+
+    pub(super) fn doubles(
+        &mut self,
+        operator: DoubleOperator,
+        left: Register,
+        right: Register,
+    ) -> Register {
+        let target = self.register(RegisterType::Double);
+        self.push(Instruction::DoubleArithmetic {
+            operator,
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    pub(super) fn add(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Add, left, right)
+    }
+
+    pub(super) fn subtract(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Subtract, left, right)
+    }
+
+    pub(super) fn multiply(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Multiply, left, right)
+    }
+
+    pub(super) fn least(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Minimum, left, right)
+    }
+
+    pub(super) fn greatest(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Maximum, left, right)
+    }
+
+    /// `0 - value`
+    pub(super) fn negate(&mut self, value: Register) -> Register {
+        let zero = self.double(0.0);
+        self.subtract(zero, value)
+    }
+
+    pub(super) fn compare(
+        &mut self,
+        left: Register,
+        relation: Relation,
+        right: Register,
+    ) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::CompareIntegers {
+            relation,
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    pub(super) fn compare_to(
+        &mut self,
+        left: Register,
+        relation: Relation,
+        right: i32,
+    ) -> Register {
+        let right = self.integer(right);
+        self.compare(left, relation, right)
+    }
+
+    pub(super) fn compare_doubles(
+        &mut self,
+        left: Register,
+        relation: Relation,
+        right: Register,
+    ) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::CompareDoubles {
+            relation,
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    pub(super) fn double_of(&mut self, source: Register) -> Register {
+        let target = self.register(RegisterType::Double);
+        self.push(Instruction::IntegerToDouble { target, source });
+        target
+    }
+
+    /// Calls a function of integers; returns its result, if it has one.
+    pub(super) fn call(&mut self, function: FunctionId, values: &[i32]) {
+        let arguments = values.iter().map(|&value| self.integer(value)).collect();
+        self.push(Instruction::Call {
+            target: None,
+            function,
+            arguments,
+        });
+    }
+
+    /// Calls a function of integers that returns one.
+    pub(super) fn call_for(&mut self, function: FunctionId, arguments: Vec<Register>) -> Register {
+        self.call_typed(function, arguments, RegisterType::Integer)
+    }
+
+    /// Calls a function that returns a double.
+    pub(super) fn call_for_double(
+        &mut self,
+        function: FunctionId,
+        arguments: Vec<Register>,
+    ) -> Register {
+        self.call_typed(function, arguments, RegisterType::Double)
+    }
+
+    fn call_typed(
+        &mut self,
+        function: FunctionId,
+        arguments: Vec<Register>,
+        kind: RegisterType,
+    ) -> Register {
+        let target = self.register(kind);
+        self.push(Instruction::Call {
+            target: Some(target),
+            function,
+            arguments,
+        });
+        target
+    }
+
+    pub(super) fn draw(&mut self, distribution: Distribution, argument: Register) -> Register {
+        let target = self.register(RegisterType::Double);
+        self.push(Instruction::Random {
+            distribution,
+            target,
+            arguments: vec![argument],
+            stream: word_of_state(self.stream, None),
+            site: NOWHERE,
+        });
+        target
+    }
+
+    /// The place of the double with this number in an array of so many.
+    pub(super) fn place_of_double(&mut self, number: Register, length: u32) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::ScaleIndex {
+            target,
+            index: number,
+            first: 0,
+            length,
+            stride: 2,
+            site: NOWHERE,
+        });
+        target
+    }
+
+    /// An integer less than `count`, each with the same probability.
+    pub(super) fn draw_below(&mut self, count: Register) -> Register {
+        let count = self.double_of(count);
+        let drawn = self.draw(Distribution::Below, count);
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::DoubleToInteger {
+            target,
+            source: drawn,
+            site: NOWHERE,
+        });
+        target
+    }
+
+    /// Goes to one of several places by a number that is one of theirs; they are in ascending
+    /// order of their numbers.
+    pub(super) fn select(&mut self, number: Register, places: &[(i32, BlockId)]) {
+        let mut open = vec![(self.current, places)];
+        while let Some((block, places)) = open.pop() {
+            self.current = block;
+            match places {
+                [] => self.give_up(),
+                [(_, only)] => self.jump(*only),
+                _ if places.iter().all(|(_, block)| *block == places[0].1) => {
+                    self.jump(places[0].1);
+                }
+                _ => {
+                    let (left, right) = places.split_at(places.len() / 2);
+                    let is_left = self.compare_to(number, Relation::Less, right[0].0);
+                    let (then, otherwise) = (self.block(), self.block());
+                    self.branch(is_left, then, otherwise);
+                    open.push((then.0 as usize, left));
+                    open.push((otherwise.0 as usize, right));
+                }
+            }
+        }
+    }
+}
+
+fn empty_block() -> Block {
+    Block {
+        instructions: Vec::new(),
+        terminator: Terminator::Fail(RunTimeErrorKind::Interrupted, NOWHERE),
+    }
+}
+
+fn word_of_state(offset: u32, index: Option<Register>) -> Address {
+    Address {
+        base: Base::State,
+        offset,
+        index,
+    }
+}

@@ -1,0 +1,279 @@
+//! Runs as code of the network against runs that are made move by move: the same, bit by bit,
+//! whether the code is compiled or interpreted.
+//!
+//! `NETWORKS=500 cargo test --release --test stochastic race_code::` tries more random networks.
+
+use checker::exec::{Executor, Interpreter, Jit};
+use checker::ir::{Statistical, StatisticalQuery};
+use checker::stochastic::{Asked, Failure, Runner};
+
+use crate::load;
+use crate::networks::generate::{Family, network};
+use crate::random::Random;
+
+/// The runs that are compared of a model.
+const RUNS: u64 = 60;
+
+/// What a run shows, its doubles as bits.
+type Shown = (Option<bool>, u64, u64);
+
+/// How a run ends.
+fn end(runner: &mut Runner<'_>, query: &StatisticalQuery, run: u64) -> Result<Shown, Failure> {
+    match &query.kind {
+        Statistical::Probability(bound, path) => {
+            let outcome = runner.path((3, run), bound, path)?;
+            Ok((
+                Some(outcome.satisfied),
+                outcome.time.to_bits(),
+                outcome.moves,
+            ))
+        }
+        Statistical::Expectation {
+            bound,
+            value,
+            maximum,
+            ..
+        } => {
+            let (value, moves) = runner.extreme((3, run), bound, *value, *maximum)?;
+            Ok((None, value.to_bits(), moves))
+        }
+        _ => panic!("{} has no runs to compare", query.text),
+    }
+}
+
+/// Writes the runs of a query as code; returns whether there is code.
+fn write(runner: &mut Runner<'_>, query: &StatisticalQuery) -> bool {
+    match &query.kind {
+        Statistical::Probability(bound, path) => runner.write_runs(bound, Asked::Path(path)),
+        Statistical::Expectation {
+            bound,
+            value,
+            maximum,
+            ..
+        } => runner.write_runs(bound, Asked::Extreme(*value, *maximum)),
+        _ => panic!("{} has no runs to compare", query.text),
+    }
+}
+
+/// Compares runs; returns how many were made by code, or `None` if there is none.
+fn compare(model: &str, query: &str, runs: u64) -> Option<u64> {
+    let (network, query) = load(model, query).unwrap_or_else(|message| panic!("{message}"));
+    let interpreter = Interpreter::new(&network.functions, &network.constants);
+    let jit = Jit::new(&network.functions, &network.constants).expect("it can be compiled");
+    let executors: [&dyn Executor; 2] = [&interpreter, &jit];
+    let mut known = Runner::new(&network, &interpreter);
+    let mut written = executors.map(|executor| Runner::new(&network, executor));
+    if !written.iter_mut().all(|runner| write(runner, &query)) {
+        return None;
+    }
+    for run in 0..runs {
+        let expected = end(&mut known, &query, run);
+        for (number, runner) in written.iter_mut().enumerate() {
+            let found = end(runner, &query, run);
+            assert_eq!(
+                format!("{found:?}"),
+                format!("{expected:?}"),
+                "run {run}, executor {number}\n{}\n{model}",
+                query.text
+            );
+        }
+    }
+    let counts = written.map(|runner| runner.written_runs());
+    assert_eq!(counts[0], counts[1], "both give up the same runs");
+    Some(counts[0])
+}
+
+/// All runs of a model are made by code, and are the same.
+fn all_are_written(model: &str, query: &str) {
+    assert_eq!(compare(model, query, RUNS), Some(RUNS), "{query}\n{model}");
+}
+
+#[test]
+fn random_networks_make_the_same_runs() {
+    let networks = std::env::var("NETWORKS")
+        .map_or(12, |number| number.parse::<u64>().expect("it is a number"));
+    for family in [Family::Exponential, Family::Timed, Family::Ticking] {
+        let mut random = Random(0xc0de);
+        let (mut written, mut models) = (0, 0);
+        for _ in 0..networks {
+            let (net, query) = network(&mut random, family);
+            if let Some(runs) = compare(&net.text(), &query.text(), RUNS) {
+                models += 1;
+                written += runs;
+            }
+        }
+        assert!(
+            models * 4 >= networks && written * 2 >= models * RUNS,
+            "{family:?}: {written} runs of {models} models"
+        );
+    }
+}
+
+/// Windows that overlap, touch and leave gaps, with and without an invariant, some of one moment.
+const WINDOWS: &str = "
+    clock g;
+    double at = 2.5;
+    int[0, 30] n = 0;
+    process P(const int k) {
+        clock x, y;
+        state A { x <= 7 }, B { ; 1 + k }, C { x <= 3 + n && y < 20 }, D { ; 2.0 / (1 + n) };
+        init A;
+        trans A -> B { guard x >= 1 && x <= 2; assign x = 0; },
+              A -> C { guard x >= 4 && x < 5 && g > 1; assign x = 0, y = 0; },
+              A -> A { guard x > at && x <= 4.25 && n < 30; assign x = 0, n = n + 1; },
+              A -> D { guard x == 6; },
+              B -> A { guard x >= 2 && x <= 3; assign x = 0; },
+              B -> A { guard x >= 2.5 && y >= 1; assign x = 0, y = 0; },
+              B -> D { guard x == 1; assign x = 0.5; },
+              C -> A { guard x == 2; assign x = 0; },
+              C -> B { guard x == 3; assign x = 0; },
+              D -> A { assign x = 0, n = n / 2; },
+              D -> D { guard n < 3; assign n = n + 1; };
+    }
+    P1 = P(0); P2 = P(1); P3 = P(3);
+    system P1, P2, P3;";
+
+#[test]
+fn delays_in_windows_are_the_same() {
+    all_are_written(WINDOWS, "Pr[<=200](<> n == 9)");
+    all_are_written(WINDOWS, "Pr[<=30]([] n < 4 || P2.A)");
+    all_are_written(WINDOWS, "Pr[<=50](!P1.D U P3.C)");
+    all_are_written(WINDOWS, "E[<=40; 9](max: n - 3)");
+    all_are_written(WINDOWS, "E[<=40; 9](min: P1.B ? -n : n)");
+}
+
+/// Arrays of channels whose numbers are computed on both sides, several inputs of one process,
+/// branches with weights, committed and urgent locations of several processes.
+const MEETINGS: &str = "
+    const int N = 3;
+    broadcast chan call[N], tell;
+    urgent broadcast chan hurry;
+    int[0, N - 1] turn = 0;
+    int[0, 50] heard = 0;
+    int weight = 1;
+    int next(int one) { return (one + 1) % N; }
+    process Caller(const int[0, N - 1] id) {
+        state Idle { ; 3 }, Chosen, Told, Ready { ; 1:2 };
+        commit Chosen;
+        urgent Told;
+        init Idle;
+        trans Idle -> Chosen { sync call[next(turn)]!; assign turn = id; },
+              Chosen -> Told { guard heard < 50; sync tell!; assign weight = 1 + heard % 3; },
+              Chosen -> Idle { guard heard >= 10; assign heard = 0; },
+              Told -> Ready { },
+              Told -> Idle { guard turn == id; },
+              Ready -> Idle { guard heard % 2 == 1; sync hurry!; };
+    }
+    process Listener(const int[0, N - 1] id) {
+        clock x;
+        state Wait, Answer { x <= 4 }, Lost { ; 5 }, Stuck;
+        urgent Stuck;
+        branchpoint Fork;
+        init Wait;
+        trans Wait -> Answer { sync call[id]?; assign x = 0; },
+              Wait -> Lost { guard turn != id; sync call[next(turn)]?; },
+              Wait -> Wait {
+                  select e : int[0, 2]; guard e <= id && heard < 50; sync tell?;
+                  assign heard = heard + 1;
+              },
+              Answer -> Fork { guard x >= 1; },
+              Fork -> Wait { probability weight; },
+              Fork -> Lost { assign x = 0; probability 2; },
+              Fork -> Stuck { probability 1; },
+              Stuck -> Wait { sync tell?; },
+              Lost -> Wait { };
+    }
+    system Caller, Listener;";
+
+#[test]
+fn meetings_are_the_same() {
+    // Where all wait in urgent locations, time is locked, which the race says.
+    for query in [
+        "Pr[<=100](<> heard == 12)",
+        "Pr[<=20]([] heard < 9)",
+        "E[<=20; 9](max: heard + weight)",
+    ] {
+        let runs = compare(MEETINGS, query, RUNS);
+        assert!(
+            runs.is_some_and(|runs| runs > RUNS / 2),
+            "{query}: {runs:?}"
+        );
+    }
+}
+
+#[test]
+fn long_runs_are_the_same() {
+    let model = "
+        clock x;
+        int[0, 9999] n = 0;
+        process P() {
+            clock y;
+            state A { y <= 3 };
+            init A;
+            trans A -> A { guard y >= 1; assign y = 0, n = (n + 7) % 10000; };
+        }
+        process Q() {
+            state A { ; 2 };
+            init A;
+            trans A -> A { guard x >= 3; assign x = 0; }, A -> A { guard n % 3 == 0; };
+        }
+        system P, Q;";
+    let runs = compare(model, "Pr[<=20000](<> n == 9999 && P.A && Q.A)", 4);
+    assert_eq!(runs, Some(4));
+}
+
+/// What is rare or goes wrong is left to the race, and ends as it ends there.
+#[test]
+fn failures_are_those_of_the_race() {
+    let model = |rest: &str| {
+        format!(
+            "int n = 0; clock x; broadcast chan c;
+            process P() {{ state A {{ ; 2 }}; init A; trans A -> A {{ sync c!; assign n++; }}; }}
+            process Q() {{ {rest} }}
+            system P, Q;"
+        )
+    };
+    for rest in [
+        // Time is locked at 2, unless `c` comes before.
+        "state A { x <= 2 }, B; init A; trans A -> B { sync c?; };",
+        // No rate.
+        "state A; init A; trans A -> A { guard n == 3; };",
+        // An invariant that breaks.
+        "state A { n < 4 }; init A; trans A -> A { guard n < 0; };",
+        // A division by zero.
+        "state A { ; 1 }; init A; trans A -> A { guard 6 / (n - 4) > 2; };",
+        // A rate that is none.
+        "state A { ; 3 - n }; init A; trans A -> A { };",
+        // Weights that are none.
+        "state A { ; 1 }; branchpoint B; init A;
+         trans A -> B { }, B -> A { probability 3 - n; }, B -> A { probability 3 - n; };",
+        // Two in urgent locations, of which one waits.
+        "state A, B; urgent A; init A; trans A -> B { sync c?; };",
+    ] {
+        let runs = compare(&model(rest), "Pr[<=4](<> n == 9)", RUNS);
+        assert!(runs.is_some(), "{rest}");
+    }
+}
+
+#[test]
+fn what_the_code_does_not_know_is_left_to_the_race() {
+    let model = |global: &str, rest: &str| {
+        format!(
+            "int n = 0; clock x; {global}
+            process P() {{ state A {{ ; 2 }}; init A; trans A -> A {{ assign n++; }}; }}
+            process Q() {{ {rest} }}
+            system P, Q;"
+        )
+    };
+    let binary = "state A { ; 1 }; init A; trans A -> A { sync c!; }, A -> A { sync c?; };";
+    let rated = "state A { x' == 2 }; init A;";
+    let split = "state A { ; 1 }; init A; trans A -> A { guard x <= 1 || x >= 2; };";
+    for (global, rest) in [("chan c;", binary), ("", rated), ("", split)] {
+        let model = model(global, rest);
+        assert_eq!(compare(&model, "Pr[<=4](<> n == 9)", 1), None, "{rest}");
+    }
+    let model = model("", "state A; init A;");
+    assert_eq!(compare(&model, "Pr[<=4](<> x >= 2)", 1), None);
+    assert_eq!(compare(&model, "Pr[x<=4](<> n == 9)", 1), None);
+    assert_eq!(compare(&model, "Pr[#<=4](<> n == 9)", 1), None);
+}
