@@ -22,7 +22,8 @@ use checker::syntax;
 
 use support::Scratch;
 
-/// The runs that are measured; `RUNS` in the environment sets another number.
+/// The runs that are measured; `RUNS` in the environment sets another number, and `MODEL` one model
+/// alone.
 const RUNS: u64 = 20_000;
 /// The fastest of so many repetitions counts; C and the engine take turns, so that both see the
 /// same load.
@@ -167,7 +168,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let scratch = Scratch::new()?;
     let program = scratch.compile("benches/stochastic.c", &[])?;
-    for case in &CASES {
+    let only = std::env::var("MODEL").ok();
+    let is_wanted = |case: &&Case| only.as_ref().is_none_or(|only| only == case.name);
+    for case in CASES.iter().filter(is_wanted) {
         measure(case, &program, runs)?;
     }
     Ok(())

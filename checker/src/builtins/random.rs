@@ -241,6 +241,7 @@ macro_rules! distributions {
 
             /// Draws a number; `None` if an argument is out of the domain of its parameter. It is
             /// never a NaN.
+            #[inline]
             pub fn sample(self, stream: &mut Stream<'_>, arguments: &[f64]) -> Option<f64> {
                 if !arguments.iter().all(|argument| argument.is_finite()) {
                     return None;

@@ -125,6 +125,21 @@ pub(super) extern "C" fn power(base: i32, exponent: i32) -> IntegerResult {
     })
 }
 
+/// Draws a random number of one distribution, by its place in [`Distribution::ALL`]: as [`draw`]
+/// does, and faster.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn draw_one<const DISTRIBUTION: usize>(
+    stream: *mut i32,
+    argument: f64,
+) -> f64 {
+    // SAFETY: compiled code passes the place of the words of a stream, whose index was checked, and
+    // nothing else uses them during the call.
+    let words = unsafe { std::slice::from_raw_parts_mut(stream, STREAM_WORDS) };
+    let distribution = const { Distribution::ALL[DISTRIBUTION] };
+    let value = distribution.sample(&mut Stream::of(words), &[argument]);
+    value.unwrap_or(f64::NAN)
+}
+
 /// Draws a random number; a NaN if an argument is out of its domain. The arguments are as many as
 /// the distribution takes, and further ones of no meaning.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]

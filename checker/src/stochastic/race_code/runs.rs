@@ -2,6 +2,7 @@
 
 use super::asked::{End, Watched};
 use super::conditions::Conditions;
+use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, RaceWriter};
 use super::rounds::{GOES_ON, IS_OVER, MISSED, REACHED};
@@ -17,6 +18,12 @@ use crate::stochastic::program::Program;
 
 /// A race of more instructions is not written as code.
 const MOST_INSTRUCTIONS: usize = 100_000;
+/// Functions of the network that are at most so large are taken into those that call them.
+const SMALL: usize = 60;
+/// Likewise plans and moves, which have one caller each.
+const LARGE: usize = 600;
+/// No function grows beyond this by what it takes in.
+const MOST_TAKEN_IN: usize = 6_000;
 
 /// The code of a race, written and not yet prepared to run.
 pub(super) struct WrittenRace {
@@ -50,13 +57,9 @@ impl WrittenRace {
         };
         functions.push(writer.windows());
         let mut instructions = 0;
-        let mut add = |function: Function| {
-            let size: usize = function
-                .blocks
-                .iter()
-                .map(|one| one.instructions.len() + 1)
-                .sum();
-            instructions += size;
+        let mut add = |function: Function, largest: usize| {
+            let function = inlined(function, &functions, (largest, MOST_TAKEN_IN));
+            instructions += size_of(&function);
             functions.push(function);
             let id = FunctionId(functions.len() as u32 - 1);
             (instructions <= MOST_INSTRUCTIONS).then_some(id)
@@ -68,15 +71,15 @@ impl WrittenRace {
             abilities: Vec::new(),
         };
         for process in processes {
-            ids.plans.push(add(writer.plan(process))?);
-            ids.moves.push(add(writer.movement(process))?);
+            ids.plans.push(add(writer.plan(process), SMALL)?);
+            ids.moves.push(add(writer.movement(process), SMALL)?);
             let ability = match layout.attempts[process] {
                 None => None,
-                Some(_) => Some(add(writer.ability(process))?),
+                Some(_) => Some(add(writer.ability(process), SMALL)?),
             };
             ids.abilities.push(ability);
         }
-        let rounds = add(writer.rounds(&ids, watched))?;
+        let rounds = add(writer.rounds(&ids, watched), LARGE)?;
         Some(WrittenRace {
             layout,
             functions,

@@ -342,8 +342,19 @@ impl Translator<'_> {
                 None => self.builder.ins().f64const(0.0),
             });
         }
-        let code = runtime::draw as *const () as usize;
-        let value = self.call_back(code, Some(F64), &values);
+        let frequent = match distribution {
+            Distribution::Uniform => Some(runtime::draw_one::<UNIFORM> as *const ()),
+            Distribution::Exponential => Some(runtime::draw_one::<EXPONENTIAL> as *const ()),
+            Distribution::Below => Some(runtime::draw_one::<BELOW> as *const ()),
+            _ => None,
+        };
+        let value = match frequent {
+            Some(code) => self.call_back(code as usize, Some(F64), &[values[0], values[2]]),
+            None => {
+                let code = runtime::draw as *const () as usize;
+                self.call_back(code, Some(F64), &values)
+            }
+        };
         let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
         self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
         value
@@ -353,6 +364,19 @@ impl Translator<'_> {
     pub(super) fn truth(&mut self, condition: Value) -> Value {
         self.builder.ins().uextend(I32, condition)
     }
+}
+
+/// The places of distributions that runs draw from all the time.
+const UNIFORM: usize = place_of(Distribution::Uniform);
+const EXPONENTIAL: usize = place_of(Distribution::Exponential);
+const BELOW: usize = place_of(Distribution::Below);
+
+const fn place_of(distribution: Distribution) -> usize {
+    let mut place = 0;
+    while Distribution::ALL[place] as u8 != distribution as u8 {
+        place += 1;
+    }
+    place
 }
 
 fn integer_condition(relation: Relation) -> IntCC {

@@ -1,0 +1,108 @@
+//! Takes the code of small functions into those that call them.
+//!
+//! The optimiser of the engine leaves calls as they are, for it gains nothing in symbolic queries.
+//! In a race a guard or an update is often cheaper than its call.
+
+use crate::ir::{Block, BlockId, Function, FunctionId, Instruction, Register, Terminator};
+
+/// How large a function is: its instructions, ends of blocks included.
+pub(super) fn size_of(function: &Function) -> usize {
+    function.instructions().count() + function.blocks.len()
+}
+
+/// A function with the code of those that it calls which are at most so large, as long as it does
+/// not grow beyond `most`.
+pub(super) fn inlined(
+    mut function: Function,
+    functions: &[Function],
+    (largest, most): (usize, usize),
+) -> Function {
+    let mut size = size_of(&function);
+    let mut block = 0;
+    while block < function.blocks.len() {
+        let instructions = &function.blocks[block].instructions;
+        let call = instructions.iter().position(|instruction| {
+            let Instruction::Call { function, .. } = instruction else {
+                return false;
+            };
+            let callee = &functions[function.0 as usize];
+            let more = size_of(callee);
+            callee.frame_words == 0 && more <= largest && size + more <= most
+        });
+        let Some(place) = call else {
+            block += 1;
+            continue;
+        };
+        let Instruction::Call {
+            target,
+            function: FunctionId(callee),
+            arguments,
+        } = function.blocks[block].instructions[place].clone()
+        else {
+            unreachable!("it is a call")
+        };
+        let callee = &functions[callee as usize];
+        size += size_of(callee);
+        take_in(&mut function, (block, place), callee, (target, &arguments));
+    }
+    function
+}
+
+/// Replaces a call by the code that it calls.
+fn take_in(
+    function: &mut Function,
+    (block, place): (usize, usize),
+    callee: &Function,
+    (target, arguments): (Option<Register>, &[Register]),
+) {
+    let first_register = function.registers.len() as u32;
+    function.registers.extend(&callee.registers);
+    let next = BlockId(function.blocks.len() as u32);
+    let first_block = next.0 + 1;
+    let before = &mut function.blocks[block];
+    let mut after = before.instructions.split_off(place);
+    after.remove(0);
+    for (number, &source) in (first_register..).zip(arguments) {
+        let target = Register(number);
+        before
+            .instructions
+            .push(Instruction::Copy { target, source });
+    }
+    let end = std::mem::replace(
+        &mut before.terminator,
+        Terminator::Jump(BlockId(first_block)),
+    );
+    function.blocks.push(Block {
+        instructions: after,
+        terminator: end,
+    });
+    for block in &callee.blocks {
+        let mut block = block.clone();
+        for instruction in &mut block.instructions {
+            instruction.each_use_mut(&mut |register| register.0 += first_register);
+            if let Some(register) = instruction.target_mut() {
+                register.0 += first_register;
+            }
+        }
+        if let Some(register) = block.terminator.used_mut() {
+            register.0 += first_register;
+        }
+        let moved = |BlockId(block)| BlockId(block + first_block);
+        block.terminator = match block.terminator {
+            Terminator::Jump(to) => Terminator::Jump(moved(to)),
+            Terminator::Branch(condition, then, otherwise) => {
+                Terminator::Branch(condition, moved(then), moved(otherwise))
+            }
+            Terminator::Return(result) => {
+                if let (Some(target), Some(source)) = (target, result) {
+                    block
+                        .instructions
+                        .push(Instruction::Copy { target, source });
+                }
+                Terminator::Jump(next)
+            }
+            fails @ Terminator::Fail(..) => fails,
+        };
+        function.blocks.push(block);
+    }
+}
