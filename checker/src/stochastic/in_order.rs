@@ -31,7 +31,7 @@ pub(super) fn in_order<T: Send + Shows>(
     mut consume: impl FnMut(T) -> bool,
     watch: &mut dyn RunWatch,
 ) -> Result<bool, Failure> {
-    let mut runners: Vec<Runner<'_>> = (0..threads.max(1)).map(|_| Runner::of(behaviour)).collect();
+    let mut runners = Runner::several(behaviour, threads);
     let (mut first, mut share, mut consumed) = (0_u64, 1_u64, 0_u64);
     loop {
         let start = Instant::now();

@@ -2,6 +2,7 @@
 //!
 //! What is asked is watched at all moments: after every move, and all through every delay.
 
+use std::iter;
 use std::sync::Arc;
 
 use super::behaviour::Behaviour;
@@ -148,6 +149,17 @@ impl<'a> Runner<'a> {
         if let Some(stages) = &mut self.stages {
             stages.count(self.race.moves);
         }
+    }
+
+    /// One for each thread, at least one: what does not change from run to run is shared.
+    pub(super) fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
+        let first = Runner::of(behaviour);
+        let program = Arc::clone(&first.program);
+        let others = (1..threads).map(|_| Runner {
+            program: Arc::clone(&program),
+            race: Race::new(behaviour),
+        });
+        iter::once(first).chain(others).collect()
     }
 
     /// Run number `run` of a seed, until it has what `path` asks or not.
