@@ -24,6 +24,7 @@ mod program;
 mod race;
 mod race_code;
 mod rare;
+mod readers;
 mod repeatable;
 mod restriction;
 mod run;

@@ -6,10 +6,13 @@
 //! binary channels. [`Program::readers`] and [`Program::followers`] list, for each word and for
 //! each process, all processes whose plans that concerns in some location.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashMap;
 
 use super::condition::{Comparisons, Condition, Number};
 use super::machine::Machine;
+use super::readers::Readers;
 use crate::analysis::function_reads::read_words;
 use crate::exec::Executor;
 use crate::ir::{
@@ -83,14 +86,14 @@ pub(super) struct Program<'a> {
     /// By branch of an edge: its weight, if it has branches with weights.
     weights: Vec<Number>,
     /// By branch of an edge: the processes that plan anew after it, beside those that move.
-    concerned: Vec<Box<[u32]>>,
+    concerned: Vec<Arc<[u32]>>,
     /// By branch of an edge: the processes whose locations its updates may set, as those of dynamic
     /// templates do.
     placed: Vec<Box<[u32]>>,
     /// By channel: the processes that may receive on it.
     listeners: Vec<Vec<u32>>,
     /// By the first word of a clock: whose plans depend on its rate.
-    pub(super) rate_readers: FxHashMap<u32, Box<[u32]>>,
+    pub(super) rate_readers: FxHashMap<u32, Arc<[u32]>>,
     /// By process: whose plans depend on where it is, the process itself left out.
     followers: Vec<Box<[u32]>>,
     /// The processes of which some location sets the rate of a clock.
@@ -328,8 +331,9 @@ impl<'a> Program<'a> {
             followers.retain(|&one| one != process as u32);
         }
         self.followers = followers.into_iter().map(Vec::into_boxed_slice).collect();
+        let mut readers = Readers::new(readers);
         for &clock in &network.chances.clocks {
-            let list = union_of(&readers, [(clock, CLOCK_WORDS)]);
+            let list = readers.of([(clock, CLOCK_WORDS)], None);
             if !list.is_empty() {
                 self.rate_readers.insert(clock, list);
             }
@@ -363,7 +367,7 @@ impl<'a> Program<'a> {
                         .iter()
                         .flat_map(|&(start, count)| start..start + count);
                     placed.push(words.filter(|&word| word < processes).collect());
-                    concerned.push(union_of(&readers, writes));
+                    concerned.push(readers.of(writes, Some(instance.process)));
                 }
                 first
             });
@@ -496,19 +500,6 @@ fn channel_of(sync: Option<Sync>, values: &[i32], machine: &mut Machine<'_>) -> 
 
 fn channels_of(sync: Sync) -> std::ops::Range<u32> {
     sync.channel.0..sync.channel.0 + sync.count
-}
-
-/// All that read one of the words in some ranges.
-fn union_of(readers: &[Vec<u32>], ranges: impl IntoIterator<Item = (u32, u32)>) -> Box<[u32]> {
-    let mut union = Vec::new();
-    for (first, count) in ranges {
-        for list in &readers[first as usize..(first + count) as usize] {
-            union.extend(list);
-        }
-        union.sort_unstable();
-        union.dedup();
-    }
-    union.into_boxed_slice()
 }
 
 /// Hands over all combinations of the values of the `select` bindings of an edge, in order.

@@ -195,7 +195,7 @@ impl<'a> Race<'a> {
                 && self.machine.clock(clock).1.to_bits() != before.to_bits()
                 && let Some(readers) = program.rate_readers.get(&clock)
             {
-                for &reader in readers {
+                for &reader in &**readers {
                     self.make_stale(reader);
                 }
             }
