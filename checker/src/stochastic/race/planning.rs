@@ -1,6 +1,7 @@
 //! What processes plan: how long they may stay, and when they try to move.
 
 use super::{FAR_BEYOND, MOST_CHANGES, Race};
+use crate::cancellation;
 use crate::ir::{FunctionId, Urgency};
 use crate::stochastic::advice::View;
 use crate::stochastic::condition::{Condition, Number};
@@ -8,6 +9,9 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Program, Spot, clocks_of};
 use crate::stochastic::span::Span;
 use crate::stochastic::windows::Windows;
+
+/// What a plan takes: see [`cancellation::work`].
+const UNITS_FOR_PLAN: usize = 128;
 
 impl<'a> Race<'a> {
     /// Lets all processes plan whose plans may have changed.
@@ -29,6 +33,7 @@ impl<'a> Race<'a> {
                 self.until = self.rest;
             }
             self.plan(program, process)?;
+            cancellation::work(UNITS_FOR_PLAN);
         }
         self.stale.clear();
         Ok(())
