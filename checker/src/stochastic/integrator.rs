@@ -8,6 +8,7 @@
 //! 2nd edition, sections II.4 to II.6.
 
 use super::failure::Failure;
+use crate::cancellation;
 
 /// The error of a step relative to the values, at most.
 const RELATIVE_ERROR: f64 = 1e-9;
@@ -17,6 +18,12 @@ const ABSOLUTE_ERROR: f64 = 1e-12;
 const LEAST_STEP: f64 = 1e-13;
 /// The first step, if nothing better is known.
 const FIRST_STEP: f64 = 1e-3;
+/// No step is longer: nothing is looked for as far away.
+const LONGEST_STEP: f64 = 1e12;
+/// What a step takes, by value: see [`cancellation::work`].
+const UNITS_FOR_STEP: usize = 128;
+/// So many steps are kept at least before it is asked whether there is room for more.
+const STEPS_OF_COURSE: usize = 1 << 16;
 
 /// The coefficients of a step, by value: a polynomial in the part of the step that has passed.
 type Polynomial = [f64; 5];
@@ -133,6 +140,12 @@ impl Integrator {
     }
 
     fn push(&mut self, length: f64) {
+        cancellation::work(UNITS_FOR_STEP * (1 + self.values.len()));
+        let kept = self.steps.len();
+        if kept >= STEPS_OF_COURSE && kept.is_power_of_two() {
+            let bytes = size_of::<Step>() + self.values.len() * size_of::<Polynomial>();
+            cancellation::ask_for(2 * kept * bytes);
+        }
         let start = self.end;
         self.steps.push(Step { start, length });
         self.end += length;
@@ -142,7 +155,7 @@ impl Integrator {
         let mut length = self.length.unwrap_or(FIRST_STEP);
         let least = LEAST_STEP * self.end.max(1.0);
         loop {
-            length = length.max(least);
+            length = length.clamp(least, LONGEST_STEP.max(least));
             let tried = self.try_step(length, slopes);
             let error = match tried {
                 Ok(error) => error,
@@ -180,7 +193,12 @@ impl Integrator {
             let known = self.slopes.iter().zip(ERROR_WEIGHTS);
             let error: f64 = known.map(|(slopes, weight)| slopes[value] * weight).sum();
             let allowed = ABSOLUTE_ERROR + RELATIVE_ERROR * before.abs().max(after.abs());
-            sum += (length * error / allowed).powi(2);
+            // Between the ends of a step that changes a value much, the polynomial is read near
+            // the lesser value, but is rounded like the change.
+            let rounding = f64::EPSILON * (after - before).abs();
+            let allowed_rounding = ABSOLUTE_ERROR + RELATIVE_ERROR * before.abs();
+            let parts = (length * error / allowed).abs() + rounding / allowed_rounding;
+            sum += parts.powi(2);
         }
         let error = (sum / self.values.len() as f64).sqrt();
         Ok(if error.is_nan() { f64::INFINITY } else { error })
@@ -301,6 +319,27 @@ mod tests {
                 .expect("it is finite");
             assert!((found[0] - time.cos()).abs() < 1e-7, "{time}: {}", found[0]);
             assert!((found[1] - time.sin()).abs() < 1e-7, "{time}: {}", found[1]);
+        }
+    }
+
+    /// A parabola, which steps of any length solve without an error.
+    fn falling(time: f64, _: &[f64], slopes: &mut [f64]) -> Result<(), Failure> {
+        slopes[0] = 10.0 - time;
+        Ok(())
+    }
+
+    #[test]
+    fn steps_without_error_grow_no_longer_than_can_be_read() {
+        let mut integrator = Integrator::default();
+        let mut found = vec![0.0];
+        for solution in 0..1000 {
+            integrator.begin(&found);
+            integrator
+                .at(0.1, &mut falling, &mut found)
+                .expect("it is finite");
+            let exact = f64::from(solution + 1) * (0.1 * 10.0 - 0.1 * 0.1 / 2.0);
+            let error = (found[0] - exact).abs();
+            assert!(error < 1e-8 * exact, "{solution}: {} for {exact}", found[0]);
         }
     }
 

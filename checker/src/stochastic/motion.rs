@@ -265,6 +265,9 @@ fn slopes_at(
     values: &[f64],
     target: &mut [f64],
 ) -> Result<(), Failure> {
+    if !values.iter().all(|value| value.is_finite()) {
+        return Err(Failure::ClockRate(rates[0].1));
+    }
     linear(machine, base, time);
     for (&clock, &value) in flowing.iter().zip(values) {
         machine.set_double(clock, value);

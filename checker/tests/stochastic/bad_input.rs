@@ -117,6 +117,11 @@ fn rates_that_are_none_are_refused() {
         process P() { state a { x' == d / d ; 1 }, b; init a; trans a -> b { }; }
         system P;";
     refused(model, "Pr[<=9](<> x > 3)", &["P.a gives a clock a rate"]);
+    let model = "
+        clock x, y;
+        process P() { state a { x' == 1e308 * cos(y * 1e-9) }; init a; }
+        system P;";
+    refused(model, "Pr[<=9](<> x < 0)", &["P.a gives a clock a rate"]);
     let model = "process P() { state a, b; init a; trans a -> b { }; } system P;";
     refused(model, REACHES, &["P.a can be left at any time"]);
     let model = "
@@ -235,6 +240,18 @@ fn runs_without_end_are_stopped_by_the_time_limit() {
     }
     let looping = updating("int n = 0; void f() { while (true) n = 1 - n; }", "f()");
     stopped(&looping, "Pr[<=9](<> n > 5)");
+}
+
+#[test]
+fn equations_that_need_tiny_steps_are_stopped_by_the_time_limit() {
+    // The first clock follows the second one within 1e-12 units of time.
+    let model = "
+        clock x, y;
+        process P() { state a { x' == 1e12 * (sin(y) - x) }; init a; }
+        system P;";
+    for query in ["Pr[<=9](<> x > 3)", "E[<=9; 5](max: 0)", "simulate[<=9]{x}"] {
+        stopped(model, query);
+    }
 }
 
 #[test]
