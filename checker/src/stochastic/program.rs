@@ -3,8 +3,9 @@
 //!
 //! Invariant: what a process plans depends only on the words that its [`Spot`] reads, on the
 //! location of the process itself, and on the locations of those that could receive from it on
-//! binary channels. [`Program::readers`] and [`Program::followers`] list, for each word and for
-//! each process, all processes whose plans that concerns in some location.
+//! binary channels. [`Program::concerned`] lists for each branch of an edge all spots whose plans
+//! depend on a word that it writes, and [`Program::followers`] for each process all processes whose
+//! plans depend on where it is.
 
 use std::sync::Arc;
 
@@ -12,7 +13,7 @@ use rustc_hash::FxHashMap;
 
 use super::condition::{Comparisons, Condition, Number};
 use super::machine::Machine;
-use super::readers::Readers;
+use super::readers::{Reader, Readers};
 use crate::analysis::function_reads::read_words;
 use crate::exec::Executor;
 use crate::ir::{
@@ -85,15 +86,15 @@ pub(super) struct Program<'a> {
     comparisons: Vec<Comparisons>,
     /// By branch of an edge: its weight, if it has branches with weights.
     weights: Vec<Number>,
-    /// By branch of an edge: the processes that plan anew after it, beside those that move.
-    concerned: Vec<Arc<[u32]>>,
+    /// By branch of an edge: who plans anew after it, beside those that move.
+    concerned: Vec<Arc<[Reader]>>,
     /// By branch of an edge: the processes whose locations its updates may set, as those of dynamic
     /// templates do.
     placed: Vec<Box<[u32]>>,
     /// By channel: the processes that may receive on it.
     listeners: Vec<Vec<u32>>,
     /// By the first word of a clock: whose plans depend on its rate.
-    pub(super) rate_readers: FxHashMap<u32, Arc<[u32]>>,
+    pub(super) rate_readers: FxHashMap<u32, Arc<[Reader]>>,
     /// By process: whose plans depend on where it is, the process itself left out.
     followers: Vec<Box<[u32]>>,
     /// The processes of which some location sets the rate of a clock.
@@ -254,8 +255,8 @@ impl<'a> Program<'a> {
         }
     }
 
-    /// The functions of which the plans of a process depend, in whichever location.
-    fn functions_of_plans(&self, process: usize) -> Vec<FunctionId> {
+    /// The functions on which the plans of a process in a location depend.
+    fn functions_of_plans(&self, spot: &Spot) -> Vec<FunctionId> {
         let mut functions = Vec::new();
         let of_instance = |instance: &Instance<'_>, functions: &mut Vec<FunctionId>| {
             functions.extend(self.function(instance.guard));
@@ -263,22 +264,20 @@ impl<'a> Program<'a> {
                 functions.push(index);
             }
         };
-        for spot in self.spots_of(process) {
-            functions.extend(self.function(spot.invariant));
-            if let Some(Number::Computed(rate)) = spot.exponential_rate {
-                functions.push(rate);
+        functions.extend(self.function(spot.invariant));
+        if let Some(Number::Computed(rate)) = spot.exponential_rate {
+            functions.push(rate);
+        }
+        functions.extend(spot.rates);
+        for output in self.range(spot.outputs) {
+            of_instance(output, &mut functions);
+            if !output.is_binary {
+                continue;
             }
-            functions.extend(spot.rates);
-            for output in self.range(spot.outputs) {
-                of_instance(output, &mut functions);
-                if !output.is_binary {
-                    continue;
-                }
-                for partner in self.partners(output) {
-                    for spot in self.spots_of(partner as usize) {
-                        for input in self.range(spot.inputs) {
-                            of_instance(input, &mut functions);
-                        }
+            for partner in self.partners(output) {
+                for spot in self.spots_of(partner as usize) {
+                    for input in self.range(spot.inputs) {
+                        of_instance(input, &mut functions);
                     }
                 }
             }
@@ -303,20 +302,35 @@ impl<'a> Program<'a> {
     fn find_dependences(&mut self, machine: &mut Machine<'a>) {
         let network = self.network;
         let words = network.layout.words as usize;
-        let mut readers: Vec<Vec<u32>> = vec![Vec::new(); words];
+        let mut readers: Vec<Vec<Reader>> = vec![Vec::new(); words];
         let mut followers: Vec<Vec<u32>> = vec![Vec::new(); network.processes.len()];
         for process in 0..network.processes.len() {
-            let reader = process as u32;
-            let functions = self.functions_of_plans(process);
-            match read_words(network, functions, words) {
-                Some(read) => {
-                    for word in read {
-                        readers[word as usize].push(reader);
-                    }
+            let spots = self.spots_of(process);
+            let mut read: Vec<(u32, u32)> = Vec::new();
+            let mut planning = 0;
+            for (location, spot) in (0..).zip(spots) {
+                let functions = self.functions_of_plans(spot);
+                planning += u32::from(!functions.is_empty());
+                match read_words(network, functions, words) {
+                    Some(of_spot) => read.extend(of_spot.iter().map(|&word| (word, location))),
+                    None => read.extend((0..words as u32).map(|word| (word, location))),
                 }
-                None => readers.iter_mut().for_each(|list| list.push(reader)),
             }
-            for spot in self.spots_of(process) {
+            read.sort_unstable();
+            for of_word in read.chunk_by(|one, other| one.0 == other.0) {
+                let list = &mut readers[of_word[0].0 as usize];
+                let process = process as u32;
+                if of_word.len() as u32 == planning {
+                    list.push(Reader::everywhere(process));
+                } else {
+                    list.extend(of_word.iter().map(|&(_, location)| Reader {
+                        process,
+                        location: Some(location),
+                    }));
+                }
+            }
+            let reader = process as u32;
+            for spot in spots {
                 for output in self.range(spot.outputs).iter().filter(|one| one.is_binary) {
                     for partner in self.partners(output) {
                         followers[partner as usize].push(reader);
@@ -325,7 +339,7 @@ impl<'a> Program<'a> {
             }
         }
         for (process, followers) in followers.iter_mut().enumerate() {
-            followers.extend(&readers[process]);
+            followers.extend(readers[process].iter().map(|reader| reader.process));
             followers.sort_unstable();
             followers.dedup();
             followers.retain(|&one| one != process as u32);
@@ -410,8 +424,8 @@ impl<'a> Program<'a> {
         self.weights[instance.branches as usize + branch]
     }
 
-    /// The processes that plan anew after a branch of an instance, beside those that move.
-    pub(super) fn concerned(&self, instance: &Instance<'_>, branch: usize) -> &[u32] {
+    /// Who plans anew after a branch of an instance, beside those that move.
+    pub(super) fn concerned(&self, instance: &Instance<'_>, branch: usize) -> &[Reader] {
         &self.concerned[instance.branches as usize + branch]
     }
 

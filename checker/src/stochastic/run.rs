@@ -108,9 +108,14 @@ impl<'a> Runner<'a> {
     /// What makes runs in which the controller does only what a strategy allows, or equations are
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
+        let program = Program::new(behaviour.network, behaviour.executor);
+        Runner::with(Arc::new(program), behaviour)
+    }
+
+    fn with(program: Arc<Program<'a>>, behaviour: Behaviour<'a>) -> Runner<'a> {
         let is_free = behaviour.restriction.is_none();
         Runner {
-            program: Arc::new(Program::new(behaviour.network, behaviour.executor)),
+            program,
             race: Race::new(behaviour),
             executor: behaviour.executor,
             stages: is_free.then(|| Stages::new(behaviour.executor)),
@@ -155,10 +160,7 @@ impl<'a> Runner<'a> {
     pub(super) fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
         let first = Runner::of(behaviour);
         let program = Arc::clone(&first.program);
-        let others = (1..threads).map(|_| Runner {
-            program: Arc::clone(&program),
-            race: Race::new(behaviour),
-        });
+        let others = (1..threads).map(|_| Runner::with(Arc::clone(&program), behaviour));
         iter::once(first).chain(others).collect()
     }
 

@@ -7,6 +7,7 @@ use crate::stochastic::condition::Number;
 use crate::stochastic::constants::MOVES_OF_A_PLAN;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
+use crate::stochastic::readers::Reader;
 
 impl<'a> Race<'a> {
     /// Makes plans stale that wait for a clock.
@@ -105,9 +106,7 @@ impl<'a> Race<'a> {
     /// Lets a mover enter the target of its branch, and finds who plans anew.
     pub(super) fn enter(&mut self, program: &Program<'a>, mover: &Instance<'a>, branch: usize) {
         self.make_stale(mover.process);
-        for &concerned in program.concerned(mover, branch) {
-            self.make_stale(concerned);
-        }
+        self.make_readers_stale(program.concerned(mover, branch));
         for &placed in program.placed(mover, branch) {
             let location = self.machine.location(placed as usize);
             self.place(program, placed, location);
@@ -115,6 +114,16 @@ impl<'a> Race<'a> {
         let target = mover.edge.branches[branch].target;
         self.machine.enter(ProcessId(mover.process), target);
         self.place(program, mover.process, target);
+    }
+
+    /// Lets those plan anew who are where their plans depend on what has changed.
+    fn make_readers_stale(&mut self, readers: &[Reader]) {
+        for &Reader { process, location } in readers {
+            let LocationId(is_at) = self.locations[process as usize];
+            if location.is_none_or(|location| location == is_at) {
+                self.make_stale(process);
+            }
+        }
     }
 
     /// Notes where a process is now.
@@ -195,9 +204,7 @@ impl<'a> Race<'a> {
                 && self.machine.clock(clock).1.to_bits() != before.to_bits()
                 && let Some(readers) = program.rate_readers.get(&clock)
             {
-                for &reader in &**readers {
-                    self.make_stale(reader);
-                }
+                self.make_readers_stale(readers);
             }
         }
         Ok(())

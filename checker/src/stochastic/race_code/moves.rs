@@ -401,7 +401,25 @@ impl<'a> RaceWriter<'_, 'a> {
         update(w, &branch.update, &mover.values);
         let process = mover.process as usize;
         let mut stale = vec![mover.process];
-        stale.extend(self.program.concerned(mover, number));
+        let mut places: Vec<(u32, u32)> = Vec::new();
+        for reader in self.program.concerned(mover, number) {
+            match reader.location {
+                None => stale.push(reader.process),
+                Some(_) if reader.process == mover.process => {}
+                Some(location) => places.push((reader.process, location)),
+            }
+        }
+        for (process, location) in places {
+            // Only who is there plans anew.
+            let (word, bit) = self.layout.stale_bit(process as usize);
+            let is_at = w.load(process);
+            let is_there = w.compare_to(is_at, Relation::Equal, location as i32);
+            let bit = w.integer(bit);
+            let bit = w.arithmetic(IntegerOperator::Multiply, is_there, bit);
+            let marked = w.load(word);
+            let marked = w.arithmetic(IntegerOperator::Or, marked, bit);
+            w.store(word, marked);
+        }
         let (source, target) = (mover.edge.source, branch.target);
         if source != target {
             let place = w.integer(target.0 as i32);

@@ -348,12 +348,11 @@ impl Translator<'_> {
             Distribution::Below => Some(runtime::draw_one::<BELOW> as *const ()),
             _ => None,
         };
-        let value = match frequent {
-            Some(code) => self.call_back(code as usize, Some(F64), &[values[0], values[2]]),
-            None => {
-                let code = runtime::draw as *const () as usize;
-                self.call_back(code, Some(F64), &values)
-            }
+        let value = if let Some(code) = frequent {
+            self.call_back(code as usize, Some(F64), &[values[0], values[2]])
+        } else {
+            let code = runtime::draw as *const () as usize;
+            self.call_back(code, Some(F64), &values)
         };
         let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
         self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
