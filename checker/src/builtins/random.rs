@@ -286,15 +286,18 @@ distributions! {
     Below "a choice" below(count),
 }
 
+#[inline]
 #[expect(clippy::unnecessary_wraps, reason = "the table wants it so")]
 fn uniform(stream: &mut Stream<'_>, max: f64) -> Option<f64> {
     Some(max * stream.uniform())
 }
 
+#[inline]
 fn exponential(stream: &mut Stream<'_>, rate: f64) -> Option<f64> {
     (rate > 0.0).then(|| stream.exponential(rate))
 }
 
+#[inline]
 fn below(stream: &mut Stream<'_>, count: f64) -> Option<f64> {
     (1.0..=f64::from(u32::MAX))
         .contains(&count)

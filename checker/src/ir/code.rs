@@ -215,8 +215,12 @@ pub enum Instruction {
     /// Writes an integer.
     StoreInteger { address: Address, source: Register },
     /// Writes a double into two words. Every NaN is written as the same one, so that equal states
-    /// have equal words.
-    StoreDouble { address: Address, source: Register },
+    /// have equal words; if `is_number`, it never is one, and nobody has to look.
+    StoreDouble {
+        address: Address,
+        source: Register,
+        is_number: bool,
+    },
     /// Copies words; the two ranges are the same or disjoint.
     CopyWords {
         target: Address,

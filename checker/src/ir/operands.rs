@@ -118,7 +118,7 @@ macro_rules! operand_walk {
                     visit(Source(source));
                     visit(Memory(address, Write(1)));
                 }
-                Instruction::StoreDouble { address, source } => {
+                Instruction::StoreDouble { address, source, .. } => {
                     visit(Source(source));
                     visit(Memory(address, Write(2)));
                 }

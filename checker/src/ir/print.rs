@@ -318,7 +318,9 @@ fn write_access(instruction: &Instruction, f: &mut Formatter<'_>) -> Result {
         Instruction::LoadInteger { target, address } => write!(f, "{target} = {address}"),
         Instruction::LoadDouble { target, address } => write!(f, "{target} = double {address}"),
         Instruction::StoreInteger { address, source } => write!(f, "{address} = {source}"),
-        Instruction::StoreDouble { address, source } => write!(f, "double {address} = {source}"),
+        Instruction::StoreDouble {
+            address, source, ..
+        } => write!(f, "double {address} = {source}"),
         Instruction::CopyWords {
             target,
             source,

@@ -228,6 +228,7 @@ fn thousand_draws(distribution: Distribution, arguments: &[f64]) -> Function {
                 ..state_word(RESULTS)
             },
             source: value,
+            is_number: false,
         },
         Instruction::Integer {
             target: one,
@@ -333,6 +334,7 @@ fn streams_lie_anywhere() {
     let store = |target, source| Instruction::StoreDouble {
         address: state_word(target),
         source: Register(source),
+        is_number: false,
     };
     let in_frame = Address {
         base: Base::Frame,

@@ -140,6 +140,7 @@ fn check_double(operands: &[f64], instruction: Instruction, expected: f64) {
     instructions.push(Instruction::StoreDouble {
         address: state_word(1),
         source: Register(operands.len() as u32),
+        is_number: false,
     });
     let bits = expected.to_bits();
     let words = vec![0, bits as i32, (bits >> 32) as i32, 0];
@@ -548,6 +549,7 @@ fn ldexp_scales_by_powers_of_two() {
             Instruction::StoreDouble {
                 address: state_word(0),
                 source: Register(2),
+                is_number: false,
             },
         ];
         let bits = expected.to_bits();

@@ -411,7 +411,11 @@ impl<'a> Lowering<'a> {
             }
             27 => {
                 let (address, source) = (self.place(b, c, d, false), self.double(a));
-                self.push(Instruction::StoreDouble { address, source });
+                self.push(Instruction::StoreDouble {
+                    address,
+                    source,
+                    is_number: false,
+                });
             }
             28 => {
                 let (target, source, words) = self.ranges([a, b, c, d, e], true);

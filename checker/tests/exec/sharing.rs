@@ -102,6 +102,7 @@ fn quotient(value: f64) -> Function {
         Instruction::StoreDouble {
             address: state_word(0),
             source: Register(3),
+            is_number: false,
         },
     ];
     straight_line(1, &[Integer, Double, Double, Double], code, None)

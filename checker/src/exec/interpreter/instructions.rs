@@ -338,7 +338,9 @@ impl Execution<'_, '_> {
                 let place = self.place(active, address);
                 self.set_word(place, self.integer(active, source));
             }
-            Instruction::StoreDouble { address, source } => {
+            Instruction::StoreDouble {
+                address, source, ..
+            } => {
                 let place = self.place(active, address);
                 let [low, high] = arithmetic::double_words(self.double(active, source));
                 self.set_word(place, low);

@@ -270,7 +270,11 @@ impl Builder<'_> {
         match target {
             Destination::Register(register) => self.copy(register, source),
             Destination::Memory(address) => self.emit(if ty.is_real() {
-                Instruction::StoreDouble { address, source }
+                Instruction::StoreDouble {
+                    address,
+                    source,
+                    is_number: false,
+                }
             } else {
                 Instruction::StoreInteger { address, source }
             }),

@@ -94,6 +94,8 @@ pub(in crate::stochastic) struct Race<'a> {
     since: (f64, u64),
     /// The moves until plans are drawn anew that wait for a clock.
     until_renewal: u32,
+    /// Who has made the last move and may have to plan anew.
+    winner: Option<usize>,
     /// What the strategy says, if the run is under one.
     advice: Option<Advice<'a>>,
     /// The first time at which an urgent channel stops time for a move that the strategy forbids,
@@ -134,6 +136,7 @@ impl<'a> Race<'a> {
             moves: 0,
             since: (0.0, 0),
             until_renewal: MOVES_OF_A_PLAN,
+            winner: None,
             advice: restriction.map(Advice::new),
             standstill: None,
             longest_stay: f64::INFINITY,
@@ -157,6 +160,7 @@ impl<'a> Race<'a> {
         self.since = (self.time, 0);
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
+        self.winner = None;
         self.stale.clear();
         self.is_stepped.fill(false);
         self.motion.end();
@@ -401,10 +405,8 @@ impl<'a> Race<'a> {
             }
         }
         self.carry_out(program)?;
+        self.winner = Some(process);
         self.until_renewal -= 1;
-        if self.until_renewal == 0 {
-            self.renew(program);
-        }
         self.count_move(process, true)
     }
 

@@ -16,14 +16,28 @@ const UNITS_FOR_PLAN: usize = 128;
 impl<'a> Race<'a> {
     /// Lets all processes plan whose plans may have changed.
     pub(super) fn plan_anew(&mut self, program: &Program<'a>) -> Result<(), Failure> {
-        // The order of random numbers is that of processes. Those who look along the motion of
-        // clocks come last, so that they need not look farther than to the first attempt.
+        // Random numbers are drawn first for who has won, and then in the order of processes.
+        // Those who look along the motion of clocks come last, so that they need not look farther
+        // than to the first attempt.
+        if let Some(winner) = self.winner.take()
+            && self.is_stale[winner]
+            && !self.is_stepped[winner]
+        {
+            self.is_stale[winner] = false;
+            self.until = self.rest;
+            self.plan(program, winner)?;
+        }
+        if self.until_renewal == 0 {
+            self.renew(program);
+        }
         let is_stepped = &self.is_stepped;
         self.stale
             .sort_unstable_by_key(|&process| (is_stepped[process as usize], process));
         for index in 0..self.stale.len() {
             let process = self.stale[index] as usize;
-            self.is_stale[process] = false;
+            if !std::mem::replace(&mut self.is_stale[process], false) {
+                continue;
+            }
             if self.is_stepped[process] {
                 self.is_stepped[process] = false;
                 self.attempts[process] = f64::INFINITY;

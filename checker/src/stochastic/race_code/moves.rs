@@ -3,8 +3,8 @@
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{
-    BlockId, Distribution, Function, IntegerOperator, Register, RegisterType, Relation, Update,
-    Urgency,
+    BlockId, Distribution, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation,
+    Update, Urgency,
 };
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::program::{Channel, Instance, Spot};
@@ -26,7 +26,7 @@ struct Receiver<'p, 'a> {
 
 impl<'a> RaceWriter<'_, 'a> {
     /// The function that lets a process move.
-    pub(super) fn movement(&self, process: usize) -> Function {
+    pub(super) fn movement(&self, process: usize, plan: FunctionId) -> Function {
         let result = (0, Some(RegisterType::Integer));
         let mut w = self.writer(&format!("move of process {process}"), result);
         let location = w.load(process as u32);
@@ -39,7 +39,7 @@ impl<'a> RaceWriter<'_, 'a> {
                 let block = w.block();
                 places.push((location, block));
                 w.at(block);
-                self.move_from(&mut w, (process, spot));
+                self.move_from(&mut w, (process, spot), plan);
             }
         }
         w.at(start);
@@ -47,14 +47,14 @@ impl<'a> RaceWriter<'_, 'a> {
         w.finish()
     }
 
-    fn move_from(&self, w: &mut Writer, (process, spot): (usize, &Spot)) {
+    fn move_from(&self, w: &mut Writer, (process, spot): (usize, &Spot), plan: FunctionId) {
         let outputs = self.program.range(spot.outputs);
         let missed = w.block();
         if let [only] = outputs {
             if !spot.is_plain {
                 self.conditions.require(w, only.guard, &only.values, missed);
             }
-            self.carry_out(w, only);
+            self.carry_out(w, only, plan);
         } else {
             let chosen = self.choose(w, outputs, missed);
             let takes: Vec<(i32, BlockId)> = (0..)
@@ -64,7 +64,7 @@ impl<'a> RaceWriter<'_, 'a> {
             w.select(chosen, &takes);
             for (output, &(_, block)) in outputs.iter().zip(&takes) {
                 w.at(block);
-                self.carry_out(w, output);
+                self.carry_out(w, output, plan);
             }
         }
         w.at(missed);
@@ -130,7 +130,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>) {
+    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, plan: FunctionId) {
         let channel = match sender.channel {
             Channel::None => None,
             Channel::Known(channel) => Some(w.integer(channel as i32)),
@@ -150,6 +150,7 @@ impl<'a> RaceWriter<'_, 'a> {
             }
         }
         let branch = self.branch(w, sender);
+        let process = sender.process as usize;
         for receiver in &receivers {
             self.branch_of_receiver(w, receiver);
         }
@@ -159,6 +160,21 @@ impl<'a> RaceWriter<'_, 'a> {
             Self::for_chosen(w, receiver, done, |w, input| {
                 self.apply(w, input, receiver.branch);
             });
+        }
+        // Who has won plans first.
+        let (word, bit) = self.layout.stale_bit(process);
+        let (before, others) = (w.load(word), w.integer(!bit));
+        let after = w.arithmetic(IntegerOperator::And, before, others);
+        w.store(word, after);
+        if let [only] = &sender.edge.branches[..] {
+            let spot = self.program.spot(process, only.target);
+            let (broken, done) = (w.block(), w.block());
+            self.plan_at(w, (process, spot), (broken, done));
+            w.at(broken);
+            w.give_up();
+            w.at(done);
+        } else {
+            w.call(plan, &[]);
         }
         let result = w.integer(MOVED);
         w.return_value(Some(result));

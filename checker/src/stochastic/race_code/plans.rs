@@ -18,6 +18,14 @@ struct Bound {
     is_finite: bool,
 }
 
+/// Where a plan goes on: if the process never tries to move, if something is broken, and else.
+#[derive(Clone, Copy)]
+struct Exits {
+    never: BlockId,
+    broken: BlockId,
+    done: BlockId,
+}
+
 impl RaceWriter<'_, '_> {
     /// The function that lets a process plan.
     pub(super) fn plan(&self, process: usize) -> Function {
@@ -25,7 +33,7 @@ impl RaceWriter<'_, '_> {
         let location = w.load(process as u32);
         let start = w.block();
         w.jump(start);
-        let (idle, broken) = (w.block(), w.block());
+        let (idle, broken, done) = (w.block(), w.block(), w.block());
         let spots = self.program.spots_of(process);
         let places: Vec<(i32, BlockId)> = (0..)
             .zip(spots)
@@ -41,12 +49,14 @@ impl RaceWriter<'_, '_> {
         for (spot, &(_, block)) in spots.iter().zip(&places) {
             if block != idle {
                 w.at(block);
-                self.plan_at(&mut w, (process, spot), broken);
+                self.plan_at(&mut w, (process, spot), (broken, done));
             }
         }
         w.at(idle);
         self.set_attempt(&mut w, process, None);
         self.set_stay(&mut w, process, None);
+        w.jump(done);
+        w.at(done);
         w.return_value(None);
         w.at(broken);
         w.give_up();
@@ -72,25 +82,36 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Ends a plan: the process tries to move at a moment that it may stay until.
-    fn end_in_time(&self, w: &mut Writer, process: usize, moment: Register) {
+    fn end_in_time(&self, w: &mut Writer, process: usize, moment: Register, done: BlockId) {
         self.set_attempt(w, process, Some(moment));
         self.set_stay(w, process, None);
-        w.return_value(None);
+        w.jump(done);
     }
 
-    fn plan_at(&self, w: &mut Writer, (process, spot): (usize, &Spot), broken: BlockId) {
+    /// Lets a process plan in a location, and goes on at `done`.
+    pub(super) fn plan_at(
+        &self,
+        w: &mut Writer,
+        (process, spot): (usize, &Spot),
+        (broken, done): (BlockId, BlockId),
+    ) {
         let bound = self.bound(w, spot, broken);
         // What a process does that does not try to move at all.
         let never = w.block();
+        let exits = Exits {
+            never,
+            broken,
+            done,
+        };
         if spot.urgency != Urgency::Normal {
             self.require_some_output(w, spot, never);
             let now = w.double(0.0);
-            self.end_in_time(w, process, now);
+            self.end_in_time(w, process, now, exits.done);
             w.at(never);
             let now = w.double(0.0);
             self.set_attempt(w, process, None);
             self.set_stay(w, process, Some(now));
-            w.return_value(None);
+            w.jump(done);
             return;
         }
         if spot.is_plain {
@@ -99,14 +120,14 @@ impl RaceWriter<'_, '_> {
                 low: None,
                 high: None,
             };
-            self.plan_in_window(w, (process, spot), (all, bound), (never, broken));
+            self.plan_in_window(w, (process, spot), (all, bound), exits);
         } else {
-            self.plan_in_windows(w, (process, spot), bound, (never, broken));
+            self.plan_in_windows(w, (process, spot), bound, exits);
         }
         w.at(never);
         self.set_attempt(w, process, None);
         self.set_stay(w, process, bound.map(|bound| bound.end));
-        w.return_value(None);
+        w.jump(done);
     }
 
     /// How long a process may stay by its invariant.
@@ -198,10 +219,10 @@ impl RaceWriter<'_, '_> {
         w: &mut Writer,
         (process, spot): (usize, &Spot),
         (window, bound): (Span, Option<Bound>),
-        (never, broken): (BlockId, BlockId),
+        exits: Exits,
     ) {
         if let Some(low) = window.low {
-            Self::require_in_time(w, low, bound, never);
+            Self::require_in_time(w, low, bound, exits.never);
         }
         let end = Self::cut(w, window, bound);
         let length = end.map(|end| match window.low {
@@ -235,14 +256,14 @@ impl RaceWriter<'_, '_> {
                     w.copy(moment, at);
                 });
             }
-            self.end_in_time(w, process, moment);
+            self.end_in_time(w, process, moment, exits.done);
             w.at(unbounded);
             if bound.is_finite {
                 w.give_up();
                 return;
             }
         }
-        let rate = self.rate(w, spot, (never, broken));
+        let rate = self.rate(w, spot, exits);
         let Some(rate) = rate else {
             return;
         };
@@ -255,40 +276,35 @@ impl RaceWriter<'_, '_> {
             w.jump(go_on);
             w.at(moment);
             let at = window.low.unwrap_or_else(|| w.double(0.0));
-            self.end_in_time(w, process, at);
+            self.end_in_time(w, process, at, exits.done);
             w.at(go_on);
         }
         let passed = w.draw(Distribution::Exponential, rate);
         if let (Some(length), false) = (length, spot.is_plain) {
             let is_inside = w.compare_doubles(passed, Relation::LessEqual, length);
-            w.unless(is_inside, never);
+            w.unless(is_inside, exits.never);
         }
         let moment = match window.low {
             None => passed,
             Some(low) => w.add(low, passed),
         };
-        self.end_in_time(w, process, moment);
+        self.end_in_time(w, process, moment, exits.done);
     }
 
     /// The rate of the exponential delay, which is greater than 0; none if that is known not to be
     /// so, and then the code has ended here.
-    fn rate(
-        &self,
-        w: &mut Writer,
-        spot: &Spot,
-        (never, broken): (BlockId, BlockId),
-    ) -> Option<Register> {
+    fn rate(&self, w: &mut Writer, spot: &Spot, exits: Exits) -> Option<Register> {
         match spot.exponential_rate {
             None => {
-                w.jump(broken);
+                w.jump(exits.broken);
                 None
             }
             Some(Number::Known(0.0)) => {
-                w.jump(never);
+                w.jump(exits.never);
                 None
             }
             Some(Number::Known(rate)) if !(rate > 0.0 && rate.is_finite()) => {
-                w.jump(broken);
+                w.jump(exits.broken);
                 None
             }
             Some(number) => {
@@ -296,11 +312,11 @@ impl RaceWriter<'_, '_> {
                 if matches!(number, Number::Computed(_)) {
                     let (zero, infinity) = (w.double(0.0), w.double(f64::INFINITY));
                     let is_rate = w.compare_doubles(rate, Relation::GreaterEqual, zero);
-                    w.unless(is_rate, broken);
+                    w.unless(is_rate, exits.broken);
                     let is_finite = w.compare_doubles(rate, Relation::Less, infinity);
-                    w.unless(is_finite, broken);
+                    w.unless(is_finite, exits.broken);
                     let is_positive = w.compare_doubles(rate, Relation::Greater, zero);
-                    w.unless(is_positive, never);
+                    w.unless(is_positive, exits.never);
                 }
                 Some(rate)
             }
@@ -313,14 +329,16 @@ impl RaceWriter<'_, '_> {
         w: &mut Writer,
         (process, spot): (usize, &Spot),
         bound: Option<Bound>,
-        (never, broken): (BlockId, BlockId),
+        exits: Exits,
     ) {
         let outputs = self.program.range(spot.outputs);
         let (urgent, drawn): (Vec<_>, Vec<_>) =
             outputs.iter().partition(|output| output.may_be_urgent);
         if let ([], [only]) = (&urgent[..], &drawn[..]) {
-            let window = self.conditions.span(w, only.guard, &only.values, never);
-            self.plan_in_window(w, (process, spot), (window, bound), (never, broken));
+            let window = self
+                .conditions
+                .span(w, only.guard, &only.values, exits.never);
+            self.plan_in_window(w, (process, spot), (window, bound), exits);
             return;
         }
         let count = self.layout.windows;
@@ -373,7 +391,14 @@ impl RaceWriter<'_, '_> {
             w.at(unbounded);
             if bound.is_some_and(|bound| bound.is_finite) {
                 w.give_up();
-            } else if let Some(rate) = self.rate(w, spot, (urgent_only, broken)) {
+            } else if let Some(rate) = self.rate(
+                w,
+                spot,
+                Exits {
+                    never: urgent_only,
+                    ..exits
+                },
+            ) {
                 w.store_double(self.layout.rate, rate);
                 let drawn = self.draw_in_windows(w, false);
                 let first = w.least(drawn, moment);
@@ -384,7 +409,7 @@ impl RaceWriter<'_, '_> {
         }
         let infinity = w.double(f64::INFINITY);
         let comes = w.compare_doubles(moment, Relation::Less, infinity);
-        w.unless(comes, never);
+        w.unless(comes, exits.never);
         let in_time = w.block();
         if let Some(bound) = bound {
             let is_in_time = w.compare_doubles(moment, Relation::LessEqual, bound.end);
@@ -393,12 +418,12 @@ impl RaceWriter<'_, '_> {
             w.at(late);
             self.set_attempt(w, process, Some(moment));
             self.set_stay(w, process, Some(bound.end));
-            w.return_value(None);
+            w.jump(exits.done);
         } else {
             w.jump(in_time);
         }
         w.at(in_time);
-        self.end_in_time(w, process, moment);
+        self.end_in_time(w, process, moment, exits.done);
     }
 
     fn draw_in_windows(&self, w: &mut Writer, is_bounded: bool) -> Register {

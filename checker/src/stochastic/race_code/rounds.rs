@@ -42,8 +42,9 @@ impl Tree {
         }
     }
 
-    /// Goes to the place of the first process whose attempt comes until then.
-    fn find(&self, w: &mut Writer, latest: Register, places: &[BlockId]) {
+    /// Goes to the place of the process whose attempt comes until then, or to `tied` if there are
+    /// several.
+    fn find(&self, w: &mut Writer, latest: Register, (places, tied): (&[BlockId], BlockId)) {
         match self {
             Tree::Leaf(process, _) => w.jump(places[*process]),
             Tree::Fork(_, left, right) => {
@@ -51,9 +52,13 @@ impl Tree {
                 let (then, otherwise) = (w.block(), w.block());
                 w.branch(is_left, then, otherwise);
                 w.at(then);
-                left.find(w, latest, places);
+                let is_right = w.compare_doubles(right.least(), Relation::LessEqual, latest);
+                let alone = w.block();
+                w.branch(is_right, tied, alone);
+                w.at(alone);
+                left.find(w, latest, (places, tied));
                 w.at(otherwise);
-                right.find(w, latest, places);
+                right.find(w, latest, (places, tied));
             }
         }
     }
@@ -112,16 +117,15 @@ impl RaceWriter<'_, '_> {
             let latest = tolerant(w, delay);
             let passing = w.least(delay, rest);
             self.wait(w, passing, &attempts);
+            let tied = w.block();
+            tree.find(w, latest, (&moves, tied));
+            w.at(tied);
             let count = w.integer(0);
             for &(_, attempt) in &attempts {
                 let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
                 let more = w.add_integers(count, is_first);
                 w.copy(count, more);
             }
-            let are_tied = w.compare_to(count, Relation::Greater, 1);
-            let (tied, alone) = (w.block(), w.block());
-            w.branch(are_tied, tied, alone);
-            w.at(tied);
             let chosen = w.draw_below(count);
             let minus_one = w.integer(-1);
             for &(process, attempt) in &attempts {
@@ -137,8 +141,6 @@ impl RaceWriter<'_, '_> {
                 w.at(next);
             }
             w.give_up();
-            w.at(alone);
-            tree.find(w, latest, &moves);
         } else {
             w.give_up();
         }

@@ -71,8 +71,9 @@ impl WrittenRace {
             abilities: Vec::new(),
         };
         for process in processes {
-            ids.plans.push(add(writer.plan(process), SMALL)?);
-            ids.moves.push(add(writer.movement(process), SMALL)?);
+            let plan = add(writer.plan(process), SMALL)?;
+            ids.plans.push(plan);
+            ids.moves.push(add(writer.movement(process, plan), SMALL)?);
             let ability = match layout.attempts[process] {
                 None => None,
                 Some(_) => Some(add(writer.ability(process), SMALL)?),

@@ -164,13 +164,18 @@ impl Writer {
         target
     }
 
+    /// Writes a double that is never a NaN.
     pub(super) fn store_double(&mut self, word: u32, source: Register) {
         self.store_double_at(word, None, source);
     }
 
     pub(super) fn store_double_at(&mut self, word: u32, index: Option<Register>, source: Register) {
         let address = word_of_state(word, index);
-        self.push(Instruction::StoreDouble { address, source });
+        self.push(Instruction::StoreDouble {
+            address,
+            source,
+            is_number: true,
+        });
     }
 
     pub(super) fn arithmetic(

@@ -30,9 +30,15 @@ impl Translator<'_> {
                 let (base, offset) = self.place(address);
                 self.builder.ins().store(MODEL_MEMORY, source, base, offset);
             }
-            Instruction::StoreDouble { address, source } => {
-                let source = self.get(source);
-                let source = self.canonical(source);
+            Instruction::StoreDouble {
+                address,
+                source,
+                is_number,
+            } => {
+                let mut source = self.get(source);
+                if !is_number {
+                    source = self.canonical(source);
+                }
                 let (base, offset) = self.place(address);
                 self.builder.ins().store(MODEL_MEMORY, source, base, offset);
             }

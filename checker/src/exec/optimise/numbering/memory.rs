@@ -87,7 +87,9 @@ impl Numbering<'_, '_> {
                 self.remember(address, source);
                 Simplified::Instruction(instruction)
             }
-            Instruction::StoreDouble { address, source } => {
+            Instruction::StoreDouble {
+                address, source, ..
+            } => {
                 self.forget(address, 2);
                 self.remember(address, source);
                 Simplified::Instruction(instruction)
