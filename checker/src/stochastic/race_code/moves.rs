@@ -1,5 +1,7 @@
 //! Code for what a move does, as `stochastic/race/transition.rs` says it.
 
+use std::ops::Range;
+
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{
@@ -8,6 +10,9 @@ use crate::ir::{
 };
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::program::{Channel, Instance, Spot};
+
+/// More channels are not told apart.
+const MOST_CHANNELS: usize = 32;
 
 /// What the function of a move returns if no output of the process is enabled after all.
 pub(super) const MISSED: i32 = 0;
@@ -131,20 +136,54 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Lets a process take an output with all who receive, and returns.
     fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, plan: FunctionId) {
-        let channel = match sender.channel {
+        let channels = match sender.channel {
             Channel::None => None,
-            Channel::Known(channel) => Some(w.integer(channel as i32)),
+            Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
             Channel::Computed(first, index) => {
                 let arguments = sender.values.iter().map(|&one| w.integer(one)).collect();
                 let offset = w.call_for(index, arguments);
-                let first = w.integer(first as i32);
-                Some(w.add_integers(first, offset))
+                let base = w.integer(first as i32);
+                let count = sender.edge.sync.map_or(1, |sync| sync.count);
+                Some((w.add_integers(base, offset), first..first + count))
             }
         };
+        match channels {
+            Some((channel, channels)) if self.is_worth_telling_apart(&channels) => {
+                let places: Vec<(i32, BlockId)> = channels
+                    .map(|channel| (channel as i32, w.block()))
+                    .collect();
+                w.select(channel, &places);
+                for &(channel, block) in &places {
+                    w.at(block);
+                    let known = w.integer(channel);
+                    let channel = channel as u32;
+                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), plan);
+                }
+            }
+            channels => self.carry_out_on(w, sender, channels, plan),
+        }
+    }
+
+    /// Whether few processes receive on each of some channels, and many on all of them.
+    fn is_worth_telling_apart(&self, channels: &Range<u32>) -> bool {
+        let of_channel = |channel| self.program.listeners(channel).len();
+        let most = channels.clone().map(of_channel).max().unwrap_or(0);
+        let all: usize = channels.clone().map(of_channel).sum();
+        (2..=MOST_CHANNELS).contains(&channels.len()) && 2 * most < all
+    }
+
+    /// Lets a process take an output on one of these channels; the register says which.
+    fn carry_out_on(
+        &self,
+        w: &mut Writer,
+        sender: &Instance<'a>,
+        channels: Option<(Register, Range<u32>)>,
+        plan: FunctionId,
+    ) {
         let mut receivers = Vec::new();
-        if let Some(channel) = channel {
+        if let Some((channel, channels)) = channels {
             for process in self.program.partners(sender) {
-                if let Some(receiver) = self.receiver(w, sender, (process, channel)) {
+                if let Some(receiver) = self.receiver(w, process, (channel, &channels)) {
                     receivers.push(receiver);
                 }
             }
@@ -180,18 +219,13 @@ impl<'a> RaceWriter<'_, 'a> {
         w.return_value(Some(result));
     }
 
-    /// Lets a process choose what it receives.
+    /// Lets a process choose what it receives on one of some channels.
     fn receiver<'p>(
         &'p self,
         w: &mut Writer,
-        sender: &Instance<'a>,
-        (process, channel): (u32, Register),
+        process: u32,
+        (channel, channels): (Register, &Range<u32>),
     ) -> Option<Receiver<'p, 'a>> {
-        let sync = sender.edge.sync?;
-        let channels = match sender.channel {
-            Channel::Known(channel) => channel..channel + 1,
-            _ => sync.channel.0..sync.channel.0 + sync.count,
-        };
         let may_receive = |input: &&Instance<'a>| match input.channel {
             Channel::None => false,
             Channel::Known(one) => channels.contains(&one),
@@ -226,7 +260,7 @@ impl<'a> RaceWriter<'_, 'a> {
             let block = w.block();
             places.push((*location, block));
             w.at(block);
-            self.choose_input(w, inputs, (channel, sender.channel), (chosen, first), next);
+            self.choose_input(w, inputs, (channel, channels), (chosen, first), next);
             first += inputs.len() as i32;
         }
         w.at(start);
@@ -244,7 +278,7 @@ impl<'a> RaceWriter<'_, 'a> {
         &self,
         w: &mut Writer,
         inputs: &[&Instance<'a>],
-        (channel, known): (Register, Channel),
+        (channel, channels): (Register, &Range<u32>),
         (chosen, first): (Register, i32),
         next: BlockId,
     ) {
@@ -252,13 +286,14 @@ impl<'a> RaceWriter<'_, 'a> {
         let mut flags = Vec::new();
         for (number, &input) in (first..).zip(inputs) {
             let (flag, otherwise) = (w.integer(0), w.block());
-            match (input.channel, known) {
-                (Channel::Known(_), Channel::Known(_)) | (Channel::None, _) => {}
-                (Channel::Known(own), _) => {
+            match input.channel {
+                Channel::None => {}
+                Channel::Known(_) if channels.len() == 1 => {}
+                Channel::Known(own) => {
                     let is_it = w.compare_to(channel, Relation::Equal, own as i32);
                     w.unless(is_it, otherwise);
                 }
-                (Channel::Computed(own, index), _) => {
+                Channel::Computed(own, index) => {
                     let arguments = input.values.iter().map(|&one| w.integer(one)).collect();
                     let offset = w.call_for(index, arguments);
                     let own = w.integer(own as i32);
