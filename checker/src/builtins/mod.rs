@@ -12,7 +12,10 @@ mod random;
 
 pub(crate) use integer_result::IntegerResult;
 pub(crate) use library::canonical;
-pub(crate) use random::MOST_PARAMETERS;
+pub(crate) use random::{
+    BLOCK as STREAM_BLOCK, BUFFER_WORDS as STREAM_BUFFER, MOST_PARAMETERS,
+    POSITION as STREAM_POSITION,
+};
 pub use random::{Distribution, STREAM_WORDS, Stream};
 
 use library::c;

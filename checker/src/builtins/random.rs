@@ -29,13 +29,14 @@ pub(crate) const MOST_PARAMETERS: usize = 3;
 const SEED: usize = 0;
 const RUN: usize = 2;
 /// How many words were drawn.
-const POSITION: usize = 4;
+pub(crate) const POSITION: usize = 4;
 /// The blocks around the last word that was drawn, if they have further ones.
-const BLOCK: usize = 6;
+pub(crate) const BLOCK: usize = 6;
 const BLOCK_WORDS: usize = 4;
 /// So many blocks are made together: a processor can work on all of them at once.
 const BLOCKS: usize = 4;
-const BUFFER_WORDS: usize = BLOCKS * BLOCK_WORDS;
+/// How many words of blocks there are; a power of 2.
+pub(crate) const BUFFER_WORDS: usize = BLOCKS * BLOCK_WORDS;
 
 /// The random numbers of a run, over the words that hold their state. Words that are all 0 are the
 /// start of run 0 with seed 0.

@@ -4,11 +4,11 @@ use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I32, I64};
 use cranelift_codegen::ir::{InstBuilder, InstructionData, Opcode, Value};
 
-use crate::builtins::{Code, IntegerResult, MOST_PARAMETERS};
+use crate::builtins::{Code, IntegerResult};
 use crate::exec::jit::runtime;
 use crate::ir::{
-    Address, Distribution, DoubleOperator, Instruction, IntegerOperator, MathFunction, Register,
-    Relation, RunTimeErrorKind, SiteId,
+    DoubleOperator, Instruction, IntegerOperator, MathFunction, Register, Relation,
+    RunTimeErrorKind, SiteId,
 };
 
 use super::Translator;
@@ -324,58 +324,10 @@ impl Translator<'_> {
         self.unwrapped(result, site)
     }
 
-    fn draw(
-        &mut self,
-        distribution: Distribution,
-        arguments: &[Register],
-        stream: Address,
-        site: SiteId,
-    ) -> Value {
-        let number = Distribution::ALL
-            .iter()
-            .position(|&one| one == distribution);
-        let number = number.expect("the list has every distribution");
-        let mut values = vec![self.pointer(stream), self.integer(number as i32)];
-        for index in 0..MOST_PARAMETERS {
-            values.push(match arguments.get(index) {
-                Some(&argument) => self.get(argument),
-                None => self.builder.ins().f64const(0.0),
-            });
-        }
-        let frequent = match distribution {
-            Distribution::Uniform => Some(runtime::draw_one::<UNIFORM> as *const ()),
-            Distribution::Exponential => Some(runtime::draw_one::<EXPONENTIAL> as *const ()),
-            Distribution::Below => Some(runtime::draw_one::<BELOW> as *const ()),
-            _ => None,
-        };
-        let value = if let Some(code) = frequent {
-            self.call_back(code as usize, Some(F64), &[values[0], values[2]])
-        } else {
-            let code = runtime::draw as *const () as usize;
-            self.call_back(code, Some(F64), &values)
-        };
-        let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
-        self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
-        value
-    }
-
     /// A condition as 0 or 1.
     pub(super) fn truth(&mut self, condition: Value) -> Value {
         self.builder.ins().uextend(I32, condition)
     }
-}
-
-/// The places of distributions that runs draw from all the time.
-const UNIFORM: usize = place_of(Distribution::Uniform);
-const EXPONENTIAL: usize = place_of(Distribution::Exponential);
-const BELOW: usize = place_of(Distribution::Below);
-
-const fn place_of(distribution: Distribution) -> usize {
-    let mut place = 0;
-    while Distribution::ALL[place] as u8 != distribution as u8 {
-        place += 1;
-    }
-    place
 }
 
 fn integer_condition(relation: Relation) -> IntCC {

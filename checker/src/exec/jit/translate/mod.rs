@@ -16,6 +16,7 @@ mod arithmetic;
 mod external;
 mod failures;
 mod memory;
+mod random;
 
 use cranelift_codegen::ir::types::{F64, I32, I64};
 use cranelift_codegen::ir::{
