@@ -21,7 +21,7 @@ const MOST_INSTRUCTIONS: usize = 100_000;
 /// Functions of the network that are at most so large are taken into those that call them.
 const SMALL: usize = 60;
 /// Likewise plans and moves, which have one caller each.
-const LARGE: usize = 600;
+const LARGE: usize = 1200;
 /// No function grows beyond this by what it takes in.
 const MOST_TAKEN_IN: usize = 6_000;
 
