@@ -240,6 +240,23 @@ fn runs_without_end_are_stopped_by_the_time_limit() {
     }
     let looping = updating("int n = 0; void f() { while (true) n = 1 - n; }", "f()");
     stopped(&looping, "Pr[<=9](<> n > 5)");
+    // Queries that are answered together end alike.
+    for (model, query) in [
+        (&turning, "Pr[<=1e300](<> n > 9)"),
+        (&looping, "Pr[<=9](<> n > 5)"),
+    ] {
+        let mut model = load(model);
+        let queries = [query, "Pr[<=9](<> n > 6)"].map(|query| model.add_query(query));
+        let options = options(Some(Duration::from_millis(100)));
+        let answers = model.check_jointly(&queries, &options);
+        let answers = answers.unwrap_or_else(|one| panic!("{}", one.rendered.join("\n")));
+        let verdicts = answers.iter().map(|answer| answer.verdict);
+        assert!(
+            verdicts
+                .into_iter()
+                .all(|one| matches!(one, Verdict::Unknown(_)))
+        );
+    }
 }
 
 #[test]

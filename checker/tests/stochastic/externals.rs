@@ -286,6 +286,16 @@ fn constants_and_hooks_call_libraries() {
     assert!((value(count) - 7.0).abs() < 1e-12);
     assert!((value("E[<=1;40](max: last + 0.0)") - 95.0).abs() < 1e-12);
     assert!((value("E[<=1;40](max: asked + 0.0)") - 32.0).abs() < 1e-12);
+    // Queries that are answered together begin and end once.
+    let queries = ["E[<=1;40](max: asked + 0.0)", "E[<=1;40](min: 1 - asked)"];
+    let queries = queries.map(|query| loaded.add_query(query));
+    let answers = loaded.check_jointly(&queries, &Options::default());
+    let answers = answers.unwrap_or_else(|error| panic!("{}", error.rendered.join("\n")));
+    let values = answers
+        .iter()
+        .map(|one| one.estimate.as_ref().map(|estimate| estimate.value));
+    let values: Vec<Option<f64>> = values.collect();
+    assert_eq!(values, [Some(43.0), Some(-42.0)]);
 }
 
 #[test]
@@ -420,6 +430,23 @@ fn a_function_that_is_not_deterministic_is_found() {
     let words = ["E0806", "'next'", "not deterministic"];
     refused(&model, &[&library], "E[<=2;40](max: n + 0.0)", &words);
     refused(&model, &[&library], "simulate[<=2;1]{ n }", &words);
+    // Together with others, too.
+    for code in [CodeEngine::Interpreter, CodeEngine::Jit] {
+        let mut model = load(&model, &[&library]).expect("the model is accepted");
+        let queries = ["Pr[<=2](<> P.b)", "E[<=2;40](max: n)"];
+        let queries = queries.map(|query| model.add_query(query));
+        let options = Options {
+            code,
+            ..Options::default()
+        };
+        let text = match model.check_jointly(&queries, &options) {
+            Ok(_) => panic!("answered"),
+            Err(rejection) => rejection.rendered.join("\n"),
+        };
+        for word in words {
+            assert!(text.contains(word), "no {word} in\n{text}");
+        }
+    }
 }
 
 #[test]

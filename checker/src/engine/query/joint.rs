@@ -3,18 +3,18 @@
 
 use std::time::Instant;
 
-use super::statistical::{GREATEST_POOL, contradiction, remark, verdict};
+use super::prepared::{begin_libraries, without_runs};
+use super::statistical::{remark, verdict};
 use crate::diagnostics::Diagnostic;
-use crate::engine::answer::{Answer, Verdict};
-use crate::engine::code::PreparedCode;
+use crate::engine::answer::Answer;
 use crate::engine::codes;
 use crate::engine::limits::LimitWatch;
 use crate::engine::loaded_model::{LoadedModel, StochasticModel};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
-use crate::ir::{RunTimeErrorKind, Statistical, StatisticalQuery};
+use crate::ir::{Statistical, StatisticalQuery};
 use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::{Behaviour, Estimate, Failure, Precision, bound_of, estimate_jointly};
+use crate::stochastic::{Estimate, Precision, bound_of, estimate_jointly};
 use crate::syntax::ast::QueryText;
 
 impl LoadedModel {
@@ -24,15 +24,9 @@ impl LoadedModel {
         queries: &[QueryText],
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
-        self.stochastic()?;
-        let mut stochastic = self.stochastic.take().expect("it was just made");
-        let pool = self.pool;
-        let answers = self.joint_answers(&mut stochastic, queries, options);
-        if self.pool > pool {
-            return self.check_jointly(queries, options);
-        }
-        self.stochastic = Some(stochastic);
-        answers
+        self.in_stochastic_reading(options, |kept, stochastic| {
+            kept.joint_answers(stochastic, queries, options)
+        })
     }
 
     fn joint_answers(
@@ -42,43 +36,36 @@ impl LoadedModel {
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
         let start = Instant::now();
-        stochastic.model.network.overflow = options.overflow;
         let mut compiled = Vec::new();
         let mut warnings = Vec::new();
         for text in queries {
-            let (query, found) = self.joint_query(stochastic, text, &options.precision)?;
+            let (query, found) = self.joint_query(stochastic, text, options)?;
             compiled.push(query);
             warnings.push(found);
         }
         let Some(first) = compiled.first() else {
             return Ok(Vec::new());
         };
+        self.prepare_stochastic(stochastic, (first.span, start), options)?;
         let network = &stochastic.model.network;
-        PreparedCode::prepare(&mut stochastic.code, network, options.code, options.tuning)
-            .map_err(|message| {
-                let error = Diagnostic::new(codes::NO_COMPILED_CODE, first.span, message)
-                    .help("use the interpreter: --engine interpreter");
-                Rejection::new(vec![error], &self.sources)
-            })?;
-        self.load_seconds += start.elapsed().as_secs_f64();
-        let executor = stochastic.code.as_ref().map(PreparedCode::executor);
-        let behaviour = Behaviour {
-            fixed_step: options.precision.discretisation,
-            ..Behaviour::new(network, executor.expect("code was just prepared"))
-        };
+        let behaviour = stochastic.behaviour(None, options);
         let count = compiled.len() as f64;
         let precision = Precision {
-            threads: options.thread_count(),
             alpha: options.precision.alpha / count,
             beta: options.precision.beta / count,
-            ..options.precision
+            ..stochastic.precision(options)
         };
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
+        let kinds: Vec<&Statistical> = compiled.iter().map(|query| &query.kind).collect();
+        // The first query of the group whose runs are made.
+        let mut at_hand = 0;
         let result = watch.bound(|watch| {
+            let _hooks = begin_libraries(behaviour, &kinds, precision.seed)?;
             let mut estimates: Vec<Option<Estimate>> = vec![None; compiled.len()];
             for group in same_bounds(&compiled) {
-                let kinds: Vec<&Statistical> = group.iter().map(|&i| &compiled[i].kind).collect();
+                at_hand = group[0];
+                let kinds: Vec<&Statistical> = group.iter().map(|&i| kinds[i]).collect();
                 let ends = |runs| {
                     let counters = Counters {
                         explored: runs,
@@ -86,28 +73,20 @@ impl LoadedModel {
                     };
                     watch.look(&counters).is_some()
                 };
-                let found = estimate_jointly(behaviour, &kinds, &precision, ends);
-                let found = found.map_err(|failure| (failure, group[0]))?;
+                let found = estimate_jointly(behaviour, &kinds, &precision, ends)?;
                 for (&index, estimate) in group.iter().zip(found) {
                     estimates[index] = Some(estimate);
                 }
             }
             Ok(estimates)
         });
+        let unknown = |answer: Answer| Ok(vec![answer; queries.len()]);
         let estimates = match result {
-            Err((reason, counters)) => {
-                let unknown = |_: &QueryText| Answer::new(Verdict::Unknown(reason), counters);
-                return Ok(queries.iter().map(unknown).collect());
-            }
-            Ok(Err((Failure::RunTime(error), _))) => {
-                if error.kind == RunTimeErrorKind::NoRoom && self.pool < GREATEST_POOL {
-                    // All begins again with more slots.
-                    self.pool *= 2;
-                }
-                return Err(self.run_time_error(network, error));
-            }
-            Ok(Err((failure, index))) => {
-                return Err(self.run_fails(network, &failure, &compiled[index]));
+            Err((reason, counters)) => return unknown(without_runs(reason, counters)),
+            Ok(Err(failure)) => {
+                let failed = (&failure, &compiled[at_hand]);
+                let verdict = self.after_failure(network, failed, &watch)?;
+                return unknown(Answer::new(verdict, Counters::default()));
             }
             Ok(Ok(estimates)) => estimates,
         };
@@ -135,10 +114,10 @@ impl LoadedModel {
 
     /// A query that can be answered together with others, and warnings about it.
     fn joint_query(
-        &mut self,
+        &self,
         stochastic: &mut StochasticModel,
         text: &QueryText,
-        precision: &Precision,
+        options: &Options,
     ) -> Result<(StatisticalQuery, Vec<String>), Rejection> {
         let refused = |message: &str, help: &str| {
             let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, text.span, message).help(help);
@@ -150,12 +129,7 @@ impl LoadedModel {
                 "ask for this one alone",
             ));
         };
-        let (query, found) = stochastic
-            .model
-            .compile_statistical(&parsed, &self.sources, &[]);
-        let Some(query) = query else {
-            return Err(Rejection::new(found, &self.sources));
-        };
+        let (query, warnings) = self.compiled(stochastic, &parsed, &[], options)?;
         if matches!(query.kind, Statistical::Simulation(_)) {
             return Err(refused(
                 "simulate shows runs, and has no part in a joint guarantee",
@@ -168,10 +142,7 @@ impl LoadedModel {
                 "ask for this one alone",
             ));
         }
-        if let Some((message, help)) = contradiction(&query.kind, precision) {
-            return Err(refused(message, help));
-        }
-        Ok((query, Rejection::new(found, &self.sources).rendered))
+        Ok((query, warnings))
     }
 }
 

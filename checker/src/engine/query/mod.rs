@@ -12,6 +12,7 @@ pub(super) mod liveness;
 pub(super) mod optimal_trace;
 pub mod partial_observation;
 pub(super) mod plans;
+mod prepared;
 pub(super) mod reachable;
 mod restriction;
 mod splitting;

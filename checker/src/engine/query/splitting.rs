@@ -15,10 +15,10 @@ impl LoadedModel {
     pub(super) fn splitting(
         &mut self,
         model: &mut Model,
-        query: Option<&StatisticalQuery>,
+        query: &StatisticalQuery,
         options: &Options,
     ) -> Result<Option<Splitting>, Rejection> {
-        let (Some(query), Some(wanted)) = (query, &options.rare) else {
+        let Some(wanted) = &options.rare else {
             return Ok(None);
         };
         let Statistical::Probability(_, path) = &query.kind else {

@@ -3,31 +3,25 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::prepared::{GREATEST_POOL, begin_libraries, without_runs};
 use super::splitting::splitting_remark;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::engine::answer::{Answer, Verdict};
-use crate::engine::code::PreparedCode;
 use crate::engine::codes;
 use crate::engine::limits::LimitWatch;
-use crate::engine::loaded_model::LoadedModel;
+use crate::engine::loaded_model::{LoadedModel, StochasticModel};
 use crate::engine::options::Options;
 use crate::engine::query::watched_runs::WatchedRuns;
 use crate::engine::rejection::Rejection;
-use crate::exec::call_hook;
 use crate::ir::{EdgeId, Network, RunTimeErrorKind, Statistical, StatisticalQuery};
-use crate::network;
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Behaviour, Estimate, Failure, MeanMethod, Precision, Rare, RunWatch as _, Simulated, Stand,
-    ValuesOfRuns, ZENO_MOVES, ZENO_TIME, compare, estimate_rare, estimate_watched, is_repeatable,
-    simulate,
+    Estimate, Failure, Rare, RunWatch as _, Simulated, Stand, ValuesOfRuns, ZENO_MOVES, ZENO_TIME,
+    compare, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
-
-/// The most slots of a dynamic template.
-pub(super) const GREATEST_POOL: u32 = 4096;
 
 /// What runs show.
 #[derive(Default)]
@@ -51,77 +45,32 @@ impl LoadedModel {
         query: &ast::Query,
         options: &Options,
     ) -> Result<Answer, Rejection> {
+        self.in_stochastic_reading(options, |kept, stochastic| {
+            kept.statistical_answer(stochastic, query, options)
+        })
+    }
+
+    fn statistical_answer(
+        &mut self,
+        stochastic: &mut StochasticModel,
+        query: &ast::Query,
+        options: &Options,
+    ) -> Result<Answer, Rejection> {
         let start = Instant::now();
-        self.stochastic()?;
-        let mut stochastic = self.stochastic.take().expect("it was just made");
-        stochastic.model.network.overflow = options.overflow;
         let names = self.strategy_names();
-        let model = &mut stochastic.model;
-        let (compiled, found) = model.compile_statistical(query, &self.sources, &names);
-        let splitting = self.splitting(&mut stochastic.model, compiled.as_ref(), options);
-        let prepared = if compiled.is_some() {
-            let network = &stochastic.model.network;
-            PreparedCode::prepare(&mut stochastic.code, network, options.code, options.tuning)
-        } else {
-            Ok(())
-        };
-        let warnings = Rejection::new(found, &self.sources);
-        let rejected = |kept: &mut LoadedModel, stochastic, rejection| {
-            kept.stochastic = Some(stochastic);
-            Err(rejection)
-        };
-        let Some(compiled) = compiled else {
-            return rejected(self, stochastic, warnings);
-        };
-        let splitting = match splitting {
-            Ok(splitting) => splitting,
-            Err(rejection) => return rejected(self, stochastic, rejection),
-        };
-        if let Err(message) = prepared {
-            let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, query.span, message)
-                .help("use the interpreter: --engine interpreter");
-            let rejection = Rejection::new(vec![diagnostic], &self.sources);
-            return rejected(self, stochastic, rejection);
-        }
-        self.load_seconds += start.elapsed().as_secs_f64();
-        let restriction = match self.restriction(query, &stochastic.model.network, options) {
-            Ok(restriction) => restriction,
-            Err(rejection) => return rejected(self, stochastic, rejection),
-        };
+        let (compiled, warnings) = self.compiled(stochastic, query, &names, options)?;
+        let splitting = self.splitting(&mut stochastic.model, &compiled, options)?;
+        self.prepare_stochastic(stochastic, (query.span, start), options)?;
         let network = &stochastic.model.network;
-        let executor = stochastic.code.as_ref().map(PreparedCode::executor);
-        let behaviour = Behaviour {
-            network,
-            executor: executor.expect("code was just prepared"),
-            restriction: restriction.as_ref(),
-            fixed_step: options.precision.discretisation,
-        };
-        let precision = Precision {
-            // Libraries need not stand several calls at a time.
-            threads: if network.externals.iter().any(|one| one.is_loaded) {
-                1
-            } else {
-                options.thread_count()
-            },
-            ..options.precision
-        };
-        if let Some((message, help)) = contradiction(&compiled.kind, &precision) {
-            let diagnostic = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message);
-            let rejection = Rejection::new(vec![diagnostic.help(help)], &self.sources);
-            return rejected(self, stochastic, rejection);
-        }
+        let restriction = self.restriction(query, network, options)?;
+        let behaviour = stochastic.behaviour(restriction.as_ref(), options);
+        let precision = stochastic.precision(options);
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
         let observer = options.run_observer.clone();
         let result = watch.bound(|watch| {
             let mut runs = WatchedRuns::new(&compiled.kind, precision.alpha, watch, observer);
-            let externals = || network.externals.iter();
-            externals().filter_map(|one| one.begin).for_each(call_hook);
-            if externals().any(|one| one.is_loaded)
-                && !is_repeatable(behaviour, &compiled.kind, precision.seed)?
-            {
-                return Err(Failure::NotRepeatable);
-            }
+            let _hooks = begin_libraries(behaviour, &[&compiled.kind], precision.seed)?;
             match &compiled.kind {
                 Statistical::Simulation(asked) => {
                     let ends = |number| runs.ends(number);
@@ -161,32 +110,12 @@ impl LoadedModel {
                 }
             }
         });
-        let ended = network.externals.iter().filter_map(|one| one.end);
-        ended.for_each(call_hook);
-        let answer = match result {
-            Err((reason, counters)) => {
-                let mut answer = Answer::new(Verdict::Unknown(reason), counters);
-                answer.remark(NO_RUN);
-                Ok(answer)
+        let mut answer = match result {
+            Err((reason, counters)) => without_runs(reason, counters),
+            Ok(Err(failure)) => {
+                let verdict = self.after_failure(network, (&failure, &compiled), &watch)?;
+                Answer::new(verdict, Counters::default())
             }
-            Ok(Err(Failure::RunTime(error)))
-                if error.kind == RunTimeErrorKind::NoRoom && self.pool < GREATEST_POOL =>
-            {
-                // No run depends on the number of slots, so that all begins again with more.
-                self.pool *= 2;
-                return self.check_statistical(query, options);
-            }
-            Ok(Err(Failure::RunTime(error))) => {
-                let failure = network::Failure::from(error);
-                match failure {
-                    network::Failure::Interrupted => {
-                        let verdict = Verdict::Unknown(watch.stop());
-                        Ok(Answer::new(verdict, Counters::default()))
-                    }
-                    _ => Err(self.run_time_error(network, error)),
-                }
-            }
-            Ok(Err(failure)) => Err(self.run_fails(network, &failure, &compiled)),
             Ok(Ok(found)) => {
                 let verdict = verdict(&compiled.kind, found.estimate.as_ref(), &watch);
                 let mut answer = Answer::new(verdict, Counters::default());
@@ -206,15 +135,31 @@ impl LoadedModel {
                 answer.estimate = found.estimate;
                 answer.simulated = simulated;
                 answer.values_of_runs = found.values;
-                Ok(answer)
+                answer
             }
         };
-        self.stochastic = Some(stochastic);
-        let mut answer = answer?;
         answer.seconds = start.elapsed().as_secs_f64();
-        answer.warnings = warnings.rendered;
+        answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
         Ok(answer)
+    }
+
+    /// How a query goes on of which a run failed: with a verdict, or not at all. All begins again
+    /// if the pool has grown.
+    pub(super) fn after_failure(
+        &mut self,
+        network: &Network,
+        (failure, query): (&Failure, &StatisticalQuery),
+        watch: &LimitWatch,
+    ) -> Result<Verdict, Rejection> {
+        if let Failure::RunTime(error) = failure {
+            match error.kind {
+                RunTimeErrorKind::Interrupted => return Ok(Verdict::Unknown(watch.stop())),
+                RunTimeErrorKind::NoRoom if self.pool < GREATEST_POOL => self.pool *= 2,
+                _ => {}
+            }
+        }
+        Err(self.run_fails(network, failure, query))
     }
 
     pub(super) fn run_time_error(
@@ -385,44 +330,6 @@ impl LoadedModel {
         Rejection::new(vec![diagnostic], &self.sources)
     }
 }
-
-/// Why an interval cannot be made as it is asked for, and what to do.
-pub(super) fn contradiction(
-    query: &Statistical,
-    precision: &Precision,
-) -> Option<(&'static str, &'static str)> {
-    let Statistical::Expectation { bound, range, .. } = query else {
-        return None;
-    };
-    if precision.runs.or(bound.runs).is_none() && precision.relative.is_none() {
-        return Some((
-            "an expected value needs a number of runs",
-            "write it behind the bound, E[<=10; 1000](max: x), or give it: --runs 1000",
-        ));
-    }
-    let has_bounds = precision.value_bounds.or(*range).is_some();
-    let is_sequential = precision.anytime || precision.relative.is_some();
-    match precision.mean_method {
-        MeanMethod::DvoretzkyKieferWolfowitz if is_sequential => Some((
-            "an interval of Dvoretzky, Kiefer and Wolfowitz is for a fixed number of runs",
-            "leave the choice to empirical Bernstein intervals, which hold at any moment",
-        )),
-        MeanMethod::Student if is_sequential => Some((
-            "Student's interval is for a fixed number of runs",
-            "leave the choice to empirical Bernstein intervals, which hold at any moment",
-        )),
-        MeanMethod::Student => None,
-        MeanMethod::Auto if !is_sequential => None,
-        _ if !has_bounds => Some((
-            "such an interval of a mean needs bounds of the value, and none are known",
-            "give them: --value-bounds LOW,HIGH",
-        )),
-        _ => None,
-    }
-}
-
-/// What is said if the first run takes too long.
-const NO_RUN: &str = "no run has ended until then: bound runs by less, and see that the clock that bounds them is not set back";
 
 fn is_test(query: &Statistical) -> bool {
     matches!(
