@@ -5,6 +5,7 @@ use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::merge_ranges;
+use super::legs::SYNCHRONISES;
 use super::lower::clocks::{bound_range, comparisons};
 use super::lower::horizons::curved;
 use super::offsets::known_offset;
@@ -242,10 +243,11 @@ impl Checker<'_> {
         Some((clock, function))
     }
 
-    /// Checks and lowers a synchronisation.
+    /// Checks and lowers a synchronisation; that of a leg must send on a broadcast channel.
     pub(super) fn synchronisation(
         &mut self,
         sync: &ast::Sync,
+        is_of_leg: bool,
         locals: &[LocalId],
         place: &str,
     ) -> Option<ir::Sync> {
@@ -275,6 +277,18 @@ impl Checker<'_> {
                 ),
                 "write channel! or channel?",
             );
+            return None;
+        }
+        if is_of_leg
+            && !matches!(
+                channel.ty,
+                Type::Channel {
+                    broadcast: true,
+                    ..
+                }
+            )
+        {
+            self.leg_refused(sync.span, SYNCHRONISES);
             return None;
         }
         if !self.can_lower() {

@@ -78,6 +78,8 @@ mod labels;
 
 mod assigned;
 
+mod legs;
+
 mod templates;
 
 mod instantiate;

@@ -7,6 +7,7 @@ use super::checker::Checker;
 use super::codes;
 use super::dynamic::exits;
 use super::labels::Select;
+use super::legs::{SYNCHRONISES, leads_on};
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
 use super::types::{Class, Size, Type};
@@ -273,7 +274,8 @@ impl Checker<'_> {
             None => Guard::default(),
         };
         let sync = edge.sync.as_ref().and_then(|sync| {
-            self.synchronisation(sync, &locals, &format!("{place}, synchronisation"))
+            let place = format!("{place}, synchronisation");
+            self.synchronisation(sync, leads_on(edge), &locals, &place)
         });
         let update = self.update(&edge.update, &locals, &format!("{place}, update"));
         self.scopes.pop();
@@ -391,12 +393,12 @@ impl Checker<'_> {
         branches
     }
 
-    fn leg_refused(&mut self, span: Span, message: &str) {
+    pub(super) fn leg_refused(&mut self, span: Span, message: &str) {
         self.error(
             codes::BRANCH_REFUSED,
             span,
             message,
-            "legs have updates and weights only, and end in locations: guard and synchronise on the edge before or behind",
+            "legs have updates and weights, may send on broadcast channels, and end in locations: guard and synchronise on the edge before or behind",
         );
     }
 
@@ -413,8 +415,7 @@ impl Checker<'_> {
             self.leg_refused(guard.span, message);
         }
         if let Some(sync) = &leg.sync {
-            let message = "synchronisations on the legs of branch points are not supported";
-            self.leg_refused(sync.span, message);
+            self.leg_refused(sync.span, SYNCHRONISES);
         }
         let mut ranges = Vec::new();
         for (name, ty) in &leg.select {

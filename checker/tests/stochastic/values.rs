@@ -130,6 +130,30 @@ fn weights_choose_branches() {
 }
 
 #[test]
+fn legs_that_send_are_chosen_by_weight() {
+    // Who listens moves with the sender. In the urgent location nobody else can come in between.
+    let model = "
+        broadcast chan high, low; int heard = 0; clock x;
+        process Coin() {
+            state wait { x <= 1 }, done;
+            branchpoint toss;
+            init wait;
+            trans wait -> toss { guard x >= 1; assign heard = 10; },
+                  toss -> done { sync high!; assign heard += 1; probability 3; },
+                  toss -> done { sync low!; assign heard += 2; probability 1; };
+        }
+        process Ear() {
+            state a, b;
+            init a;
+            trans a -> b { sync high?; assign heard = 5 * heard; };
+        }
+        system Coin, Ear;";
+    expect(model, "Pr[<=1](<> Coin.done && heard == 55 && Ear.b)", 0.75);
+    expect(model, "Pr[<=1](<> Coin.done && heard == 12 && Ear.a)", 0.25);
+    expect(model, "Pr[<=1](<> Ear.b && Coin.wait)", 0.0);
+}
+
+#[test]
 fn a_clock_with_a_rate_bounds_a_run() {
     let model = "
         clock cost;
