@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.gathered import gathered
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 
@@ -46,30 +46,17 @@ class Wanted:
     tissue: str | None = None
 
 
-def course_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options; the command gets their values as `wanted`."""
-
-    @functools.wraps(command)
-    def with_wanted(**values: Any) -> int | None:  # noqa: ANN401
-        wanted = Wanted(*(values.pop(name) for name in _OPTIONS))
-        return command(wanted=wanted, **values)
-
-    decorated: Callable[..., int | None] = with_wanted
-    for option in reversed(_options()):
-        decorated = option(decorated)
-    return decorated
-
-
-def _options() -> list[Callable[..., Any]]:
-    return [
-        click.option(
+course_options = gathered(
+    "wanted",
+    {
+        "by": click.option(
             "--by",
             type=click.Choice(["strategy", "plans"]),
             help="What is followed in a tissue that answers (tissue adversarial): a strategy that "
             "wins whatever the tissue picks, or plans for the expected tissue, which are made anew "
             "when the needle leaves them.  [default: strategy; plans if there is none]",
         ),
-        click.option(
+        "tree_path": click.option(
             "--strategy",
             "tree_path",
             metavar="FILE.json",
@@ -77,13 +64,13 @@ def _options() -> list[Callable[..., Any]]:
             help="Follow the strategy in this file, which ntagen check --plans wrote for this "
             "task. Without it, the strategy is found before the needle enters.",
         ),
-        click.option(
+        "only_guaranteed": click.option(
             "--only-guaranteed",
             is_flag=True,
             help="End the run as soon as no branch of the strategy explains where the tip is. "
             "Otherwise the run goes on by plans.",
         ),
-        click.option(
+        "tissue": click.option(
             "--tissue",
             metavar="corners|between|worst|expected",
             type=click.Choice(["corners", "between", "worst", "expected"]),
@@ -91,7 +78,10 @@ def _options() -> list[Callable[..., Any]]:
             "--seed: pick corners or the middle of its bounds, any value between, what is worst "
             "for the strategy, or what is expected.  [default: corners]",
         ),
-    ]
+    },
+    Wanted,
+)
+"""Adds the options; the command gets their values as `wanted`."""
 
 
 def say_idle_options(scene: Scene, configuration: Configuration) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.gathered import gathered
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 
@@ -69,29 +69,16 @@ class Wanted:
         return replace(self, by_odds=by_odds, is_random=is_random, shown=count)
 
 
-def odds_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options; the command gets their values as `wanted`."""
-
-    @functools.wraps(command)
-    def with_wanted(**values: Any) -> int | None:  # noqa: ANN401
-        wanted = Wanted(*(values.pop(name) for name in _OPTIONS))
-        return command(wanted=wanted, **values)
-
-    decorated: Callable[..., int | None] = with_wanted
-    for option in reversed(_options()):
-        decorated = option(decorated)
-    return decorated
-
-
-def _options() -> list[Callable[..., Any]]:
-    return [
-        click.option(
+odds_options = gathered(
+    "wanted",
+    {
+        "among": click.option(
             "--among",
             metavar="N",
             type=click.IntRange(min=1),
             help="For --rank probability: how many plans are compared.  [default: 10]",
         ),
-        click.option(
+        "runs": click.option(
             "--runs",
             metavar="N",
             default=2000,
@@ -99,7 +86,7 @@ def _options() -> list[Callable[..., Any]]:
             type=click.IntRange(min=2),
             help="With tissue stochastic: how many random runs are made of each plan.",
         ),
-        click.option(
+        "seed": click.option(
             "--seed",
             metavar="N",
             default=0,
@@ -107,7 +94,10 @@ def _options() -> list[Callable[..., Any]]:
             type=click.IntRange(min=0),
             help="With tissue stochastic: the same seed gives the same runs.",
         ),
-    ]
+    },
+    Wanted,
+)
+"""Adds the options; the command gets their values as `wanted`."""
 
 
 def rate(candidates: Sequence[Candidate], scene: Scene, wanted: Wanted) -> tuple[Rated, ...]:
