@@ -2,7 +2,11 @@
 //! order 5, whose steps can be read anywhere by polynomials of order 4, or by Euler's method with a
 //! fixed step.
 //!
-//! Invariant: the steps follow each other without gaps from time 0.
+//! Invariants:
+//! * The steps follow each other without gaps from time 0.
+//! * An adaptive step that is not the shortest changes no value by more than [`MOST_CHANGE`] times
+//!   what it was, or 1 if that is more: so anywhere in it rounding stays below what counts as equal
+//!   when clocks are compared. Where the solution is a polynomial, no error would limit the step.
 //!
 //! Source: E. Hairer, S. P. Nørsett and G. Wanner, "Solving Ordinary Differential Equations I",
 //! 2nd edition, sections II.4 to II.6.
@@ -16,6 +20,10 @@ const RELATIVE_ERROR: f64 = 1e-9;
 const ABSOLUTE_ERROR: f64 = 1e-12;
 /// No step is shorter than this part of the time.
 const LEAST_STEP: f64 = 1e-13;
+/// What a step may change a value by, relative to what it was or to 1.
+const MOST_CHANGE: f64 = 100.0;
+/// Two looks are at least this part of a step apart.
+const LEAST_PART: f64 = 1e-9;
 /// The first step, if nothing better is known.
 const FIRST_STEP: f64 = 1e-3;
 /// No step is longer: nothing is looked for as far away.
@@ -27,6 +35,9 @@ const STEPS_OF_COURSE: usize = 1 << 16;
 
 /// The coefficients of a step, by value: a polynomial in the part of the step that has passed.
 type Polynomial = [f64; 5];
+
+/// The coefficients of a slope, by powers of the part of the step that has passed.
+type Cubic = [f64; 4];
 
 /// The right side of an equation: the slopes of the values at a time. An error if they are no
 /// finite numbers.
@@ -76,39 +87,55 @@ impl Integrator {
         }
     }
 
-    /// Writes the values at a time to `target`.
+    /// Writes the values at a time to `values`, and their slopes to `rates`; none where nothing is
+    /// solved yet.
     pub(super) fn at(
         &mut self,
         time: f64,
         slopes: &mut Slopes<'_>,
-        target: &mut Vec<f64>,
+        (values, rates): (&mut Vec<f64>, &mut Vec<f64>),
     ) -> Result<(), Failure> {
-        target.clear();
+        values.clear();
+        rates.clear();
         if time <= 0.0 && self.steps.is_empty() {
-            target.extend_from_slice(&self.values);
+            values.extend_from_slice(&self.values);
             return Ok(());
         }
         let index = self.step_at(time, slopes)?;
         let Step { start, length } = self.steps[index];
         let part = ((time - start) / length).clamp(0.0, 1.0);
-        let count = self.values.len();
-        let polynomials = &self.polynomials[index * count..(index + 1) * count];
-        target.extend(polynomials.iter().map(|&[a, b, c, d, e]| {
-            let rest = 1.0 - part;
-            a + part * (b + rest * (c + part * (d + rest * e)))
-        }));
+        let rest = 1.0 - part;
+        for polynomial in self.polynomials(index) {
+            let &[a, b, c, d, e] = polynomial;
+            values.push(a + part * (b + rest * (c + part * (d + rest * e))));
+            rates.push(value_of(&slope_of(polynomial), part) / length);
+        }
         Ok(())
     }
 
-    /// The start and the length of the step that goes on behind a time.
-    pub(super) fn step_behind(
+    /// The polynomials of a step.
+    fn polynomials(&self, index: usize) -> &[Polynomial] {
+        let count = self.values.len();
+        &self.polynomials[index * count..(index + 1) * count]
+    }
+
+    /// When to look next, behind a time: each of so many parts of a step, and wherever a value
+    /// turns. So a value between two looks lies between its values there.
+    pub(super) fn next_look(
         &mut self,
         time: f64,
+        parts: f64,
         slopes: &mut Slopes<'_>,
-    ) -> Result<(f64, f64), Failure> {
+    ) -> Result<f64, Failure> {
         let index = self.step_at(time, slopes)?;
         let Step { start, length } = self.steps[index];
-        Ok((start, length))
+        let part = (time - start) / length;
+        let mut next = ((part * parts).floor() + 1.0) / parts;
+        for polynomial in self.polynomials(index) {
+            next = first_root(&slope_of(polynomial), part + LEAST_PART, next).unwrap_or(next);
+        }
+        let next = start + length * next;
+        Ok(if next > time { next } else { start + length })
     }
 
     /// The step in which a time lies, at its start rather than at the end of the one before.
@@ -188,20 +215,23 @@ impl Integrator {
             self.slopes[stage + 1] = target;
             found?;
         }
-        let mut sum = 0.0;
+        let (mut sum, mut most) = (0.0_f64, 0.0_f64);
         for (value, (before, after)) in self.values.iter().zip(&self.trial).enumerate() {
             let known = self.slopes.iter().zip(ERROR_WEIGHTS);
             let error: f64 = known.map(|(slopes, weight)| slopes[value] * weight).sum();
             let allowed = ABSOLUTE_ERROR + RELATIVE_ERROR * before.abs().max(after.abs());
-            // Between the ends of a step that changes a value much, the polynomial is read near
-            // the lesser value, but is rounded like the change.
-            let rounding = f64::EPSILON * (after - before).abs();
-            let allowed_rounding = ABSOLUTE_ERROR + RELATIVE_ERROR * before.abs();
-            let parts = (length * error / allowed).abs() + rounding / allowed_rounding;
-            sum += parts.powi(2);
+            sum += (length * error / allowed).powi(2);
+            let change = (after - before).abs() / before.abs().max(1.0);
+            most = most.max(change);
         }
+        // An error grows with the fifth power of the length, a change with the first.
+        let too_far = (most / MOST_CHANGE).powi(5);
         let error = (sum / self.values.len() as f64).sqrt();
-        Ok(if error.is_nan() { f64::INFINITY } else { error })
+        Ok(if error.is_nan() {
+            f64::INFINITY
+        } else {
+            error.max(too_far)
+        })
     }
 
     /// Takes over the step that was tried.
@@ -219,6 +249,71 @@ impl Integrator {
         self.slopes.swap(0, 6);
         self.push(length);
     }
+}
+
+/// The slope of a polynomial, where the length of the step is 1.
+fn slope_of(&[_, b, c, d, e]: &Polynomial) -> Cubic {
+    [b + c, 2.0 * (d + e - c), -3.0 * (d + 2.0 * e), 4.0 * e]
+}
+
+fn value_of(&[a, b, c, d]: &Cubic, part: f64) -> f64 {
+    a + part * (b + part * (c + part * d))
+}
+
+/// The first place between two parts of a step where a slope changes its sign, if there is one.
+fn first_root(slope: &Cubic, low: f64, high: f64) -> Option<f64> {
+    let &[a, b, c, d] = slope;
+    // By the coefficients of Bernstein, between the least and the greatest of which a polynomial
+    // lies.
+    let corners = [a, a + b / 3.0, a + (2.0 * b + c) / 3.0, a + b + c + d];
+    if corners.iter().all(|&one| one >= 0.0) || corners.iter().all(|&one| one <= 0.0) {
+        return None;
+    }
+    // Between its own extremes a slope changes its sign once at most.
+    let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
+    let q = -(c + c.signum() * root);
+    let mut turns = [q / (3.0 * d), b / q];
+    if !(turns[0] <= turns[1]) {
+        turns.swap(0, 1);
+    }
+    let mut left = low;
+    for right in [turns[0], turns[1], high] {
+        if right > left && right <= high {
+            if let Some(found) = root_between(slope, left, right) {
+                return Some(found);
+            }
+            left = right;
+        }
+    }
+    None
+}
+
+/// Where a slope changes its sign, if it does so between two parts of a step: by false position,
+/// with halving where that does not get on.
+fn root_between(slope: &Cubic, mut low: f64, mut high: f64) -> Option<f64> {
+    let (mut below, mut above) = (value_of(slope, low), value_of(slope, high));
+    if below * above >= 0.0 {
+        return None;
+    }
+    let enough = 1e-12 * below.abs().max(above.abs());
+    let mut place = high;
+    for halves in (0..60).map(|round| round % 2 == 1) {
+        place = if halves {
+            f64::midpoint(low, high)
+        } else {
+            low - below * (high - low) / (above - below)
+        };
+        let value = value_of(slope, place);
+        if value.abs() <= enough || high - low < LEAST_PART {
+            break;
+        }
+        if value * below > 0.0 {
+            (low, below) = (place, value);
+        } else {
+            (high, above) = (place, value);
+        }
+    }
+    Some(place)
 }
 
 /// The stages behind the first one: the part of the step, and the weights of the slopes so far. The
@@ -283,7 +378,7 @@ const DENSE_WEIGHTS: [f64; 7] = [
 mod tests {
     #![expect(clippy::unnecessary_wraps, reason = "equations may fail")]
 
-    use super::{Failure, Integrator};
+    use super::{Failure, Integrator, first_root};
 
     fn decay(_: f64, values: &[f64], slopes: &mut [f64]) -> Result<(), Failure> {
         slopes[0] = -values[0];
@@ -300,11 +395,11 @@ mod tests {
     #[test]
     fn solutions_are_exact_to_nine_digits_anywhere() {
         let mut integrator = Integrator::default();
-        let mut found = Vec::new();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
         integrator.begin(&[1.0]);
         for time in [0.0, 0.3, 5.0, 1.0, 0.001] {
             integrator
-                .at(time, &mut decay, &mut found)
+                .at(time, &mut decay, (&mut found, &mut rates))
                 .expect("it is finite");
             assert!(
                 (found[0] - (-time).exp()).abs() < 1e-9,
@@ -315,11 +410,18 @@ mod tests {
         integrator.begin(&[1.0, 0.0]);
         for time in [0.7, 10.0, 3.0] {
             integrator
-                .at(time, &mut circle, &mut found)
+                .at(time, &mut circle, (&mut found, &mut rates))
                 .expect("it is finite");
             assert!((found[0] - time.cos()).abs() < 1e-7, "{time}: {}", found[0]);
             assert!((found[1] - time.sin()).abs() < 1e-7, "{time}: {}", found[1]);
         }
+    }
+
+    /// Of a body that is thrown upwards with 10 and falls with 10: `5 - 5 (t - 1)^2`.
+    fn throw(_: f64, values: &[f64], slopes: &mut [f64]) -> Result<(), Failure> {
+        slopes[0] = values[1];
+        slopes[1] = -10.0;
+        Ok(())
     }
 
     /// A parabola, which steps of any length solve without an error.
@@ -331,11 +433,11 @@ mod tests {
     #[test]
     fn steps_without_error_grow_no_longer_than_can_be_read() {
         let mut integrator = Integrator::default();
-        let mut found = vec![0.0];
+        let (mut found, mut rates) = (vec![0.0], Vec::new());
         for solution in 0..1000 {
             integrator.begin(&found);
             integrator
-                .at(0.1, &mut falling, &mut found)
+                .at(0.1, &mut falling, (&mut found, &mut rates))
                 .expect("it is finite");
             let exact = f64::from(solution + 1) * (0.1 * 10.0 - 0.1 * 0.1 / 2.0);
             let error = (found[0] - exact).abs();
@@ -344,12 +446,78 @@ mod tests {
     }
 
     #[test]
+    fn rates_are_those_of_the_solution() {
+        let mut integrator = Integrator::default();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
+        integrator.begin(&[1.0, 0.0]);
+        for time in [0.7, 10.0, 3.0] {
+            integrator
+                .at(time, &mut circle, (&mut found, &mut rates))
+                .expect("it is finite");
+            assert!((rates[0] + found[1]).abs() < 1e-6, "{time}: {}", rates[0]);
+            assert!((rates[1] - found[0]).abs() < 1e-6, "{time}: {}", rates[1]);
+        }
+    }
+
+    #[test]
+    fn a_throw_is_looked_at_where_it_turns() {
+        let mut integrator = Integrator::default();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
+        integrator.begin(&[0.0, 10.0]);
+        let (mut time, mut highest) = (0.0, f64::NEG_INFINITY);
+        while time < 2.0 {
+            integrator
+                .at(time, &mut throw, (&mut found, &mut rates))
+                .expect("it is finite");
+            highest = found[0].max(highest);
+            time = integrator
+                .next_look(time, 4.0, &mut throw)
+                .expect("it is finite");
+        }
+        assert!((highest - 5.0).abs() < 1e-12, "{highest}");
+    }
+
+    /// However often a solution that no error limits is begun anew, its steps stay short enough for
+    /// values in them to be exact.
+    #[test]
+    fn steps_of_a_polynomial_stay_exact() {
+        let mut integrator = Integrator::default();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
+        for _ in 0..100 {
+            integrator.begin(&[0.0, 10.0]);
+            integrator
+                .at(2.0, &mut throw, (&mut found, &mut rates))
+                .expect("it is finite");
+            assert!(found[0].abs() < 1e-12, "{}", found[0]);
+            assert!((found[1] + 10.0).abs() < 1e-12, "{}", found[1]);
+        }
+    }
+
+    #[test]
+    fn slopes_change_their_sign_where_their_roots_are() {
+        // (x - 0.2) (x - 0.5) (x - 0.9)
+        let cubic = [-0.09, 0.73, -1.6, 1.0];
+        for (low, root) in [(0.0, 0.2), (0.3, 0.5), (0.6, 0.9)] {
+            let found = first_root(&cubic, low, 1.0).expect("there is one");
+            assert!((found - root).abs() < 1e-8, "{found} instead of {root}");
+        }
+        assert_eq!(first_root(&cubic, 0.95, 1.0), None);
+        assert_eq!(first_root(&cubic, 0.3, 0.4), None);
+        // x - 0.25, and x^2 - 0.25
+        let found = first_root(&[-0.25, 1.0, 0.0, 0.0], 0.0, 1.0);
+        assert_eq!(found, Some(0.25));
+        let found = first_root(&[-0.25, 0.0, 1.0, 0.0], 0.0, 1.0).expect("there is one");
+        assert!((found - 0.5).abs() < 1e-8, "{found}");
+        assert_eq!(first_root(&[1.0, -0.5, 0.0, 0.0], 0.0, 1.0), None);
+    }
+
+    #[test]
     fn a_fixed_step_is_eulers() {
         let mut integrator = Integrator::new(Some(0.5));
-        let mut found = Vec::new();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
         integrator.begin(&[1.0]);
         integrator
-            .at(0.75, &mut decay, &mut found)
+            .at(0.75, &mut decay, (&mut found, &mut rates))
             .expect("it is finite");
         assert!((found[0] - 0.375).abs() < 1e-15);
     }

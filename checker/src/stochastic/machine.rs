@@ -45,6 +45,18 @@ impl Mask {
     }
 }
 
+/// What is seen of a timed condition at a moment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// Whether it holds.
+    pub(super) now: bool,
+    /// On which sides its comparisons are.
+    pub(super) signature: f64,
+    /// In how long the next of its linear comparisons would change its side, if the rates of clocks
+    /// stayed as they are.
+    pub(super) gap_closes_in: f64,
+}
+
 /// A state, and what runs code on it.
 pub(super) struct Machine<'a> {
     pub(super) network: &'a Network,
@@ -187,8 +199,8 @@ impl<'a> Machine<'a> {
             }
             Condition::Compared(_) => unreachable!("it is asked as a whole"),
             Condition::Curved(function) => {
-                let (now, _) = self.side(function, arguments)?;
-                Ok(Mask::constant(now))
+                let view = self.view(function, arguments)?;
+                Ok(Mask::constant(view.now))
             }
             Condition::Timed(function) => {
                 self.set_double(self.network.chances.ahead, ahead);
@@ -202,15 +214,19 @@ impl<'a> Machine<'a> {
         }
     }
 
-    /// Whether a timed condition holds now, and its signature.
-    pub(super) fn side(
+    /// A timed condition, now.
+    pub(super) fn view(
         &mut self,
         function: FunctionId,
         arguments: &[i32],
-    ) -> Result<(bool, f64), Failure> {
+    ) -> Result<View, Failure> {
         self.set_double(self.network.chances.ahead, 0.0);
         let bits = self.call(function, arguments)?;
-        Ok((bits & 1 != 0, self.double(self.network.chances.signature)))
+        Ok(View {
+            now: bits & 1 != 0,
+            signature: self.double(self.network.chances.signature),
+            gap_closes_in: self.double(self.network.chances.result),
+        })
     }
 
     /// Whether a condition holds now.

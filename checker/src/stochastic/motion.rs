@@ -19,6 +19,12 @@ const STEP_OF_LOOKS: f64 = 0.01;
 const NUDGE: f64 = 1e-9;
 /// Nothing is looked for behind this time.
 const LAST_LOOK: f64 = 1e12;
+/// Tangents that are followed towards a change, at most.
+const MOST_TANGENTS: usize = 8;
+/// How near to the end of the tangents a change is looked for first, relative to the time.
+const NEAR: f64 = 1e-15;
+/// By how much it is looked for farther, if it is not there.
+const GROWTH: f64 = 16.0;
 /// What a look takes: see [`cancellation::work`].
 const UNITS_FOR_LOOK: usize = 256;
 
@@ -34,6 +40,7 @@ pub(super) struct Motion {
     base: Vec<(u32, f64, f64)>,
     has_begun: bool,
     values: Vec<f64>,
+    slopes: Vec<f64>,
 }
 
 impl Motion {
@@ -90,7 +97,7 @@ impl Motion {
         self.integrator.begin(&self.values);
     }
 
-    /// Makes the words of the machine those of a time.
+    /// Makes the words of the machine those of a time, with the rates that clocks have then.
     pub(super) fn go_to(&mut self, machine: &mut Machine<'_>, time: f64) -> Result<(), Failure> {
         self.begin(machine);
         if !self.is_flowing() {
@@ -101,10 +108,14 @@ impl Motion {
         let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
             slopes_at(machine, (base, flowing, rates), time, values, target)
         };
-        self.integrator.at(time, &mut slopes, &mut self.values)?;
+        let target = (&mut self.values, &mut self.slopes);
+        self.integrator.at(time, &mut slopes, target)?;
         linear(machine, &self.base, time);
         for (&clock, &value) in self.flowing.iter().zip(&self.values) {
             machine.set_double(clock, value);
+        }
+        for (&clock, &slope) in self.flowing.iter().zip(&self.slopes) {
+            machine.set_rate(clock, slope);
         }
         Ok(())
     }
@@ -144,12 +155,9 @@ impl Motion {
         let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
             slopes_at(machine, (base, flowing, rates), time, values, target)
         };
-        let found = self.integrator.step_behind(time, &mut slopes);
+        let found = self.integrator.next_look(time, LOOKS, &mut slopes);
         self.go_back(machine);
-        let (start, length) = found?;
-        let part = ((time - start) / length * LOOKS).floor() + 1.0;
-        let next = start + length * (part / LOOKS);
-        Ok(if next > time { next } else { start + length })
+        found
     }
 
     /// The mask of a condition after a time; its horizon is when it changes next, infinity if that
@@ -162,41 +170,38 @@ impl Motion {
         until: f64,
     ) -> Result<Mask, Failure> {
         let ask = |motion: &mut Motion, machine: &mut Machine<'_>, time: f64| {
-            motion.look(machine, time, |machine| machine.side(function, arguments))
+            motion.look(machine, time, |machine| machine.view(function, arguments))
         };
-        let (now, _) = ask(self, machine, time)?;
+        let now = ask(self, machine, time)?.now;
         let mut next = self.next_look(machine, time)?;
         let mut known = time + NUDGE * (next - time);
-        let (behind, side) = ask(self, machine, known)?;
+        let mut seen = ask(self, machine, known)?;
+        let mut mask = Mask {
+            now,
+            behind: seen.now,
+            horizon: f64::INFINITY,
+        };
         if time >= until {
-            return Ok(Mask {
-                now,
-                behind,
-                horizon: f64::INFINITY,
-            });
+            return Ok(mask);
         }
+        let side = seen.signature.to_bits();
         loop {
             cancellation::work(UNITS_FOR_LOOK);
-            let (_, other) = ask(self, machine, next)?;
-            if other.to_bits() != side.to_bits() {
-                let change = bisected(known, next, &mut |time| {
-                    let (_, found) = ask(self, machine, time)?;
-                    Ok(found.to_bits() == side.to_bits())
-                })?;
-                return Ok(Mask {
-                    now,
-                    behind,
-                    horizon: change - time,
-                });
+            let found = ask(self, machine, next)?;
+            if found.signature.to_bits() != side {
+                let mut probe = |time| {
+                    let found = ask(self, machine, time)?;
+                    let is_same = found.signature.to_bits() == side;
+                    Ok(is_same.then_some(found.gap_closes_in))
+                };
+                let change = first_change((known, seen.gap_closes_in), next, &mut probe)?;
+                mask.horizon = change - time;
+                return Ok(mask);
             }
             if next >= until.min(LAST_LOOK) {
-                return Ok(Mask {
-                    now,
-                    behind,
-                    horizon: f64::INFINITY,
-                });
+                return Ok(mask);
             }
-            known = next;
+            (known, seen) = (next, found);
             next = self.next_look(machine, next)?;
         }
     }
@@ -219,7 +224,13 @@ impl Motion {
             cancellation::work(UNITS_FOR_LOOK);
             let next = self.next_look(machine, known)?;
             if !is_below(self, machine, next)? {
-                let time = bisected(known, next, &mut |time| is_below(self, machine, time))?;
+                let mut probe = |time| {
+                    let (found, rate) = self.look(machine, time, |machine| {
+                        Ok(machine.clock(clock))
+                    })?;
+                    Ok((found < value).then_some((value - found) / rate))
+                };
+                let time = first_change((known, f64::INFINITY), next, &mut probe)?;
                 return Ok((time <= until).then_some(time));
             }
             known = next;
@@ -228,18 +239,59 @@ impl Motion {
     }
 }
 
-/// The first time at which something is different, between one where it is not and one where it is.
-fn bisected(
-    mut same: f64,
+/// What is asked whether something is the same at a time as before: `None` if it is not; else in
+/// how long it would differ if all clocks went on as they do then, as far as that is known.
+type Probe<'a> = dyn FnMut(f64) -> Result<Option<f64>, Failure> + 'a;
+
+/// The first time at which something is different, to the last bit, between one where it is not,
+/// with what was found there, and one where it is.
+///
+/// The method of Newton comes near; then steps that grow find both sides of the change; what is
+/// left is halved.
+fn first_change(
+    (mut same, mut differs_in): (f64, f64),
     mut other: f64,
-    is_same: &mut dyn FnMut(f64) -> Result<bool, Failure>,
+    probe: &mut Probe<'_>,
 ) -> Result<f64, Failure> {
+    let is_between = |time: f64, same: f64, other: f64| time > same && time < other;
+    let mut is_beyond = false;
+    for _ in 0..MOST_TANGENTS {
+        let time = same + differs_in;
+        if !is_between(time, same, other) {
+            break;
+        }
+        match probe(time)? {
+            Some(longer) => (same, differs_in) = (time, longer),
+            None => {
+                other = time;
+                is_beyond = true;
+                break;
+            }
+        }
+    }
+    let mut step = NEAR * other.abs().max(f64::MIN_POSITIVE);
+    loop {
+        let time = if is_beyond { other - step } else { same + step };
+        if !is_between(time, same, other) || step > (other - same) / 2.0 {
+            break;
+        }
+        let is_same = probe(time)?.is_some();
+        if is_same {
+            same = time;
+        } else {
+            other = time;
+        }
+        if is_same == is_beyond {
+            break;
+        }
+        step *= GROWTH;
+    }
     loop {
         let middle = same + (other - same) / 2.0;
-        if middle <= same || middle >= other {
+        if !is_between(middle, same, other) {
             return Ok(other);
         }
-        if is_same(middle)? {
+        if probe(middle)?.is_some() {
             same = middle;
         } else {
             other = middle;
