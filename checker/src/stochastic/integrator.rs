@@ -3,7 +3,8 @@
 //! fixed step.
 //!
 //! Invariants:
-//! * The steps follow each other without gaps from time 0.
+//! * The steps that are kept follow each other without gaps. A solution that is asked for behind
+//!   them goes on; one that is asked for before them begins again, with the same steps.
 //! * An adaptive step that is not the shortest changes no value by more than [`MOST_CHANGE`] times
 //!   what it was, or 1 if that is more: so anywhere in it rounding stays below what counts as equal
 //!   when clocks are compared. Where the solution is a polynomial, no error would limit the step.
@@ -24,6 +25,8 @@ const LEAST_STEP: f64 = 1e-13;
 const MOST_CHANGE: f64 = 100.0;
 /// Two looks are at least this part of a step apart.
 const LEAST_PART: f64 = 1e-9;
+/// So many steps are kept at a time; of more the older half is forgotten.
+const MOST_STEPS: usize = 1 << 16;
 /// The first step, if nothing better is known.
 const FIRST_STEP: f64 = 1e-3;
 /// No step is longer: nothing is looked for as far away.
@@ -62,6 +65,8 @@ pub(super) struct Integrator {
     end: f64,
     /// What length the next step should have; it is kept from one solution to the next.
     length: Option<f64>,
+    /// The values and the length at time 0.
+    initial: (Vec<f64>, Option<f64>),
     slopes: [Vec<f64>; 7],
     trial: Vec<f64>,
 }
@@ -75,16 +80,28 @@ impl Integrator {
         }
     }
 
+    /// Forgets how long steps were: what follows must not depend on what came before.
+    pub(super) fn forget(&mut self) {
+        self.length = None;
+    }
+
     /// Begins a solution.
     pub(super) fn begin(&mut self, values: &[f64]) {
-        self.steps.clear();
-        self.polynomials.clear();
-        self.values.clear();
-        self.values.extend_from_slice(values);
-        self.end = 0.0;
+        self.initial.0.clear();
+        self.initial.0.extend_from_slice(values);
+        self.initial.1 = self.length;
         for slopes in &mut self.slopes {
             slopes.resize(values.len(), 0.0);
         }
+        self.begin_again();
+    }
+
+    fn begin_again(&mut self) {
+        self.steps.clear();
+        self.polynomials.clear();
+        self.values.clone_from(&self.initial.0);
+        self.length = self.initial.1;
+        self.end = 0.0;
     }
 
     /// Writes the values at a time to `values`, and their slopes to `rates`; none where nothing is
@@ -140,7 +157,15 @@ impl Integrator {
 
     /// The step in which a time lies, at its start rather than at the end of the one before.
     fn step_at(&mut self, time: f64, slopes: &mut Slopes<'_>) -> Result<usize, Failure> {
+        if self.steps.first().is_some_and(|first| time < first.start) {
+            self.begin_again();
+        }
         while self.end <= time {
+            if self.steps.len() == MOST_STEPS {
+                let forgotten = MOST_STEPS / 2;
+                self.steps.drain(..forgotten);
+                self.polynomials.drain(..forgotten * self.values.len());
+            }
             self.make_step(slopes)?;
         }
         Ok(self.steps.partition_point(|step| step.start <= time) - 1)
@@ -273,7 +298,7 @@ fn first_root(slope: &Cubic, low: f64, high: f64) -> Option<f64> {
     let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
     let q = -(c + c.signum() * root);
     let mut turns = [q / (3.0 * d), b / q];
-    if !(turns[0] <= turns[1]) {
+    if turns[1] < turns[0] {
         turns.swap(0, 1);
     }
     let mut left = low;
@@ -490,6 +515,27 @@ mod tests {
                 .expect("it is finite");
             assert!(found[0].abs() < 1e-12, "{}", found[0]);
             assert!((found[1] + 10.0).abs() < 1e-12, "{}", found[1]);
+        }
+    }
+
+    /// What was forgotten is computed again, to the same bits.
+    #[test]
+    fn a_solution_of_many_steps_can_be_read_anywhere() {
+        let mut integrator = Integrator::default();
+        let (mut found, mut rates) = (Vec::new(), Vec::new());
+        let mut read = |integrator: &mut Integrator, time| {
+            integrator
+                .at(time, &mut circle, (&mut found, &mut rates))
+                .expect("it is finite");
+            found.clone()
+        };
+        integrator.begin(&[1.0, 0.0]);
+        let times = [0.5, 1.0, 4000.0];
+        let before = times.map(|time| read(&mut integrator, time));
+        assert!(integrator.steps.len() <= super::MOST_STEPS);
+        assert!(integrator.steps[0].start > 1.0, "some are forgotten");
+        for (time, before) in times.into_iter().zip(before) {
+            assert_eq!(read(&mut integrator, time), before);
         }
     }
 

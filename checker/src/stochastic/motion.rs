@@ -10,7 +10,7 @@ use super::machine::{Machine, Mask};
 use crate::cancellation;
 use crate::ir::FunctionId;
 
-/// A step of the integrator is looked at so many times.
+/// A step of the integrator is looked at so many times if more than one clock may count at a time.
 const LOOKS: f64 = 4.0;
 /// Where no clock flows, conditions that are not linear in time are looked at so often.
 const STEP_OF_LOOKS: f64 = 0.01;
@@ -27,6 +27,16 @@ const NEAR: f64 = 1e-15;
 const GROWTH: f64 = 16.0;
 /// What a look takes: see [`cancellation::work`].
 const UNITS_FOR_LOOK: usize = 256;
+
+/// A condition that is looked at along the motion of clocks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Asked<'a> {
+    pub(super) function: FunctionId,
+    pub(super) arguments: &'a [i32],
+    /// Whether each of its comparisons is linear, and of one clock with a number: so none of them
+    /// changes more than once while that clock rises or falls.
+    pub(super) is_simple: bool,
+}
 
 /// The clocks of a network between two moves.
 #[derive(Debug, Default)]
@@ -73,6 +83,12 @@ impl Motion {
     /// Whether a clock flows.
     pub(super) fn flows(&self, clock: u32) -> bool {
         self.flowing.contains(&clock)
+    }
+
+    /// Says that a run begins now, with the words of the machine.
+    pub(super) fn start(&mut self) {
+        self.integrator.forget();
+        self.has_begun = false;
     }
 
     /// Says that the words of the machine are those of time 0 now.
@@ -147,6 +163,16 @@ impl Motion {
         machine: &mut Machine<'_>,
         time: f64,
     ) -> Result<f64, Failure> {
+        self.next_of(machine, time, LOOKS)
+    }
+
+    /// The next look if each step of the integrator has so many.
+    fn next_of(
+        &mut self,
+        machine: &mut Machine<'_>,
+        time: f64,
+        looks: f64,
+    ) -> Result<f64, Failure> {
         self.begin(machine);
         if !self.is_flowing() {
             return Ok(time + self.integrator.fixed_step.unwrap_or(STEP_OF_LOOKS));
@@ -155,7 +181,7 @@ impl Motion {
         let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
             slopes_at(machine, (base, flowing, rates), time, values, target)
         };
-        let found = self.integrator.next_look(time, LOOKS, &mut slopes);
+        let found = self.integrator.next_look(time, looks, &mut slopes);
         self.go_back(machine);
         found
     }
@@ -165,15 +191,20 @@ impl Motion {
     pub(super) fn mask(
         &mut self,
         machine: &mut Machine<'_>,
-        (function, arguments): (FunctionId, &[i32]),
+        Asked {
+            function,
+            arguments,
+            is_simple,
+        }: Asked<'_>,
         time: f64,
         until: f64,
     ) -> Result<Mask, Failure> {
+        let looks = if is_simple { 1.0 } else { LOOKS };
         let ask = |motion: &mut Motion, machine: &mut Machine<'_>, time: f64| {
             motion.look(machine, time, |machine| machine.view(function, arguments))
         };
         let now = ask(self, machine, time)?.now;
-        let mut next = self.next_look(machine, time)?;
+        let mut next = self.next_of(machine, time, looks)?;
         let mut known = time + NUDGE * (next - time);
         let mut seen = ask(self, machine, known)?;
         let mut mask = Mask {
@@ -202,7 +233,7 @@ impl Motion {
                 return Ok(mask);
             }
             (known, seen) = (next, found);
-            next = self.next_look(machine, next)?;
+            next = self.next_of(machine, next, looks)?;
         }
     }
 
@@ -222,12 +253,11 @@ impl Motion {
         let mut known = 0.0;
         while known < until.min(LAST_LOOK) {
             cancellation::work(UNITS_FOR_LOOK);
-            let next = self.next_look(machine, known)?;
+            let next = self.next_of(machine, known, 1.0)?;
             if !is_below(self, machine, next)? {
                 let mut probe = |time| {
-                    let (found, rate) = self.look(machine, time, |machine| {
-                        Ok(machine.clock(clock))
-                    })?;
+                    let (found, rate) =
+                        self.look(machine, time, |machine| Ok(machine.clock(clock)))?;
                     Ok((found < value).then_some((value - found) / rate))
                 };
                 let time = first_change((known, f64::INFINITY), next, &mut probe)?;

@@ -113,6 +113,60 @@ fn a_ball_bounces_when_it_meets_the_ground() {
     expect_extreme(&equal, "E[<=2.51; 1](max: bounces)", 3.0, 0.0);
 }
 
+/// A ball that loses nothing: it meets the ground every 2 units, however often.
+#[test]
+fn a_ball_bounces_as_often_as_it_should() {
+    let model = "
+        clock p = 5.0, v;
+        int bounces = 0;
+        urgent broadcast chan bounce;
+        process Ball() {
+            state Flying { p' == v && v' == -10 };
+            init Flying;
+            trans Flying -> Flying {
+                guard p == 0 && v < 0; sync bounce!; assign v = -v, bounces++;
+            };
+        }
+        system Ball;";
+    expect_extreme(model, "E[<=200; 1](max: bounces)", 100.0, 0.0);
+    expect_extreme(model, "E[<=200; 1](min: p)", 0.0, 1e-9);
+    // Its top lies between two looks that are far apart.
+    expect_extreme(model, "E[<=200; 1](max: p)", 5.0, 1e-9);
+    let thrown = model.replace("p = 5.0, v", "p, v = 10.0");
+    expect(&thrown, "Pr[<=1.9](<> p >= 4.9999)", 1.0);
+    expect(&thrown, "Pr[<=1.9](<> p >= 5.0001)", 0.0);
+    expect(&thrown, "Pr[<=0.9](<> p >= 4.9999)", 0.0);
+}
+
+/// The steps of a run do not depend on the runs before it.
+#[test]
+fn a_run_with_equations_is_the_same_alone_and_after_others() {
+    let model = "
+        clock x = 1.0, y;
+        process P() {
+            state a { x' == y - x && y' == 1 - x * y; 2 };
+            init a;
+            trans a -> a { assign y = random(2); };
+        }
+        system P;";
+    let query = "E[<=10; 1](max: x)";
+    let (network, query) = load(model, query).unwrap_or_else(|message| panic!("{message}"));
+    let Statistical::Expectation { bound, value, .. } = &query.kind else {
+        panic!("{} asks for no expectation", query.text);
+    };
+    for executor in executors(&network) {
+        let mut together = Runner::new(&network, &*executor);
+        for run in 0..10 {
+            let mut alone = Runner::new(&network, &*executor);
+            let [left, right] = [&mut together, &mut alone].map(|runner| {
+                let found = runner.extreme((1, run), bound, *value, true);
+                found.expect("the run does not fail").0
+            });
+            assert_eq!(left.to_bits(), right.to_bits(), "run {run}");
+        }
+    }
+}
+
 /// The delay is uniform up to the moment at which the clock that flows reaches its bound.
 #[test]
 fn an_invariant_on_a_clock_that_flows_bounds_a_delay() {

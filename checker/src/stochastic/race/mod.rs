@@ -35,7 +35,7 @@ use super::condition::Condition;
 use super::constants::{MOVES_OF_A_PLAN, TOLERANCE, ZENO_MOVES, ZENO_TIME};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
-use super::motion::Motion;
+use super::motion::{Asked, Motion};
 use super::program::Program;
 use super::windows::Windows;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
@@ -163,7 +163,7 @@ impl<'a> Race<'a> {
         self.winner = None;
         self.stale.clear();
         self.is_stepped.fill(false);
-        self.motion.end();
+        self.motion.start();
         for process in 0..self.locations.len() {
             let location = self.machine.location(process);
             self.locations[process] = location;
@@ -438,14 +438,18 @@ impl Race<'_> {
         ahead: f64,
         delay: f64,
     ) -> Result<Mask, Failure> {
-        let function = match condition {
-            Condition::Curved(function) => function,
+        let (function, is_linear) = match condition {
+            Condition::Curved(function) => (function, false),
             Condition::Timed(function) if self.motion.is_flowing() && self.reads_flow(function) => {
-                function
+                (function, true)
             }
             _ => return self.machine.mask(condition, &[], ahead),
         };
-        let asked: (FunctionId, &[i32]) = (function, &[]);
+        let asked = Asked {
+            function,
+            arguments: &[],
+            is_simple: is_linear && self.clocks_of[&function].len() == 1,
+        };
         self.motion.mask(&mut self.machine, asked, ahead, delay)
     }
 

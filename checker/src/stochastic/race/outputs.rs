@@ -7,6 +7,7 @@ use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
+use crate::stochastic::motion::Asked;
 use crate::stochastic::program::{Channel, Instance, Program, Spot};
 use crate::stochastic::span::Span;
 use crate::stochastic::windows::Windows;
@@ -46,6 +47,7 @@ impl<'a> Race<'a> {
         (bound, view): (f64, View),
         mut windows: Option<&mut Windows>,
     ) -> Result<f64, Failure> {
+        let only_first = windows.is_none();
         let mut add = |low: f64, high: f64| {
             if let Some(windows) = &mut windows {
                 windows.add(low, high);
@@ -75,6 +77,9 @@ impl<'a> Race<'a> {
             } else if mask.now && !before {
                 add(ahead, ahead);
                 first = first.min(ahead);
+            }
+            if only_first && first.is_finite() {
+                return Ok(first);
             }
             let next = ahead + mask.horizon;
             if next.is_infinite() || next > bound * (1.0 + TOLERANCE) + TOLERANCE {
@@ -193,7 +198,11 @@ impl<'a> Race<'a> {
             other => other,
         };
         if let (true, Condition::Timed(function) | Condition::Curved(function)) = (steps, whole) {
-            let asked = (function, values);
+            let asked = Asked {
+                function,
+                arguments: values,
+                is_simple: matches!(condition, Condition::Compared(_)),
+            };
             return self
                 .motion
                 .mask(&mut self.machine, asked, ahead, self.until);
