@@ -10,11 +10,10 @@
 //! 1 / [`CELLS`] of the bounds at most.
 //!
 //! Sources: P. Massart, "The tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality", Annals
-//! of Probability 18 (1990), corollary 1; T. W. Anderson, "Confidence limits for the expected value
-//! of an arbitrary bounded random variable with a continuous distribution function", Bulletin of
-//! the International Statistical Institute 43 (1969), for the mean; C. E. Budde et al., "Sound
-//! statistical model checking for probabilities and expected rewards", TACAS 2025, who recommend
-//! it.
+//! of Probability 18 (1990), for both sides at once; T. W. Anderson (1969), for the mean, as told by
+//! M. Phan, P. Thomas and E. Learned-Miller, "Towards practical mean bounds for small samples", ICML
+//! 2021; C. E. Budde et al., "Sound statistical model checking for probabilities and expected
+//! rewards", TACAS 2025, who recommend it.
 
 use super::binomial::Interval;
 
