@@ -6,6 +6,8 @@
 
 #![expect(clippy::print_stdout, reason = "a benchmark prints")]
 
+#[path = "support/statistical.rs"]
+mod statistical;
 mod support;
 
 use std::error::Error;
@@ -13,13 +15,11 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::exec::{Executor, Jit};
 use checker::ir::{Network, Statistical, StatisticalQuery};
-use checker::semantics::{self, Reading};
 use checker::stochastic::{Precision, Runner, estimate};
-use checker::syntax;
 
+use statistical::load;
 use support::Scratch;
 
 /// The runs that are measured; `RUNS` in the environment sets another number, and `MODEL` one model
@@ -280,30 +280,4 @@ fn counted_moves(
     let runs = COUNTED_RUNS as f64;
     let mean = sum / runs;
     (mean, ((squares / runs - mean * mean) / runs).sqrt())
-}
-
-/// A model in the stochastic reading, with a compiled query.
-fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), Box<dyn Error>> {
-    let mut sources = SourceMap::default();
-    let prelude = syntax::prelude(&mut sources);
-    let parsed = syntax::read_model("model.xta", model.as_bytes(), &mut sources);
-    let (model, more) =
-        semantics::analyse(&parsed.document, &prelude, &sources, Reading::Stochastic);
-    let mut found = parsed.diagnostics;
-    found.extend(more);
-    let span = syntax::add_query_text(query, &mut sources);
-    let (parsed, more) = syntax::parse_query(span, &sources);
-    found.extend(more);
-    let mut compiled = None;
-    let mut model = model.filter(|_| !found.iter().any(Diagnostic::is_error));
-    if let (Some(model), Some(parsed)) = (&mut model, parsed) {
-        let (query, more) = model.compile_statistical(&parsed, &sources, &[]);
-        found.extend(more);
-        compiled = query;
-    }
-    let (Some(model), Some(query)) = (model, compiled) else {
-        let texts: Vec<String> = found.iter().map(|one| one.render(&sources)).collect();
-        return Err(texts.join("\n").into());
-    };
-    Ok((model.network, query))
 }
