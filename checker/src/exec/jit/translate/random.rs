@@ -1,6 +1,7 @@
-//! Random numbers in native code. The uniform ones, which runs draw all the time, are taken from the
-//! words of the stream here as long as there are some that were made before; all else is called
-//! back.
+//! Random numbers in native code.
+//!
+//! The uniform ones, which runs draw all the time, are taken from the words of the stream here as
+//! long as there are some that were made before; all else is called back.
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I64};
