@@ -112,6 +112,7 @@ PARTS = {
     "exact_first": Part("game"),
     "unrolling": Part("both", ("exec/optimise/unroll.rs",)),
     "value_numbering": Part("both", ("exec/optimise/numbering",)),
+    "compiled_runs": Part("runs", ("stochastic/race_code",)),
     "interpret_first": Part("both", ("exec/jit/needs.rs",)),
 }
 
@@ -235,6 +236,15 @@ def _games() -> Iterator[Member]:
     clocks = text.replace("clock x;", "clock x, y;").replace("x = 0; }}", "x = 0; }}")
     apart = clocks.replace("guard x >= 10;", "guard x >= 10 && y - x >= 0;")
     yield of("trains 3, differences", apart.replace("N = 4", "N = 3"), bridge)
+
+
+def _random_runs() -> Iterator[Member]:
+    def of(name: str, text: str, query: str) -> Member:
+        return Member(name, "runs", text, query, {"runs": 100_000})
+
+    yield of("ferries 6", models.ferries(6), "Pr[<=200](<> waiting == 5)")
+    yield of("till 20", models.till(20), "Pr[<=100](<> length == 20)")
+    yield of("till 20, greatest", models.till(20), "E[<=100; 1](max: length)")
 
 
 def _of_folder(folder: Path) -> Iterator[Member]:
@@ -396,7 +406,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if unknown := set(PARTS) ^ set(checker.HEURISTICS):
         raise SystemExit(f"not in both tables: {', '.join(sorted(unknown))}")
-    members = [*_searches(), *_games()]
+    members = [*_searches(), *_games(), *_random_runs()]
     if arguments.models:
         members += _of_folder(arguments.models)
     if arguments.member:

@@ -641,3 +641,59 @@ process Player(const int[0, N - 1] pid) {{
 }}
 system Player;
 """
+
+
+def ferries(count: int) -> str:
+    """Ferries that share a quay for one, with chance: who finds it taken waits at anchor."""
+    return f"""
+const int N = {count};
+typedef int[0, N - 1] id_t;
+broadcast chan moored[N], cast_off[N];
+urgent broadcast chan enter[N];
+bool is_taken = false;
+int[0, N] waiting = 0;
+bool anchors[N];
+id_t first() {{
+    for (i : id_t) if (anchors[i]) return i;
+    return 0;
+}}
+process Ferry(const id_t id) {{
+    clock x;
+    state sea {{ ; (1 + id):50 }}, anchor, entering {{ x <= 4 }}, quay {{ x <= 9 }};
+    init sea;
+    trans sea -> entering {{ guard !is_taken; assign is_taken = true, x = 0; }},
+          sea -> anchor {{ guard is_taken; assign anchors[id] = true, waiting = waiting + 1; }},
+          anchor -> entering {{ sync enter[id]?; assign x = 0; }},
+          entering -> quay {{ guard x >= 1; sync moored[id]!; assign x = 0; }},
+          quay -> sea {{ guard x >= 3; sync cast_off[id]!; assign is_taken = false; }};
+}}
+process Harbour() {{
+    state watch;
+    init watch;
+    trans watch -> watch {{ guard !is_taken && waiting > 0; sync enter[first()]!;
+        assign is_taken = true, anchors[first()] = false, waiting = waiting - 1; }};
+}}
+system Ferry, Harbour;
+"""
+
+
+def till(customers: int) -> str:
+    """A queue before a till, with chance."""
+    return f"""
+broadcast chan come, leave;
+int[0, {customers}] length = 0;
+process Door() {{
+    state open {{ ; 9:10 }};
+    init open;
+    trans open -> open {{ sync come!; }};
+}}
+process Till() {{
+    state free, busy {{ ; 1 }};
+    init free;
+    trans free -> busy {{ sync come?; assign length = 1; }},
+          busy -> busy {{ guard length < {customers}; sync come?; assign length = length + 1; }},
+          busy -> busy {{ guard length > 1; sync leave!; assign length = length - 1; }},
+          busy -> free {{ guard length == 1; sync leave!; assign length = 0; }};
+}}
+system Door, Till;
+"""
