@@ -12,6 +12,7 @@
 //! Source: E. Hairer, S. P. Nørsett and G. Wanner, "Solving Ordinary Differential Equations I",
 //! 2nd edition, sections II.4 to II.6.
 
+use super::cubic::{Cubic, LEAST_PART, first_root, value_of};
 use super::failure::Failure;
 use crate::cancellation;
 
@@ -23,8 +24,6 @@ const ABSOLUTE_ERROR: f64 = 1e-12;
 const LEAST_STEP: f64 = 1e-13;
 /// What a step may change a value by, relative to what it was or to 1.
 const MOST_CHANGE: f64 = 100.0;
-/// Two looks are at least this part of a step apart.
-const LEAST_PART: f64 = 1e-9;
 /// So many steps are kept at a time; of more the older half is forgotten.
 const MOST_STEPS: usize = 1 << 16;
 /// The first step, if nothing better is known.
@@ -33,14 +32,9 @@ const FIRST_STEP: f64 = 1e-3;
 const LONGEST_STEP: f64 = 1e12;
 /// What a step takes, by value: see [`cancellation::work`].
 const UNITS_FOR_STEP: usize = 128;
-/// So many steps are kept at least before it is asked whether there is room for more.
-const STEPS_OF_COURSE: usize = 1 << 16;
 
 /// The coefficients of a step, by value: a polynomial in the part of the step that has passed.
 type Polynomial = [f64; 5];
-
-/// The coefficients of a slope, by powers of the part of the step that has passed.
-type Cubic = [f64; 4];
 
 /// The right side of an equation: the slopes of the values at a time. An error if they are no
 /// finite numbers.
@@ -193,11 +187,6 @@ impl Integrator {
 
     fn push(&mut self, length: f64) {
         cancellation::work(UNITS_FOR_STEP * (1 + self.values.len()));
-        let kept = self.steps.len();
-        if kept >= STEPS_OF_COURSE && kept.is_power_of_two() {
-            let bytes = size_of::<Step>() + self.values.len() * size_of::<Polynomial>();
-            cancellation::ask_for(2 * kept * bytes);
-        }
         let start = self.end;
         self.steps.push(Step { start, length });
         self.end += length;
@@ -281,66 +270,6 @@ fn slope_of(&[_, b, c, d, e]: &Polynomial) -> Cubic {
     [b + c, 2.0 * (d + e - c), -3.0 * (d + 2.0 * e), 4.0 * e]
 }
 
-fn value_of(&[a, b, c, d]: &Cubic, part: f64) -> f64 {
-    a + part * (b + part * (c + part * d))
-}
-
-/// The first place between two parts of a step where a slope changes its sign, if there is one.
-fn first_root(slope: &Cubic, low: f64, high: f64) -> Option<f64> {
-    let &[a, b, c, d] = slope;
-    // By the coefficients of Bernstein, between the least and the greatest of which a polynomial
-    // lies.
-    let corners = [a, a + b / 3.0, a + (2.0 * b + c) / 3.0, a + b + c + d];
-    if corners.iter().all(|&one| one >= 0.0) || corners.iter().all(|&one| one <= 0.0) {
-        return None;
-    }
-    // Between its own extremes a slope changes its sign once at most.
-    let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
-    let q = -(c + c.signum() * root);
-    let mut turns = [q / (3.0 * d), b / q];
-    if turns[1] < turns[0] {
-        turns.swap(0, 1);
-    }
-    let mut left = low;
-    for right in [turns[0], turns[1], high] {
-        if right > left && right <= high {
-            if let Some(found) = root_between(slope, left, right) {
-                return Some(found);
-            }
-            left = right;
-        }
-    }
-    None
-}
-
-/// Where a slope changes its sign, if it does so between two parts of a step: by false position,
-/// with halving where that does not get on.
-fn root_between(slope: &Cubic, mut low: f64, mut high: f64) -> Option<f64> {
-    let (mut below, mut above) = (value_of(slope, low), value_of(slope, high));
-    if below * above >= 0.0 {
-        return None;
-    }
-    let enough = 1e-12 * below.abs().max(above.abs());
-    let mut place = high;
-    for halves in (0..60).map(|round| round % 2 == 1) {
-        place = if halves {
-            f64::midpoint(low, high)
-        } else {
-            low - below * (high - low) / (above - below)
-        };
-        let value = value_of(slope, place);
-        if value.abs() <= enough || high - low < LEAST_PART {
-            break;
-        }
-        if value * below > 0.0 {
-            (low, below) = (place, value);
-        } else {
-            (high, above) = (place, value);
-        }
-    }
-    Some(place)
-}
-
 /// The stages behind the first one: the part of the step, and the weights of the slopes so far. The
 /// last one is the end of the step.
 const STAGES: [(f64, &[f64]); 6] = [
@@ -403,7 +332,7 @@ const DENSE_WEIGHTS: [f64; 7] = [
 mod tests {
     #![expect(clippy::unnecessary_wraps, reason = "equations may fail")]
 
-    use super::{Failure, Integrator, first_root};
+    use super::{Failure, Integrator};
 
     fn decay(_: f64, values: &[f64], slopes: &mut [f64]) -> Result<(), Failure> {
         slopes[0] = -values[0];
@@ -537,24 +466,6 @@ mod tests {
         for (time, before) in times.into_iter().zip(before) {
             assert_eq!(read(&mut integrator, time), before);
         }
-    }
-
-    #[test]
-    fn slopes_change_their_sign_where_their_roots_are() {
-        // (x - 0.2) (x - 0.5) (x - 0.9)
-        let cubic = [-0.09, 0.73, -1.6, 1.0];
-        for (low, root) in [(0.0, 0.2), (0.3, 0.5), (0.6, 0.9)] {
-            let found = first_root(&cubic, low, 1.0).expect("there is one");
-            assert!((found - root).abs() < 1e-8, "{found} instead of {root}");
-        }
-        assert_eq!(first_root(&cubic, 0.95, 1.0), None);
-        assert_eq!(first_root(&cubic, 0.3, 0.4), None);
-        // x - 0.25, and x^2 - 0.25
-        let found = first_root(&[-0.25, 1.0, 0.0, 0.0], 0.0, 1.0);
-        assert_eq!(found, Some(0.25));
-        let found = first_root(&[-0.25, 0.0, 1.0, 0.0], 0.0, 1.0).expect("there is one");
-        assert!((found - 0.5).abs() < 1e-8, "{found}");
-        assert_eq!(first_root(&[1.0, -0.5, 0.0, 0.0], 0.0, 1.0), None);
     }
 
     #[test]

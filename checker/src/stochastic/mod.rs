@@ -10,6 +10,7 @@ mod comparison;
 mod condition;
 mod constants;
 mod correspondence;
+mod cubic;
 mod estimate;
 mod extreme;
 mod failure;

@@ -28,9 +28,9 @@ const GROWTH: f64 = 16.0;
 /// What a look takes: see [`cancellation::work`].
 const UNITS_FOR_LOOK: usize = 256;
 
-/// A condition that is looked at along the motion of clocks.
+/// A condition that is followed along the motion of clocks.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked<'a> {
+pub(super) struct Followed<'a> {
     pub(super) function: FunctionId,
     pub(super) arguments: &'a [i32],
     /// Whether each of its comparisons is linear, and of one clock with a number: so none of them
@@ -191,11 +191,11 @@ impl Motion {
     pub(super) fn mask(
         &mut self,
         machine: &mut Machine<'_>,
-        Asked {
+        Followed {
             function,
             arguments,
             is_simple,
-        }: Asked<'_>,
+        }: Followed<'_>,
         time: f64,
         until: f64,
     ) -> Result<Mask, Failure> {

@@ -35,7 +35,7 @@ use super::condition::Condition;
 use super::constants::{MOVES_OF_A_PLAN, TOLERANCE, ZENO_MOVES, ZENO_TIME};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
-use super::motion::{Asked, Motion};
+use super::motion::{Followed, Motion};
 use super::program::Program;
 use super::windows::Windows;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
@@ -445,7 +445,7 @@ impl Race<'_> {
             }
             _ => return self.machine.mask(condition, &[], ahead),
         };
-        let asked = Asked {
+        let asked = Followed {
             function,
             arguments: &[],
             is_simple: is_linear && self.clocks_of[&function].len() == 1,

@@ -7,7 +7,7 @@ use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
-use crate::stochastic::motion::Asked;
+use crate::stochastic::motion::Followed;
 use crate::stochastic::program::{Channel, Instance, Program, Spot};
 use crate::stochastic::span::Span;
 use crate::stochastic::windows::Windows;
@@ -198,7 +198,7 @@ impl<'a> Race<'a> {
             other => other,
         };
         if let (true, Condition::Timed(function) | Condition::Curved(function)) = (steps, whole) {
-            let asked = Asked {
+            let asked = Followed {
                 function,
                 arguments: values,
                 is_simple: matches!(condition, Condition::Compared(_)),
