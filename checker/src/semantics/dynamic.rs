@@ -118,7 +118,7 @@ impl Checker<'_> {
     }
 
     /// The dynamic template with this name.
-    fn dynamic(&self, name: &str) -> Option<&Dynamic> {
+    pub(super) fn dynamic(&self, name: &str) -> Option<&Dynamic> {
         self.world.dynamics.iter().find(|one| one.name.text == name)
     }
 

@@ -2,12 +2,20 @@
 
 use super::checker::Checker;
 use super::codes;
+use super::scope::{Entity, Scope};
+use super::typed::Expr;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{Formula, Guard, Temporal};
 use crate::syntax::ast;
 
 /// The greatest distance in time that a formula may speak of.
 const GREATEST_DISTANCE: f64 = 1e15;
+
+/// The most values of a quantifier over operators.
+const MOST_VALUES: i64 = 1024;
+
+/// The most conditions on states of a formula with quantifiers.
+const MOST_CONDITIONS: usize = 4096;
 
 /// What the operators of a formula may rely on.
 struct Reading {
@@ -65,7 +73,79 @@ impl Checker<'_> {
                 let (keep, goal) = self.both(keep, goal, reading)?;
                 keep.release(interval?, goal)
             }
+            ast::Formula::Quantified(is_for_all, name, ty, inner) => {
+                self.quantified(*is_for_all, (name, ty), inner, reading)?
+            }
         })
+    }
+
+    /// A formula for all values, or for some: the bound variable stays what it is as time passes.
+    fn quantified(
+        &mut self,
+        is_for_all: bool,
+        (name, ty): (&ast::Name, &ast::TypeExpr),
+        inner: &ast::Formula,
+        reading: &mut Reading,
+    ) -> Option<Temporal> {
+        if let ast::TypeKind::Named(template) = &ty.kind
+            && self.dynamic(&template.text).is_some()
+        {
+            self.error(
+                codes::DYNAMIC_MISUSED,
+                ty.span,
+                "operators over time cannot be asked of each instance of a dynamic template",
+                "let instances count what they do in a global variable, and ask for it",
+            );
+            return None;
+        }
+        let (range, (low, high)) = self.iterated(ty)?;
+        let values = i64::from(high) - i64::from(low) + 1;
+        if values > MOST_VALUES {
+            self.error(
+                codes::RANGE_TOO_LARGE,
+                ty.span,
+                format!("a quantifier over operators over time has more than {MOST_VALUES} values"),
+                "use a smaller range",
+            );
+            return None;
+        }
+        let mut parts = Vec::new();
+        for value in low..=high {
+            self.scopes.push(Scope::default());
+            let value = Expr::int(value, range.clone(), name.span);
+            self.declare(name, Entity::Constant { value, free: false });
+            let part = self.temporal(inner, reading);
+            self.scopes.pop();
+            parts.push(part?);
+            if reading.atoms.len() > MOST_CONDITIONS {
+                self.error(
+                    codes::RANGE_TOO_LARGE,
+                    ty.span,
+                    format!("this formula asks for more than {MOST_CONDITIONS} conditions"),
+                    "use a smaller range",
+                );
+                return None;
+            }
+        }
+        // Halves, so that the tree is not high.
+        while parts.len() > 1 {
+            let mut pairs = parts.into_iter();
+            let mut joined = Vec::new();
+            while let Some(left) = pairs.next() {
+                joined.push(match pairs.next() {
+                    Some(right) if is_for_all => left.and(right),
+                    Some(right) => left.or(right),
+                    None => left,
+                });
+            }
+            parts = joined;
+        }
+        let of_nothing = if is_for_all {
+            Temporal::True
+        } else {
+            Temporal::True.negated()
+        };
+        Some(parts.pop().unwrap_or(of_nothing))
     }
 
     fn both(

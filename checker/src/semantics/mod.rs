@@ -92,6 +92,8 @@ mod members;
 
 mod queries;
 
+mod each;
+
 mod formulas;
 mod value_ranges;
 

@@ -108,31 +108,32 @@ impl Checker<'_> {
     fn simulation(
         &mut self,
         bound: &ast::RunBound,
-        items: &[ast::Expr],
+        items: &[ast::Shown],
         filter: Option<&(Option<ast::Expr>, ast::Expr)>,
     ) -> Option<Simulation> {
         let bound = self.run_bound(bound)?;
         let mut shown = Vec::new();
         for item in items {
-            let value = self.expression(item);
-            self.report_members(&value, item.span);
-            self.expect_pure(&value, "a query");
-            if !value.is_error() && !value.ty.is_number() {
-                self.error(
-                    codes::NUMBER_EXPECTED,
-                    value.span,
-                    format!(
-                        "only numbers can be shown, but this is {}",
-                        value.ty.described()
-                    ),
-                    "name clocks, integers, doubles, or conditions",
-                );
+            for (value, text) in self.shown(item) {
+                self.report_members(&value, value.span);
+                self.expect_pure(&value, "a query");
+                if !value.is_error() && !value.ty.is_number() {
+                    self.error(
+                        codes::NUMBER_EXPECTED,
+                        value.span,
+                        format!(
+                            "only numbers can be shown, but this is {}",
+                            value.ty.described()
+                        ),
+                        "name clocks, integers, doubles, or conditions",
+                    );
+                }
+                shown.push(ShownItem {
+                    is_curved: curved_number(&value).is_some(),
+                    text,
+                    value: self.make_real(value, &[], String::from("query"))?,
+                });
             }
-            shown.push(ShownItem {
-                is_curved: curved_number(&value).is_some(),
-                text: collapse(self.sources.text(item.span)),
-                value: self.make_real(value, &[], String::from("query"))?,
-            });
         }
         let filter = match filter {
             None => None,

@@ -700,10 +700,19 @@ pub enum Statistical {
         /// How long a run is, and how many there are.
         bound: RunBound,
         /// What is shown.
-        items: Vec<Expr>,
+        items: Vec<Shown>,
         /// The number of runs that are shown, and what they must reach.
         filter: Option<(Option<Expr>, Expr)>,
     },
+}
+
+/// What `simulate` shows: an expression, alone or behind `foreach (name : type)`.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// The name and its type, of which each value is shown.
+    pub each: Option<(Name, TypeExpr)>,
+    /// The expression.
+    pub value: Expr,
 }
 
 /// What a probability is asked of.
@@ -773,6 +782,8 @@ pub enum Formula {
     Until(Option<Interval>, Box<Formula>, Box<Formula>),
     /// `f R[a,b] g`
     Release(Option<Interval>, Box<Formula>, Box<Formula>),
+    /// `forall (name : type) f` if the first part is true, else `exists (name : type) f`.
+    Quantified(bool, Name, TypeExpr, Box<Formula>),
 }
 
 impl Formula {
@@ -787,7 +798,8 @@ impl Formula {
             | Formula::And(_, inner)
             | Formula::Or(_, inner)
             | Formula::Until(_, _, inner)
-            | Formula::Release(_, _, inner) => inner.span(),
+            | Formula::Release(_, _, inner)
+            | Formula::Quantified(_, _, _, inner) => inner.span(),
         }
     }
 }

@@ -2,8 +2,8 @@
 //! behind them or without.
 //!
 //! An operator over time binds more loosely than all others, and its last operand extends as far to
-//! the right as it can: `p && q U[0,1] r || s` is `(p && q) U[0,1] (r || s)`. What holds no such
-//! operator is read as an expression, so conditions on states are the same as in all queries.
+//! the right as it can: `p && q U[0,1] r || s` is `(p && q) U[0,1] (r || s)`. So does the body of
+//! a quantifier. What holds no such operator is read as an expression, so conditions on states are the same as in all queries.
 //!
 //! Source: UPPAAL's grammar of MITL. Where we differ: operators over time need no parentheses
 //! around them, and bounds are any constant expressions.
@@ -127,6 +127,9 @@ impl Parser<'_> {
             }
             TokenKind::Exclamation => self.negation(),
             TokenKind::Word if self.at_word("not") => self.negation(),
+            TokenKind::Word if self.at_word("forall") || self.at_word("exists") => {
+                self.quantified_formula()
+            }
             TokenKind::LeftParenthesis => {
                 self.bump();
                 let inner = self.formula();
@@ -135,6 +138,20 @@ impl Parser<'_> {
             }
             _ => Formula::State(self.expression_at(level::AND + 1)),
         }
+    }
+
+    /// `forall (name : type) f`, and the same with `exists`.
+    fn quantified_formula(&mut self) -> Formula {
+        let is_for_all = self.at_word("forall");
+        self.bump();
+        self.expect(TokenKind::LeftParenthesis, "after the quantifier");
+        let name = self.declared_name("the name of the bound variable");
+        self.expect(TokenKind::Colon, "between the variable and its type");
+        let ty = self.type_expr();
+        let height = self.height;
+        self.closing(TokenKind::RightParenthesis, "after the type");
+        let inner = Box::new(self.formula());
+        self.level_above(height, Formula::Quantified(is_for_all, name, ty, inner))
     }
 
     fn negation(&mut self) -> Formula {

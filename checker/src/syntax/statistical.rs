@@ -4,7 +4,9 @@
 //! Source: UPPAAL's language reference, "Statistical Queries". Forms of older versions are read,
 //! too: `simulate 5 [<=10] {a}`, and `?` behind a probability.
 
-use super::ast::{BinaryOp, Estimated, Expr, ExprKind, QueryKind, RunBound, RunLimit, Statistical};
+use super::ast::{
+    BinaryOp, Estimated, Expr, ExprKind, QueryKind, RunBound, RunLimit, Shown, Statistical,
+};
 use super::codes;
 use super::lexer::TokenKind;
 use super::parser::Parser;
@@ -136,9 +138,9 @@ impl Parser<'_> {
         if !self.expect(TokenKind::LeftBrace, "before what is shown") {
             self.skip_rest();
         }
-        let mut items = vec![self.expression()];
+        let mut items = vec![self.shown()];
         while self.eat(TokenKind::Comma) && !self.at(TokenKind::RightBrace) {
-            items.push(self.expression());
+            items.push(self.shown());
         }
         self.closing(TokenKind::RightBrace, "after what is shown");
         let mut filter = None;
@@ -154,6 +156,22 @@ impl Parser<'_> {
             bound,
             items,
             filter,
+        }
+    }
+
+    /// `a`, or `foreach (name : type) a`
+    fn shown(&mut self) -> Shown {
+        let each = self.eat_word("foreach").then(|| {
+            self.expect(TokenKind::LeftParenthesis, "after foreach");
+            let name = self.declared_name("the name of the bound variable");
+            self.expect(TokenKind::Colon, "between the variable and its type");
+            let ty = self.type_expr();
+            self.closing(TokenKind::RightParenthesis, "after the type");
+            (name, ty)
+        });
+        Shown {
+            each,
+            value: self.expression(),
         }
     }
 

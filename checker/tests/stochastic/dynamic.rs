@@ -9,7 +9,7 @@ use checker::semantics::{self, Reading};
 use checker::stochastic::{Outcome, Precision, Runner};
 use checker::syntax;
 
-use super::expect;
+use super::{executors, expect, load};
 
 /// Everybody makes one more at rate 1; there is one at the beginning.
 const YULE: &str = "
@@ -295,4 +295,66 @@ fn misuse_is_refused() {
     );
     refused(&model, "Pr[<=1](<> exists (c : T) c.missing)", &["E0266"]);
     refused(&model, "E<> P.a", &["E0298", "only statistical queries"]);
+}
+
+#[test]
+fn foreach_shows_the_places_of_instances() {
+    let model = BIRTHS_AND_DEATHS;
+    let query =
+        "simulate[<=3; 20]{numOf(P), foreach (p : P) p.a, foreach (p : P) (p.a ? 2.5 : 7.0)}";
+    let (network, query) = load(model, query).unwrap_or_else(|message| panic!("{message}"));
+    let Statistical::Simulation(asked) = &query.kind else {
+        panic!("{} shows runs", query.text);
+    };
+    let places = (asked.items.len() - 1) / 2;
+    assert!(places > 1);
+    assert_eq!(asked.items[1].text, "p.a for p = 0");
+    let [interpreter, jit] = executors(&network);
+    let mut most = 0.0_f64;
+    for executor in [interpreter, jit] {
+        let mut runner = Runner::new(&network, &*executor);
+        for run in 0..20 {
+            let trajectory = runner.trajectory((1, run), asked).expect("there is room");
+            let at = |row: usize, time: f64| {
+                let points = trajectory.points[row].iter();
+                points
+                    .rev()
+                    .find(|point| point.0 <= time)
+                    .map_or(0.0, |point| point.1)
+            };
+            let times = trajectory.points[0].iter().map(|point| point.0);
+            for time in times.chain([3.0]) {
+                let count = at(0, time);
+                most = most.max(count);
+                let there: f64 = (1..=places).map(|row| at(row, time)).sum();
+                let values: f64 = (1..=places).map(|row| at(places + row, time)).sum();
+                assert!((there - count).abs() < 1e-12, "run {run}, {time}");
+                // Who is nowhere is worth 0, not 7.
+                assert!((values - 2.5 * count).abs() < 1e-12, "run {run}, {time}");
+            }
+        }
+    }
+    assert!(most >= 2.0);
+}
+
+#[test]
+fn foreach_shows_the_values_of_a_range() {
+    let model = "int n = 1; process P() { state a { ; 1 }; init a; } system P;";
+    let query = "simulate[<=1; 1]{foreach (i : int[2,4]) 10 * i + n, n}";
+    let (network, query) = load(model, query).unwrap_or_else(|message| panic!("{message}"));
+    let Statistical::Simulation(asked) = &query.kind else {
+        panic!("{} shows runs", query.text);
+    };
+    let [interpreter, _] = executors(&network);
+    let mut runner = Runner::new(&network, &*interpreter);
+    let trajectory = runner.trajectory((1, 0), asked).expect("nothing fails");
+    let last = trajectory
+        .points
+        .iter()
+        .map(|points| points.last().map(|one| one.1));
+    let last: Vec<Option<f64>> = last.collect();
+    assert_eq!(last, [Some(21.0), Some(31.0), Some(41.0), Some(1.0)]);
+    let too_many = load(model, "simulate[<=1; 1]{foreach (i : int[0,4096]) i}");
+    let message = too_many.map(|_| ()).unwrap_err();
+    assert!(message.contains("E0209"), "{message}");
 }

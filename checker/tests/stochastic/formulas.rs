@@ -127,3 +127,55 @@ fn formulas_without_end_and_wrong_bounds_are_refused() {
         "the second bound of an operator",
     );
 }
+
+#[test]
+fn quantifiers_range_over_operators() {
+    let model = "
+        process P(const int[0,2] i) { state p { ; 1 }, q; init p; trans p -> q { }; }
+        system P;";
+    let tail = |time: f64| (-time).exp();
+    expect(
+        model,
+        "Pr(forall (i : int[0,2]) <>[0,1] P(i).q)",
+        (1.0 - tail(1.0)).powi(3),
+    );
+    expect(
+        model,
+        "Pr(exists (i : int[0,2]) <>[0,1] P(i).q)",
+        1.0 - tail(3.0),
+    );
+    // The one that is still there after 1 leaves within 1 more.
+    expect(
+        model,
+        "Pr(forall (i : int[0,0]) (P(i).p && [][0,1] P(i).p) && <>[0,2] P(i).q)",
+        tail(1.0) * (1.0 - tail(1.0)),
+    );
+    expect(
+        model,
+        "Pr(forall (i : int[0,2]) exists (j : int[i,i]) (<>[0,1] P(j).q))",
+        (1.0 - tail(1.0)).powi(3),
+    );
+    expect(model, "Pr(forall (i : int[1,0]) <>[0,1] P(i).q)", 1.0);
+    expect(model, "Pr(exists (i : int[1,0]) <>[0,1] P(i).q)", 0.0);
+    for (query, code) in [
+        ("Pr(forall (i : int[0,1024]) <>[0,1] P(0).q)", "E0209"),
+        (
+            "Pr(forall (i : int[0,99]) exists (j : int[0,99]) <>[0,1] P(0).q)",
+            "E0209",
+        ),
+        ("Pr(forall (i : int[0,3]) <>[0,1] P(i).q)", "E0215"),
+    ] {
+        let message = load(model, query).map(|_| ()).unwrap_err();
+        assert!(message.contains(code), "{query}: {message}");
+    }
+    let model = "
+        dynamic C(); process C() { state a { ; 1 }; init a; }
+        process S() { state s { ; 1 }; init s; trans s -> s { assign spawn C(); }; }
+        system S;";
+    let query = "Pr(forall (c : C) <>[0,1] c.a)";
+    let message = load(model, query).map(|_| ()).unwrap_err();
+    assert!(
+        message.contains("E0298") || message.contains("instance of a dynamic"),
+        "{message}"
+    );
+}
