@@ -103,10 +103,33 @@ MAY_IMPORT: dict[str, set[str]] = {
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"} | {"checker.picture"},
+    "cluster": {"checker", "checker.queries", "errors", "version"},
     "experiment": BASE
-    | {"files", "frames", "grbl", "needle", "nsl", "plan", "drive", "lab", "system", "version"},
+    | {
+        "cluster",
+        "files",
+        "frames",
+        "grbl",
+        "needle",
+        "nsl",
+        "plan",
+        "drive",
+        "lab",
+        "system",
+        "version",
+    },
     "cli": BASE
-    | {"experiment", "files", "needle", "nsl", "plan", "render", "loading", "explanations"}
+    | {
+        "cluster",
+        "experiment",
+        "files",
+        "needle",
+        "nsl",
+        "plan",
+        "render",
+        "loading",
+        "explanations",
+    }
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture", "system"}
     | {"editor", "serve", "verifyta"}
@@ -147,8 +170,8 @@ ONLY_IN: dict[str, set[str]] = {
     "trimesh": {"imaging"},
     "nrrd": {"imaging"},
     "nibabel": {"imaging"},
-    "dask": {"experiment"},
-    "distributed": {"experiment"},
+    "dask": {"cluster"},
+    "distributed": {"cluster"},
     "mcap": {"drive"},
     "lz4": {"drive"},
     "zstandard": {"drive"},
@@ -166,9 +189,10 @@ ONLY_IN: dict[str, set[str]] = {
     "tty": {"grbl"},
     "termios": set(),
     "resource": {"serve"},
-    "threading": {"drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
+    "threading": {"cluster", "drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
     | {"plugins", "serve", "testing"},
     "time": {
+        "cluster",
         "drive",
         "grbl",
         "cli",

@@ -24,7 +24,7 @@ use crate::engine::query_form;
 use crate::exec::Libraries;
 use crate::tuning::PARTS;
 
-use answer::{Answer, InterruptedError, check, check_jointly};
+use answer::{Answer, InterruptedError, block_of_runs, check, check_jointly};
 use convert::{FailedError, RejectedError, rejected, until_signal};
 use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
@@ -91,6 +91,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("PARTS", PARTS.to_vec())?;
     module.add_function(wrap_pyfunction!(check, module)?)?;
     module.add_function(wrap_pyfunction!(check_jointly, module)?)?;
+    module.add_function(wrap_pyfunction!(block_of_runs, module)?)?;
     module.add_function(wrap_pyfunction!(simulate, module)?)?;
     module.add_function(wrap_pyfunction!(walk_exactly, module)?)?;
     module.add_function(wrap_pyfunction!(form_of_query, module)?)?;

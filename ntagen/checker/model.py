@@ -244,6 +244,25 @@ class Model:
             raise Interrupted(answer) from None
         return Answer(raw, query, self._edge_table(), rules)
 
+    def block_of_runs(self, query: str, first: int, count: int, options: Options) -> bytes:
+        """Makes random runs of ``Pr`` or ``E``, for whoever answers the query elsewhere.
+
+        Args:
+            query: The query.
+            first: The number of the first run.
+            count: How many runs; for a comparison of probabilities, how many pairs of runs.
+            options: How the query is answered.
+
+        Returns:
+            The results for `Options.run_source`: bytes that this version of ntagen reads.
+
+        Raises:
+            RejectedError: The query is wrong, or of another kind.
+            KeyboardInterrupt: The user interrupted.
+        """
+        with rejecting():
+            return _checker.block_of_runs(self._raw, query, options, first, count)
+
     def check_jointly(self, queries: Iterable[str | Query], **keywords: Any) -> list[Answer]:  # noqa: ANN401
         """Answers statistical queries so that all their intervals hold together.
 

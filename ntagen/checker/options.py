@@ -34,6 +34,9 @@ Progress = Callable[[int, int, int, int], object]
 RunProgress = Callable[[int, float | None, float | None, float | None], object]
 """Is called with the number of random runs, their estimate, and the ends of its interval."""
 
+RunSource = Callable[[int, int | None], bytes]
+"""Is called with the number of a run, and how many runs are needed at most."""
+
 MAX_PLANS = 1_000_000
 """The default maximum of plans that are listed."""
 
@@ -228,6 +231,14 @@ class Options:
     number, the estimate so far and the ends of its interval; each is ``None`` as long as it is not
     known. The interval is that of as many runs, and was not chosen to be looked at before. What it
     raises ends the runs as Ctrl-C does."""
+
+    run_source: RunSource | None = None
+    """Gives the results of the random runs of ``Pr`` and ``E``, which are then made elsewhere.
+
+    It is called with the number of the next run and, if that is known, how many are needed at most;
+    it returns what `Model.block_of_runs` gives for some runs from this one on, or ``b""`` if
+    nothing is there yet. `ntagen.cluster.runs.DaskRuns` makes them by a cluster.
+    """
 
     def __post_init__(self) -> None:
         if self.threads != "all" and self.threads < 0:

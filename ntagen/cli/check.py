@@ -33,6 +33,7 @@ from ntagen.cli.outcomes import Outcome, exit_code
 from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.run_progress import progress_of, say_interrupted
+from ntagen.cli.spreading import Spreading, dask_option
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
@@ -163,6 +164,7 @@ class _CheckCommand(click.Command):
     help="Answer all Pr and E queries so that all their intervals hold together, with the risk of "
     "--alpha for all of them. Queries with the same bound share their runs.",
 )
+@dask_option
 @engine_options
 @overflow_rule()
 @constant_option()
@@ -184,6 +186,7 @@ def command(
     plans: str | None,
     ranking: str | None,
     joint: bool,
+    dask: str | None,
     given: dict[str, Any],
     overflow: Any,  # noqa: ANN401
     constants: dict[str, str],
@@ -212,6 +215,7 @@ def command(
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
       ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --relative 0.1
       ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --levels "Queue.length"
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --dask tcp://head:8786
 
     \b
     A trace is a run with exact times, which an independent replay has checked. Each step says when
@@ -263,6 +267,7 @@ def command(
     _say_idle_options(
         [query.form for query in todo if query.form], is_environment=loaded.task is not None
     )
+    spreading = Spreading(dask, todo, options, _why_not_spread(joint, allow_external))
     shown.loaded(model_path, loaded.model)
     together = joint_answers(loaded.model, todo, options, quiet=not is_human) if joint else {}
     for number, query in enumerate(todo):
@@ -281,8 +286,12 @@ def command(
             if number in together:
                 answer, found = _unless_wrong(together[number]), None
             else:
-                with progress_of(query.text, query.form, quiet=not is_human) as reports:
-                    answer, found = answered(loaded, query, replace(wanted, **reports), overflow)
+                with (
+                    spreading.source(loaded.model, query, wanted) as source,
+                    progress_of(query.text, query.form, quiet=not is_human) as reports,
+                ):
+                    wanted = replace(wanted, **reports, **source)
+                    answer, found = answered(loaded, query, wanted, overflow)
         except Interrupted as interrupted:
             # The runs until then say something, and that is what the user gets.
             outcomes.append(replace(outcome, answer=interrupted.answer))
@@ -332,6 +341,13 @@ def _require_one_output(targets: Mapping[str, str | None], option_given: str) ->
             raise click.UsageError(
                 f"{option_given} and {option} - both write to standard output; give {option} a FILE"
             )
+
+
+def _why_not_spread(joint: bool, allow_external: Sequence[Path]) -> str:
+    """Why no cluster can make the runs of these queries; empty if one can."""
+    if joint:
+        return "queries of --joint share their runs"
+    return "libraries are loaded by this machine only" if allow_external else ""
 
 
 def _unless_wrong(answer: Answer | InputError) -> Answer:

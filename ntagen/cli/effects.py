@@ -101,7 +101,7 @@ def _of_statistics(
     else:
         notes = [
             f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
-            for name in (*STATISTICAL, "joint")
+            for name in (*STATISTICAL, "joint", "dask")
             if name in given
         ]
         if "seed" in given and values["search"] != "random":

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
+from ntagen.cluster.identity import identity
 from ntagen.experiment.crew import Crew
 from ntagen.experiment.description import Experiment
-from ntagen.experiment.identity import identity
 from ntagen.experiment.making import Block
 from ntagen.experiment.record import Run
 from ntagen.experiment.results import Campaign

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ntagen.cluster.identity import identity
 from ntagen.drive.configure import Configuration
 from ntagen.drive.log import Log
 from ntagen.drive.log_facts import facts_of
@@ -19,7 +20,6 @@ from ntagen.drive.simulate import simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.experiment.description import Row, digest_of
-from ntagen.experiment.identity import identity
 from ntagen.experiment.record import Observer, Profile, Run, Synthesised
 from ntagen.experiment.store import Results, finished_in, new_log
 from ntagen.nsl import Task, load_task
@@ -36,7 +36,7 @@ class Block:
         row: The row; its seeds count for nothing here.
         seeds: The seeds of the runs, in the order in which they are made.
         folder: The folder of the experiment; absolute.
-        version: The ntagen that must make them (`ntagen.experiment.identity`).
+        version: The ntagen that must make them (`ntagen.cluster.identity`).
         logs: Whether each run has a log.
     """
 

@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Final
 
 from ntagen import system
+from ntagen.cluster.identity import identity
 from ntagen.errors import InputError
 from ntagen.experiment.description import Experiment
-from ntagen.experiment.identity import identity
 from ntagen.experiment.record import Run, line_of, run_of
 from ntagen.files import lock, write_files
 

@@ -11,8 +11,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from ntagen.cluster.identity import identity
 from ntagen.experiment.description import Experiment, Row
-from ntagen.experiment.identity import identity
 from ntagen.experiment.paper import PAPER
 from ntagen.experiment.record import Run
 from ntagen.experiment.statistics import Spread, rate_of, spread_of

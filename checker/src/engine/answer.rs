@@ -114,6 +114,8 @@ pub struct Answer {
     pub simulated: Option<Arc<Simulated>>,
     /// How the values of the runs of a statistical query are distributed.
     pub values_of_runs: Option<Arc<ValuesOfRuns>>,
+    /// The results of the runs that alone were wanted, as `stochastic::block` writes them.
+    pub block: Option<Vec<u8>>,
     /// A remark for the user.
     pub message: Option<String>,
     /// Warnings about the query, rendered.
@@ -142,6 +144,7 @@ impl Answer {
             estimate: None,
             simulated: None,
             values_of_runs: None,
+            block: None,
             message: None,
             warnings: Vec::new(),
             evidence: Evidence::default(),

@@ -1,5 +1,6 @@
 //! How a query is answered: every option with its meaning and its default.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
 use crate::stochastic::statistics::Interval;
-use crate::stochastic::{Precision, UnderChoice};
+use crate::stochastic::{Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
 
 /// What runs the code of the model.
@@ -187,6 +188,11 @@ pub struct Options {
     pub under_choice: UnderChoice,
     /// Sees what the runs of a statistical query say while they are made.
     pub run_observer: Option<RunObserver>,
+    /// Where the results of random runs come from, if they are made elsewhere. `simulate`,
+    /// importance splitting and queries that are answered together make their runs here.
+    pub run_source: Option<RunSource>,
+    /// Only the results of runs with these numbers are wanted, for whoever answers the query.
+    pub only_runs: Option<Range<u64>>,
 }
 
 impl Options {

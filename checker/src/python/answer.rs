@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pyo3::exceptions::PyKeyboardInterrupt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -27,7 +27,7 @@ pub(super) fn check(
     query: &str,
     options: &Bound<'_, PyAny>,
 ) -> PyResult<Answer> {
-    let options = options::read(options)?;
+    let (options, raised) = options::read(options)?;
     let inner = model.get();
     let answer = model.py().detach(|| {
         inner.with(|model| {
@@ -40,6 +40,9 @@ pub(super) fn check(
             model.check(&text, &options)
         })
     });
+    if let Some(failure) = raised.failure(model.py()) {
+        return Err(failure);
+    }
     let answer = answer.map_err(rejected)?;
     let is_interrupted = answer.verdict == Verdict::Unknown(StopReason::Interrupted);
     if is_interrupted && answer.estimate.is_none() && answer.simulated.is_none() {
@@ -54,6 +57,43 @@ pub(super) fn check(
         return Err(InterruptedError::new_err((answer,)));
     }
     Ok(answer)
+}
+
+/// Makes runs of a statistical query, from number `first` on: their results, for the `run_source`
+/// of whoever answers the query.
+#[pyfunction]
+pub(super) fn block_of_runs<'py>(
+    model: &Bound<'py, Model>,
+    query: &str,
+    options: &Bound<'py, PyAny>,
+    first: u64,
+    count: u64,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let (options, _) = options::read(options)?;
+    let inner = model.get();
+    let answer = model.py().detach(|| {
+        inner.with(|model| {
+            let text = model.add_query(query);
+            let overflow = model.network().overflow;
+            let options = Options {
+                overflow,
+                run_source: None,
+                only_runs: Some(first..first.saturating_add(count)),
+                ..options
+            };
+            model.check(&text, &options)
+        })
+    });
+    let answer = answer.map_err(rejected)?;
+    match answer.block {
+        Some(block) => Ok(PyBytes::new(model.py(), &block)),
+        None if matches!(answer.verdict, Verdict::Unknown(_)) => {
+            Err(PyKeyboardInterrupt::new_err(()))
+        }
+        None => Err(PyValueError::new_err(format!(
+            "{query}: its runs have no results to count"
+        ))),
+    }
 }
 
 pyo3::create_exception!(
@@ -76,7 +116,7 @@ pub(super) fn check_jointly(
     queries: Vec<String>,
     options: &Bound<'_, PyAny>,
 ) -> PyResult<Vec<Answer>> {
-    let options = options::read(options)?;
+    let (options, _) = options::read(options)?;
     let inner = model.get();
     let answers = model.py().detach(|| {
         inner.with(|model| {

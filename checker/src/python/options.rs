@@ -1,11 +1,14 @@
 //! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use super::convert::{
     code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
@@ -14,14 +17,38 @@ use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
 use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
 use crate::search::reachability::report::Order;
-use crate::stochastic::{MeanMethod, Precision, UnderChoice};
+use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
 
-/// The options that a Python value holds.
-pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
+/// What a function has raised that the engine has called: it ends the work.
+#[derive(Clone, Default)]
+pub(super) struct Raised {
+    is_raised: Arc<AtomicBool>,
+    error: Arc<Mutex<Option<PyErr>>>,
+}
+
+impl Raised {
+    fn note(&self, error: PyErr) {
+        let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        first.get_or_insert(error);
+        self.is_raised.store(true, Ordering::Relaxed);
+    }
+
+    /// What ended the work, if it is something else than the user.
+    pub(super) fn failure(&self, py: Python<'_>) -> Option<PyErr> {
+        let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        first
+            .take()
+            .filter(|error| !error.is_instance_of::<PyKeyboardInterrupt>(py))
+    }
+}
+
+/// The options that a Python value holds, and what its functions will have raised.
+pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
     let text = |name| field::<String>(given, name);
-    let is_raised = Arc::new(AtomicBool::new(false));
-    Ok(Options {
+    let raised = Raised::default();
+    let is_raised = Arc::clone(&raised.is_raised);
+    let options = Options {
         order: order(&text("search")?, field(given, "seed")?)?,
         guide: field(given, "guide")?,
         threads: threads(given)?,
@@ -51,9 +78,34 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Options> {
         precision: precision(given)?,
         under_choice: under_choice(&text("under_choice")?)?,
         run_observer: run_observer(field(given, "run_progress")?, is_raised),
+        run_source: run_source(field(given, "run_source")?, &raised),
         rare: rare_event(given)?,
         ..Options::default()
-    })
+    };
+    Ok((options, raised))
+}
+
+/// How long a source of runs that has raised is not asked again: the work ends before.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// Takes the results of runs from a Python function, and notes what it raises.
+fn run_source(source: Option<Py<PyAny>>, raised: &Raised) -> Option<RunSource> {
+    let source = source?;
+    let raised = raised.clone();
+    Some(RunSource(Arc::new(move |first, most| {
+        if raised.is_raised.load(Ordering::Relaxed) {
+            thread::sleep(PAUSE);
+            return Vec::new();
+        }
+        let block = Python::attach(|py| {
+            let block = source.call1(py, (first, most))?;
+            PyResult::Ok(block.bind(py).cast::<PyBytes>()?.as_bytes().to_vec())
+        });
+        block.unwrap_or_else(|error| {
+            raised.note(error);
+            Vec::new()
+        })
+    })))
 }
 
 /// Shows what runs say until now to a Python function, and notes in `is_raised` if it raises: what

@@ -3,10 +3,10 @@
 //! Results come in the order of run numbers, so what is said does not depend on threads.
 
 use super::behaviour::Behaviour;
+use super::blocks::{Runs, from_anywhere, shown};
 use super::failure::Failure;
-use super::in_order::in_order;
 use super::precision::{Estimate, MeanMethod, Precision};
-use super::run_watch::{Ends, RunWatch};
+use super::run_watch::{Ends, RunWatch, Shown};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,
     ProbabilitySequence, SequentialTest, clopper_pearson,
@@ -264,13 +264,14 @@ pub fn estimate(
 ///
 /// # Errors
 /// A run failed: the one with the least number.
-pub fn estimate_watched(
-    behaviour: Behaviour<'_>,
+pub fn estimate_watched<'a>(
+    runs: impl Into<Runs<'a>>,
     query: &Statistical,
     precision: &Precision,
     ends: &mut dyn RunWatch,
 ) -> Result<Estimate, Failure> {
     let mut collector = Collector::new(query, precision);
+    let most = collector.wanted;
     let mut failure = None;
     let mut push = |value: f64| match collector.push(value) {
         Ok(is_last) => is_last,
@@ -279,32 +280,16 @@ pub fn estimate_watched(
             true
         }
     };
-    let seed = precision.seed;
-    let is_complete = match query {
-        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
-            in_order(
-                behaviour,
-                precision.threads,
-                |runner, run| runner.path((seed, run), bound, path),
-                |outcome| push(f64::from(outcome.satisfied)),
-                ends,
-            )?
-        }
-        Statistical::Expectation {
-            bound,
-            maximum,
-            value,
-            ..
-        } => in_order(
-            behaviour,
-            precision.threads,
-            |runner, run| runner.extreme((seed, run), bound, *value, *maximum),
-            |(value, _)| push(value),
-            ends,
-        )?,
-        Statistical::Comparison { .. } => unreachable!("probabilities are compared by `compare`"),
-        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
-    };
+    let is_complete = from_anywhere(
+        runs.into(),
+        (precision.threads, most),
+        |runner, run| shown(runner, query, (precision.seed, run)),
+        |shown| match shown {
+            Shown::Decided { satisfied, .. } => push(f64::from(satisfied)),
+            Shown::Value(value) => push(value),
+        },
+        ends,
+    )?;
     match failure {
         Some(failure) => Err(failure),
         None => Ok(collector.estimate(is_complete)),

@@ -1,9 +1,8 @@
 //! Answers `Pr[…](…) >= Pr[…](…)`: runs in pairs, until the test decides.
 
-use super::behaviour::Behaviour;
+use super::blocks::{Runs, from_anywhere, pair_of_runs};
 use super::estimate::share;
 use super::failure::Failure;
-use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
 use super::run_watch::Ends;
 use super::statistics::{Decision, DoubleSampling};
@@ -13,16 +12,15 @@ use crate::ir::Statistical;
 /// ever differ, and those that are equal may never be told apart.
 const MOST_PAIRS: u64 = 1_000_000;
 
-/// Answers a comparison; `ends` is asked now and then, with the number of runs so far. Runs 2k and
-/// 2k + 1 are a pair.
+/// Answers a comparison; `ends` is asked now and then, with the number of runs so far.
 ///
 /// # Errors
 /// A run failed: that of the pair with the least number.
 ///
 /// # Panics
 /// The query is no comparison.
-pub fn compare(
-    behaviour: Behaviour<'_>,
+pub fn compare<'a>(
+    runs: impl Into<Runs<'a>>,
     query: &Statistical,
     precision: &Precision,
     mut ends: impl FnMut(u64) -> bool,
@@ -40,15 +38,10 @@ pub fn compare(
     let (mut pairs, mut first, mut second) = (0, 0, 0);
     let said = left.0.runs.max(right.0.runs);
     let most = precision.runs.or(said).unwrap_or(MOST_PAIRS);
-    let seed = precision.seed;
-    in_order(
-        behaviour,
-        precision.threads,
-        |runner, pair| {
-            let left = runner.path((seed, 2 * pair), &left.0, &left.1)?;
-            let right = runner.path((seed, 2 * pair + 1), &right.0, &right.1)?;
-            Ok((left.satisfied, right.satisfied))
-        },
+    from_anywhere(
+        runs.into(),
+        (precision.threads, Some(most)),
+        |runner, pair| pair_of_runs(runner, [left, right], (precision.seed, pair)),
         |(left, right)| {
             pairs += 1;
             first += u64::from(left);

@@ -5,6 +5,7 @@
 
 mod advice;
 mod behaviour;
+mod blocks;
 mod collector;
 mod comparison;
 mod condition;
@@ -38,6 +39,7 @@ mod values_of_runs;
 mod windows;
 
 pub use behaviour::Behaviour;
+pub use blocks::{RunSource, Runs, block};
 pub use collector::{estimate, estimate_watched};
 pub use comparison::compare;
 pub use constants::{ZENO_MOVES, ZENO_TIME};

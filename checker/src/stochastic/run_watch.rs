@@ -1,6 +1,6 @@
 //! Whoever watches runs as they are counted: sees what each of them shows, and may end them.
 
-use super::run::{Outcome, Trajectory};
+use super::run::Trajectory;
 
 /// What a run shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,23 +25,16 @@ pub(super) trait Shows {
     }
 }
 
-impl Shows for Outcome {
+impl Shows for Shown {
     fn shows(&self) -> Option<Shown> {
-        Some(Shown::Decided {
-            satisfied: self.satisfied,
-            at: self.at,
-        })
-    }
-}
-
-/// The value of a run, and its moves.
-impl Shows for (f64, u64) {
-    fn shows(&self) -> Option<Shown> {
-        Some(Shown::Value(self.0))
+        Some(*self)
     }
 }
 
 impl Shows for Trajectory {}
+
+/// The value of a repetition, and its parts.
+impl Shows for (f64, u64) {}
 
 /// Whether the two runs of a pair have what was asked.
 impl Shows for (bool, bool) {}

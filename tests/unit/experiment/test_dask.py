@@ -92,7 +92,7 @@ def test_workers_of_another_version_are_refused(tmp_path: Path, cluster: Any) ->
 @pytest.mark.filterwarnings("ignore")
 def test_a_scheduler_that_is_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="needs ntagen[cluster]")
-    monkeypatch.setattr("ntagen.experiment.dask_crew._CONNECT_S", 0.2)
+    monkeypatch.setattr("ntagen.cluster.workers.CONNECT_S", 0.2)
     with pytest.raises(InputError, match=r"there is no Dask scheduler at tcp://127\.0\.0\.1:9"):
         campaign(written(tmp_path), dask="tcp://127.0.0.1:9", folder=tmp_path / "x")
 

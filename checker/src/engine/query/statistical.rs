@@ -17,8 +17,8 @@ use crate::ir::{EdgeId, Network, RunTimeErrorKind, Statistical, StatisticalQuery
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Estimate, Failure, Rare, RunWatch as _, Simulated, Stand, ValuesOfRuns, ZENO_MOVES, ZENO_TIME,
-    compare, estimate_rare, estimate_watched, simulate,
+    Estimate, Failure, Rare, RunWatch as _, Runs, Simulated, Stand, ValuesOfRuns, ZENO_MOVES,
+    ZENO_TIME, block, compare, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -30,6 +30,7 @@ struct Found {
     simulated: Option<Arc<Simulated>>,
     values: Option<Arc<ValuesOfRuns>>,
     rare: Option<Rare>,
+    block: Option<Vec<u8>>,
 }
 
 impl LoadedModel {
@@ -64,6 +65,11 @@ impl LoadedModel {
         let network = &stochastic.model.network;
         let restriction = self.restriction(query, network, options)?;
         let behaviour = stochastic.behaviour(restriction.as_ref(), options);
+        let runs_anywhere = Runs {
+            behaviour,
+            source: options.run_source.as_ref(),
+        };
+        let may_have_more_room = self.pool < GREATEST_POOL;
         let precision = stochastic.precision(options);
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
@@ -71,6 +77,23 @@ impl LoadedModel {
         let result = watch.bound(|watch| {
             let mut runs = WatchedRuns::new(&compiled.kind, precision.alpha, watch, observer);
             let _hooks = begin_libraries(behaviour, &[&compiled.kind], precision.seed)?;
+            if let Some(numbers) = &options.only_runs
+                && !matches!(compiled.kind, Statistical::Simulation(_))
+            {
+                let (results, failure) =
+                    block(behaviour, &compiled.kind, precision.seed, numbers.clone());
+                // All other failures are found again where the query is answered.
+                if let Some(Failure::RunTime(error)) = failure
+                    && (error.kind == RunTimeErrorKind::Interrupted
+                        || error.kind == RunTimeErrorKind::NoRoom && may_have_more_room)
+                {
+                    return Err(Failure::RunTime(error));
+                }
+                return Ok(Found {
+                    block: Some(results),
+                    ..Found::default()
+                });
+            }
             match &compiled.kind {
                 Statistical::Simulation(asked) => {
                     let ends = |number| runs.ends(number);
@@ -94,14 +117,14 @@ impl LoadedModel {
                 }
                 kind @ Statistical::Comparison { .. } => {
                     let ends = |number| runs.ends(number);
-                    let estimate = compare(behaviour, kind, &precision, ends)?;
+                    let estimate = compare(runs_anywhere, kind, &precision, ends)?;
                     Ok(Found {
                         estimate: Some(estimate),
                         ..Found::default()
                     })
                 }
                 kind => {
-                    let estimate = estimate_watched(behaviour, kind, &precision, &mut runs)?;
+                    let estimate = estimate_watched(runs_anywhere, kind, &precision, &mut runs)?;
                     Ok(Found {
                         estimate: Some(estimate),
                         values: runs.values(kind),
@@ -135,6 +158,7 @@ impl LoadedModel {
                 answer.estimate = found.estimate;
                 answer.simulated = simulated;
                 answer.values_of_runs = found.values;
+                answer.block = found.block;
                 answer
             }
         };

@@ -1,0 +1,304 @@
+"""Random runs on a Dask cluster on loopback: the same answers as on one machine."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ntagen import checker
+from ntagen.checker import Options
+from ntagen.cli import main
+from ntagen.cluster import runs as cluster_runs
+from ntagen.cluster.identity import identity
+from ntagen.cluster.runs import DaskRuns, Job, make_block, why_here
+from ntagen.errors import InputError, NtagenError
+
+MODEL = """
+clock x; int n;
+process Q() { state A { x <= 4 }, B; init A; trans A -> B { guard x >= 2; }; }
+process R() { state A { ; 5 }; init A; trans A -> A { guard n < 9; assign n++; }; }
+system Q, R;
+"""
+REACHED = "Pr[<=3](<> Q.B)"
+
+SLOW = """
+clock x; int n;
+int work(int k) {
+    int i, j;
+    for (i = 0; i < 3000; i++) {
+        for (j = 0; j < 1000; j++) { k = (k * 31 + i + j) % 1009; }
+    }
+    return k % 3;
+}
+process Q() {
+    state A { x <= 4 }, B;
+    init A;
+    trans A -> B { select i : int[0,9]; assign n = work(i); };
+}
+system Q;
+"""
+"""Each run takes tens of milliseconds."""
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """A cluster with two worker processes."""
+    distributed = pytest.importorskip("distributed", reason="needs ntagen[cluster]")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            worker_dashboard_address=None,
+        ) as found:
+            yield found
+
+
+def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    """The JSON of answers without their times."""
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    for line in found:
+        del line["seconds"], line["load_seconds"]
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_json_is_that_of_one_machine(
+    tmp_path: Path,
+    cluster: Any,  # noqa: ANN401
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    words = ["check", str(path), "--json", "--seed", "3", "--epsilon", "0.004"]
+    for query in [
+        REACHED,
+        "Pr[<=3; 20000]([] !Q.B)",
+        "Pr[<=3](<> Q.B) >= 0.49",
+        "Pr[<=3](<> Q.B) >= Pr[<=3](<> n > 8)",
+        "E[<=1; 30000](max: n)",
+    ]:
+        words += ["--query", query]
+    code = main(words)
+    here = lines(capsys)
+    assert main([*words, "--dask", cluster.scheduler_address]) == code
+    assert lines(capsys) == here
+    assert len(here) == 5
+    assert here[0]["runs"] > 20_000
+    assert here[1]["distribution"]["runs"] == 20_000
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_lost_worker_changes_nothing(cluster: Any) -> None:  # noqa: ANN401
+    model, options = checker.load(SLOW), Options(runs=50)
+    query = "Pr[<=3](<> n == 1)"
+    with DaskRuns(cluster.scheduler_address) as runs:
+        client = runs._workers.client
+        victim = next(iter(client.run(os.getpid).values()))
+        killed: list[float] = []
+
+        def kill() -> None:
+            # Blocks are being made from the first moment on.
+            time.sleep(0.5)
+            os.kill(victim, signal.SIGKILL)
+            killed.append(time.monotonic())
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        there = runs.answer(model, query, options)
+        ended = time.monotonic()
+        thread.join()
+    assert killed[0] < ended, "the worker was killed too late"
+    assert there.estimate == checker.load(SLOW).answer(query, options).estimate
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_workers_end_what_nobody_wants(cluster: Any) -> None:  # noqa: ANN401
+    # One run takes for ever.
+    endless = (
+        "int n; process P() { state S { ; 9 }; init S; trans S -> S { assign n = 1 - n; }; } "
+        "system P;"
+    )
+    with DaskRuns(cluster.scheduler_address) as runs:
+        model = checker.load(endless)
+        answer = runs.check(model, "Pr[<=1000000000](<> n > 1)", timeout_s=1.5)
+        assert (answer.verdict, answer.stop) == ("unknown", "time")
+        start = time.monotonic()
+        found = runs.check(checker.load(MODEL), REACHED, runs=1000)
+        assert found.estimate is not None
+        assert found.estimate.runs == 1000
+        assert time.monotonic() - start < 60, "the workers still make the endless runs"
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_what_is_made_here_is_said(
+    tmp_path: Path,
+    cluster: Any,  # noqa: ANN401
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    words = ["check", str(path), "--dask", cluster.scheduler_address]
+    words += ["--query", "simulate[<=3]{n}", "--query", REACHED, "--query", "E<> Q.B"]
+    assert main(words) == 0
+    said = capsys.readouterr().err
+    assert said.splitlines() == [
+        "note: simulate[<=3]{n}: runs are made by this machine: only the runs of Pr and E are made "
+        "by a cluster"
+    ]
+    assert main(["check", str(path), "--query", REACHED, "--dask", "tcp://x:1", "--joint"]) == 0
+    assert "queries of --joint share their runs" in capsys.readouterr().err
+
+
+def test_without_statistical_queries_it_has_no_effect(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    assert main(["check", str(path), "--query", "E<> Q.B", "--dask", "tcp://x:1"]) == 0
+    assert "--dask has no effect here: no query is a statistical one" in capsys.readouterr().err
+
+
+def test_without_dask_there_is_a_hint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    assert main(["check", str(path), "--query", REACHED, "--dask", "tcp://127.0.0.1:9"]) == 2
+    assert "hint: pip install 'ntagen[cluster]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("query", "options", "says"),
+    [
+        (REACHED, Options(), None),
+        ("E[<=3; 9](max: n)", Options(), None),
+        (REACHED + " >= 0.5", Options(), None),
+        (REACHED + " under S", Options(), "where the strategy is"),
+        (REACHED, Options(levels="n"), "importance splitting"),
+        ("simulate[<=3]{n}", Options(), "only the runs of Pr and E"),
+        ("E<> Q.B", Options(), "only the runs of Pr and E"),
+        ("rubbish", Options(), "only the runs of Pr and E"),
+    ],
+)
+def test_which_runs_are_made_elsewhere(query: str, options: Options, says: str | None) -> None:
+    reason = why_here(query, options)
+    assert reason is None if says is None else says in (reason or "")
+
+
+class Done:
+    """A block that is made when it is wanted."""
+
+    def __init__(self, job: Job, first: int, count: int) -> None:
+        self.job, self.first, self.count = job, first, count
+
+    def result(self) -> tuple[bytes, float]:
+        return make_block(self.job, self.first, self.count)
+
+
+class HereClient:
+    """A client whose tasks are done by this process."""
+
+    def __init__(self) -> None:
+        self.blocks: list[tuple[int, int]] = []
+        self.cancelled = 0
+
+    def submit(self, task: Any, *arguments: Any, **_: Any) -> Any:  # noqa: ANN401
+        if task is not make_block:
+            return task(*arguments)
+        _, first, count = arguments
+        self.blocks.append((first, count))
+        return Done(*arguments)
+
+    def as_current(self) -> contextlib.nullcontext[None]:
+        return contextlib.nullcontext()
+
+    def cancel(self, futures: list[Any], **_: Any) -> None:  # noqa: ANN401
+        self.cancelled += len(futures)
+
+
+class HereWorkers:
+    """Three workers that are this process."""
+
+    size = 3
+
+    def __init__(self, _: str) -> None:
+        self.client = HereClient()
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> DaskRuns:
+    """A cluster that is this process."""
+    pytest.importorskip("distributed", reason="needs ntagen[cluster]")
+    monkeypatch.setattr(cluster_runs, "Workers", HereWorkers)
+    found = DaskRuns("tcp://here:1")
+    monkeypatch.setattr("distributed.wait", lambda *_, **__: None)
+    return found
+
+
+def test_blocks_grow_and_are_in_order(here: DaskRuns) -> None:
+    model = checker.load(MODEL)
+    answer = here.check(model, REACHED, epsilon=0.005)
+    assert answer.estimate == model.check(REACHED, epsilon=0.005).estimate
+    client: Any = here._workers.client
+    ends = [first + count for first, count in client.blocks]
+    assert [first for first, _ in client.blocks] == [0, *ends[:-1]]
+    sizes = [count for _, count in client.blocks]
+    assert sizes[0] == 1
+    assert sizes == sorted(sizes)
+    assert client.cancelled > 0
+
+
+def test_no_runs_are_made_that_nobody_needs(here: DaskRuns) -> None:
+    model = checker.load(MODEL)
+    answer = here.check(model, "E[<=3; 5000](max: n)")
+    assert answer.estimate is not None
+    assert answer.estimate.runs == 5000
+    client: Any = here._workers.client
+    assert sum(count for _, count in client.blocks) == 5000
+    assert client.blocks[-1][1] < 1700, "the last runs are shared by all workers"
+
+
+def test_another_version_is_refused() -> None:
+    job = Job("another", MODEL, "wrap", REACHED, Options())
+    with pytest.raises(InputError, match=r"has another version of ntagen(.|\n)*hint: "):
+        make_block(job, 0, 1)
+    right = Job(identity(), MODEL, "wrap", REACHED, Options())
+    block, seconds = make_block(right, 0, 5)
+    assert block == checker.load(MODEL).block_of_runs(REACHED, 0, 5, Options())
+    assert seconds > 0
+
+
+def test_what_a_cluster_cannot_do_is_refused(here: DaskRuns) -> None:
+    with pytest.raises(InputError, match=r"only the runs of Pr and E(.|\n)*hint: "):
+        here.check(checker.load(MODEL), "simulate[<=3]{n}")
+
+
+def test_a_cluster_that_fails_is_a_message(here: DaskRuns, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> tuple[bytes, float]:
+        raise ConnectionError("the scheduler is gone")
+
+    monkeypatch.setattr(Done, "result", broken)
+    with pytest.raises(NtagenError, match=r"failed: ConnectionError: the sch(.|\n)*hint: start"):
+        here.check(checker.load(MODEL), REACHED)
