@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -151,6 +152,22 @@ class OverTime:
     def __repr__(self) -> str:
         return f"<OverTime of {', '.join(self.mean)}: {len(self.times)} moments>"
 
+    def to_json(self) -> dict[str, Any]:
+        """What ``ntagen check --json`` shows of it; what is no finite number is null."""
+        return {
+            "time": _finite(self.times),
+            "runs": self.runs.tolist(),
+            "quantiles": list(self.quantiles),
+            **{
+                name: {text: _finite(values) for text, values in found.items()}
+                for name, found in (
+                    ("mean", self.mean),
+                    ("lower", self.lower),
+                    ("upper", self.upper),
+                )
+            },
+        }
+
     def to_frame(self) -> Any:  # noqa: ANN401  it depends on what is installed
         """A frame of pandas, or of polars: a row for each expression and moment.
 
@@ -198,6 +215,10 @@ class OverTime:
 _TIME: Final = "time [units of the model]"
 
 
+def _finite(values: Floats) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values.tolist()]
+
+
 def over_time(
     runs: Sequence[Trajectory],
     times: Any,  # noqa: ANN401  any array will do
@@ -237,8 +258,10 @@ def over_time(
         some = is_there.any(axis=0)
         columns = np.full((3, len(moments)), np.nan)
         if some.any():
-            columns[0, some] = np.nanmean(table[:, some], axis=0)
-            columns[1:, some] = np.nanquantile(table[:, some], quantiles, axis=0)
+            # Between infinite values there is no quantile.
+            with np.errstate(invalid="ignore"):
+                columns[0, some] = np.nanmean(table[:, some], axis=0)
+                columns[1:, some] = np.nanquantile(table[:, some], quantiles, axis=0)
         found[text] = (columns[0], columns[1], columns[2])
     mean, lower, upper = ({text: one[i] for text, one in found.items()} for i in range(3))
     return OverTime(moments, lasting, mean, lower, upper, quantiles, query)

@@ -86,7 +86,10 @@ def _record(outcome: Outcome) -> dict[str, object]:
     if answer is not None and answer.distribution is not None:
         record["distribution"] = answer.distribution.to_json()
     if answer is not None and outcome.shows_runs:
-        record["trajectories"] = [_trajectory(one) for one in answer.trajectories]
+        runs = answer.trajectories
+        record["trajectories"] = [_trajectory(one) for one in runs]
+        if len(runs) > 1:
+            record["over_time"] = answer.frequency_over_time().to_json()
     if answer is None:
         place = f"{mistake.path}:{mistake.line}:{mistake.column}" if mistake else None
         record |= {"place": place, "code": mistake and mistake.code}

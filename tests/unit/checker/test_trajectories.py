@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import xml.etree.ElementTree as ET
 from types import ModuleType
@@ -11,6 +12,7 @@ import pytest
 
 from ntagen import checker
 from ntagen.checker import Model, Trajectory
+from ntagen.checker.trajectories import over_time
 from ntagen.errors import InputError
 
 MODEL = """
@@ -71,6 +73,27 @@ def test_runs_count_until_their_end(model: Model) -> None:
     assert found.runs[0] == 50
     assert 0 < found.runs[1] < 50
     assert (found.runs[2], np.isnan(found.mean["n"][2])) == (0, True)
+
+
+def test_json_has_the_same_numbers(model: Model) -> None:
+    found = model.check("simulate[<=6; 1000]{Q.B, n} : 50 : Q.B").frequency_over_time()
+    shown = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert list(shown) == ["time", "runs", "quantiles", "mean", "lower", "upper"]
+    assert (shown["time"], shown["runs"]) == (found.times.tolist(), found.runs.tolist())
+    assert shown["quantiles"] == [0.05, 0.95]
+    for name in ("mean", "lower", "upper"):
+        values = getattr(found, name)
+        assert list(shown[name]) == list(values) == ["Q.B", "n"]
+        for text, line in values.items():
+            assert shown[name][text] == line.tolist()
+
+
+def test_what_is_infinite_is_null_in_json() -> None:
+    points = [np.array([[0.0, start], [2.0, start]]) for start in (np.inf, 1.0)]
+    runs = [Trajectory(number, "", {"v": one.tobytes()}) for number, one in enumerate(points)]
+    shown = over_time(runs, [1.0, 3.0], (0.0, 1.0), "").to_json()
+    assert shown["runs"] == [2, 0]
+    assert shown["mean"] == {"v": [None, None]}
 
 
 @pytest.mark.parametrize("quantiles", [(0.9, 0.1), (-0.1, 0.5), (0.5, float("nan"))])

@@ -196,6 +196,24 @@ def test_progress_shows_the_interval_so_far(path: str) -> None:
     assert so_far(3, None, None, None, 0.0) == "3 runs (0/s)"
 
 
+def test_json_says_how_often_it_holds_at_each_moment(
+    path: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    query = "simulate[<=4; 300]{n, Q.B}"
+    assert main(["check", path, "--query", query, "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["over_time"]
+    assert shown["time"][::50] == [0, 1, 2, 3, 4]
+    assert shown["runs"] == [300] * 201
+    # Q.B is reached between 2 and 4, at each moment with the same chance.
+    shares = shown["mean"]["Q.B"][::50]
+    assert shares[:3] == [0, 0, 0]
+    assert shares[3] == pytest.approx(0.5, abs=0.15)
+    assert shares[4] > 0.97
+    assert shown["lower"]["n"][50] <= shown["mean"]["n"][50] <= shown["upper"]["n"][50]
+    assert main(["check", path, "--query", "simulate[<=4; 1]{n}", "--json"]) == 0
+    assert "over_time" not in json.loads(capsys.readouterr().out)
+
+
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
 @pytest.mark.parametrize("query", [REACHED, "E[<=1; 40](max: n)", "simulate[<=3; 20]{n, Q.B}"])
 def test_plot_draws_random_runs(path: str, tmp_path: Path, ending: str, query: str) -> None:
