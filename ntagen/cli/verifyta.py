@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from ntagen.cli.run_progress import progress_of, say_interrupted
 from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart, write_files
@@ -21,6 +23,9 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 """The exit code of every mistake; verdicts have none of their own."""
+
+INTERRUPTED: Final = 130
+"""The exit code if the user has ended random runs, as for every interruption."""
 
 COMPILE_ONLY: Final = "UPPAAL_COMPILE_ONLY"
 """If it is set and not empty, the compiled form of the model is printed and nothing is checked."""
@@ -87,7 +92,7 @@ def _failed(message: str, path: Path) -> int:
 
 def _checked(line: CommandLine, path: Path) -> int:
     """Answers all queries, or prints the compiled form; returns the exit code."""
-    from ntagen.checker import RejectedError
+    from ntagen.checker import Interrupted, RejectedError
     from ntagen.loading import load_file
     from ntagen.verifyta.output import header
     from ntagen.verifyta.places import places_of_queries
@@ -115,10 +120,24 @@ def _checked(line: CommandLine, path: Path) -> int:
         echo(f"Verifying formula {number} at {place}")
         try:
             _answer(line, model, query, number, [p for p in (path, query_path) if p])
+        except Interrupted as interrupted:
+            _show_runs_so_far(line, interrupted.answer)
+            say_interrupted(query.text, len(queries) - number)
+            return INTERRUPTED
         except RejectedError as error:
             # The other queries may be right. A model that fails ends everything.
             code = _failed(str(error), query_path or path)
     return code
+
+
+def _show_runs_so_far(line: CommandLine, answer: Answer) -> None:
+    """Prints what random runs say that the user has ended: it has no verdict."""
+    from ntagen.verifyta.histogram import histogram
+    from ntagen.verifyta.output import INTERRUPTED_RUNS, estimate
+
+    _progress(line, f"{INTERRUPTED_RUNS}\n")
+    for value in [*estimate(answer), *histogram(answer)]:
+        echo(value)
 
 
 def _progress(line: CommandLine, after: str) -> None:
@@ -143,18 +162,16 @@ def _answer(line: CommandLine, model: Model, query: Query, number: int, inputs: 
     if wanted == "fastest" and form is not None and form.kind in _ENDLESS:
         wanted = "any"
     before = os.times().user
-    answer = model.answer(
-        text,
-        Options(
-            search=_SEARCH.get(line.value("--search-order"), "bfs"),
-            **of_model(query.options) | statistical(line.given),
-            trace=wants_trace,
-            wanted_trace=wanted if wants_trace else "any",
-            strategy=form is not None
-            and (form.defines is not None or (wants_trace and form.is_game)),
-            folder=inputs[-1].parent,
-        ),
+    options = Options(
+        search=_SEARCH.get(line.value("--search-order"), "bfs"),
+        **of_model(query.options) | statistical(line.given),
+        trace=wants_trace,
+        wanted_trace=wanted if wants_trace else "any",
+        strategy=form is not None and (form.defines is not None or (wants_trace and form.is_game)),
+        folder=inputs[-1].parent,
     )
+    with progress_of(text, form, quiet=True) as reports:
+        answer = model.answer(text, replace(options, **reports))
     if answer.verdict == "error":
         raise ModelError(answer.message or "the model has a run-time error")
     shown = verdict(answer)

@@ -21,6 +21,9 @@ COMPATIBLE_VERSION: Final = "5.0.0"
 ERASE_LINE: Final = "\x1b[2K"
 """Stands before a verdict if progress is shown."""
 
+INTERRUPTED_RUNS: Final = " -- Interrupted: this is what the runs until now say."
+"""Stands in place of the verdict if the user has ended random runs."""
+
 _TRACES: Final = {"": "no", "0": "some", "1": "shortest", "2": "fastest"}
 _ORDERS: Final = {"1": "depth first", "2": "random depth first"}
 _SPACE: Final = {"0": "no", "2": "aggressive"}
@@ -40,7 +43,7 @@ def help_text() -> str:
         "ntagen in place of UPPAAL's verifyta. MODEL is .xml, .xta or .ta; QUERY is a file of",
         "queries, without which those in MODEL are answered. UPPAAL_COMPILE_ONLY=1 in the",
         "environment prints the compiled form of MODEL (.if) instead. Exit codes: 0 whatever the",
-        "verdicts are, 1 after an error.",
+        "verdicts are, 1 after an error, 130 if interrupted (random runs until then are shown).",
         "",
         "Examples:",
         "  ntagen verifyta model.xml",

@@ -139,6 +139,29 @@ def test_ctrl_c_gives_the_result_so_far(path: str, capsys: pytest.CaptureFixture
     assert record["runs"] == record["distribution"]["runs"]
 
 
+def test_ctrl_c_gives_the_result_so_far_in_verifyta_too(
+    path: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    queries = tmp_path / "model.q"
+    queries.write_text("Pr[<=3](<> Q.B)\n\nE<> Q.B\n", "utf-8")
+    with interrupted_after(0.4):
+        assert main(["verifyta", "-sq", "-E", "0.0001", path, str(queries)]) == 130
+    said = capsys.readouterr()
+    lines = said.out.splitlines()
+    label = lines.index(" -- Interrupted: this is what the runs until now say.")
+    assert lines[label - 1].startswith("Verifying formula 1 at ")
+    found = re.fullmatch(
+        r"\((\d+)/(\d+) runs\) Pr\(<> …\) in \[(.*),(.*)\] \(95% CI\)", lines[label + 1]
+    )
+    assert found is not None
+    assert float(found[3]) < int(found[1]) / int(found[2]) < float(found[4])
+    assert lines[label + 2].startswith("Values in [2")
+    assert len(lines) == label + 3
+    # Clients look for these words.
+    assert "satisfied" not in said.out
+    assert "is answered by the runs until now, and 1 query is not asked" in said.err
+
+
 def test_the_second_ctrl_c_ends_at_once() -> None:
     before = signal.getsignal(signal.SIGINT)
     with ending_at_once_next_time():
