@@ -59,6 +59,8 @@ class Spreading:
         if None in self._reasons.values():
             self._cluster = DaskRuns(address)
             click.get_current_context().call_on_close(self._cluster.close)
+            if not self._cluster.has_workers:
+                say([f"the Dask cluster at {address} has no workers yet, and is waited for"])
 
     @contextlib.contextmanager
     def source(self, model: Model, query: Asked, options: Options) -> Iterator[dict[str, Any]]:

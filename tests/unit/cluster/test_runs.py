@@ -167,6 +167,23 @@ def test_what_is_made_here_is_said(
     assert "queries of --joint share their runs" in capsys.readouterr().err
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_workers_are_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    distributed = pytest.importorskip("distributed", reason="needs ntagen[cluster]")
+    path = tmp_path / "model.xta"
+    path.write_text(MODEL, "utf-8")
+    with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as empty:
+        address = empty.scheduler_address
+        words = ["check", str(path), "--query", REACHED, "--dask", address, "--timeout", "500ms"]
+        assert main(words) == 3
+    said = capsys.readouterr()
+    assert (
+        said.err == f"note: the Dask cluster at {address} has no workers yet, and is waited for\n"
+    )
+    assert "no run has ended until then" in said.out
+
+
 def test_without_statistical_queries_it_has_no_effect(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
