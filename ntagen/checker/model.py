@@ -280,14 +280,24 @@ class Model:
         Raises:
             RejectedError: A query is wrong, or of another kind.
         """
-        return self.answer_jointly([str(query) for query in queries], Options(**keywords))
+        options = Options(**keywords)
+        return self.answer_jointly([(str(query), options) for query in queries])
 
-    def answer_jointly(self, texts: Sequence[str], options: Options) -> list[Answer]:
-        """Answers queries as `check_jointly` does, with all options as one value."""
+    def answer_jointly(self, queries: Sequence[tuple[str, Options]]) -> list[Answer]:
+        """Answers queries as `check_jointly` does, each with its own options.
+
+        Queries share their runs if they have the same bound, seed and step of equations. Each
+        interval has its own risk divided by the number of queries: all hold together but for the
+        mean of the risks. Limits are those of the first query.
+        """
+        texts = [text for text, _ in queries]
         with rejecting():
-            answers = _checker.check_jointly(self._raw, texts, options)
-        edges, rules = self._edge_table(), (options.forced, options.priorities)
-        return [Answer(raw, text, edges, rules) for raw, text in zip(answers, texts, strict=True)]
+            answers = _checker.check_jointly(self._raw, texts, [options for _, options in queries])
+        edges = self._edge_table()
+        return [
+            Answer(raw, text, edges, (options.forced, options.priorities))
+            for raw, (text, options) in zip(answers, queries, strict=True)
+        ]
 
     @by_keywords(Options)
     def synthesize(self, query: str, options: Options) -> Strategy:

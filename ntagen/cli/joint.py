@@ -7,8 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ntagen.cli.asked import Asked
+from ntagen.cli.effects import given_options
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError
+from ntagen.verifyta.statistical import of_model
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options
@@ -24,16 +26,21 @@ def joint_answers(
     Args:
         model: The model.
         queries: All queries.
-        options: How they are to be answered.
+        options: How they are to be answered, unless the file says otherwise of a query.
         quiet: Whether no progress is shown.
     """
     places = [place for place, query in enumerate(queries) if _is_joint(query)]
     if not places:
         return {}
-    texts = [queries[place].text for place in places]
-    with shown_progress(f"{len(texts)} queries together", quiet=quiet) as report:
+    given = given_options()
+    with shown_progress(f"{len(places)} queries together", quiet=quiet) as report:
+        options = replace(options, progress=report)
+        asked = [
+            (query.text, replace(options, **of_model(query.options, given)))
+            for query in (queries[place] for place in places)
+        ]
         try:
-            answers = model.answer_jointly(texts, replace(options, progress=report))
+            answers = model.answer_jointly(asked)
         except InputError as error:
             return dict.fromkeys(places, error)
     return dict(zip(places, answers, strict=True))

@@ -19,6 +19,7 @@ use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, LoadedModel, Options, Verdict};
 use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
+use crate::stochastic::Precision;
 
 /// Answers a query; `options` is an `Options` of `ntagen.checker.options`.
 #[pyfunction]
@@ -109,24 +110,35 @@ fn doubles(py: Python<'_>, numbers: impl Iterator<Item = f64>) -> Bound<'_, PyBy
     PyBytes::new(py, &bytes)
 }
 
-/// Answers statistical queries from the same runs; their intervals hold together.
+/// Answers statistical queries from the same runs; their intervals hold together. There are options
+/// for each; those of the first one count for what is no matter of statistics.
 #[pyfunction]
 pub(super) fn check_jointly(
     model: &Bound<'_, Model>,
     queries: Vec<String>,
-    options: &Bound<'_, PyAny>,
+    options: Vec<Bound<'_, PyAny>>,
 ) -> PyResult<Vec<Answer>> {
-    let (options, _) = options::read(options)?;
+    let options = options.into_iter().map(|one| options::read(&one));
+    let mut all = options.collect::<PyResult<Vec<_>>>()?;
+    if all.len() != queries.len() {
+        return Err(PyValueError::new_err("each query needs options"));
+    }
+    let precisions: Vec<Precision> = all.iter().map(|(options, _)| options.precision).collect();
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let (options, _) = all.swap_remove(0);
     let inner = model.get();
     let answers = model.py().detach(|| {
         inner.with(|model| {
-            let texts: Vec<_> = queries.iter().map(|query| model.add_query(query)).collect();
+            let texts = queries.iter().map(|query| model.add_query(query));
+            let texts: Vec<_> = texts.zip(precisions).collect();
             let overflow = model.network().overflow;
             let options = Options {
                 overflow,
                 ..options
             };
-            model.check_jointly(&texts, &options)
+            model.check_each_jointly(&texts, &options)
         })
     });
     let answers = answers.map_err(rejected)?;

@@ -21,31 +21,32 @@ use super::run::{Runner, watched};
 use super::run_watch::Ends;
 use crate::ir::{Path, RunBound, Statistical};
 
-/// Answers queries for estimates or tests from the same runs; all have the same bound. The risks
-/// of `precision` are those of each query alone. `ends` is asked now and then, with the number of
-/// runs so far.
+/// Answers queries for estimates or tests from the same runs, each with what is asked of it alone;
+/// all have the same bound and the same seed. `ends` is asked now and then, with the number of runs
+/// so far.
 ///
 /// # Errors
 /// A run failed: the one with the least number.
 pub fn estimate_jointly(
     behaviour: Behaviour<'_>,
-    queries: &[&Statistical],
-    precision: &Precision,
+    asked: &[(&Statistical, Precision)],
     ends: impl FnMut(u64) -> bool,
 ) -> Result<Vec<Estimate>, Failure> {
-    let Some(bound) = queries.first().map(|query| bound_of(query)) else {
+    let Some((first, Precision { seed, threads, .. })) = asked.first() else {
         return Ok(Vec::new());
     };
-    let mut collectors: Vec<Collector> = queries
+    let bound = bound_of(first);
+    let queries: Vec<&Statistical> = asked.iter().map(|(query, _)| *query).collect();
+    let mut collectors: Vec<Collector> = asked
         .iter()
-        .map(|query| Collector::new(query, precision))
+        .map(|(query, precision)| Collector::new(query, precision))
         .collect();
     let open: Vec<AtomicBool> = queries.iter().map(|_| AtomicBool::new(true)).collect();
     let mut failure = None;
     in_order(
         behaviour,
-        precision.threads,
-        |runner, run| runner.all((precision.seed, run), bound, queries, &open),
+        *threads,
+        |runner, run| runner.all((*seed, run), bound, &queries, &open),
         |results| {
             let mut is_over = true;
             for ((collector, result), open) in collectors.iter_mut().zip(results).zip(&open) {

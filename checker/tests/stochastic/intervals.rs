@@ -164,6 +164,14 @@ fn relative_widths_are_reached() {
     assert!(mean.upper - mean.lower <= 0.4 * mean.value);
 }
 
+/// The same precision for all queries.
+fn asked_alike<'q>(
+    queries: &[&'q Statistical],
+    precision: Precision,
+) -> Vec<(&'q Statistical, Precision)> {
+    queries.iter().map(|query| (*query, precision)).collect()
+}
+
 #[test]
 fn queries_that_share_runs_have_the_answers_that_they_have_alone() {
     const ASKED: [&str; 6] = [
@@ -192,8 +200,7 @@ fn queries_that_share_runs_have_the_answers_that_they_have_alone() {
         };
         let found = estimate_jointly(
             Behaviour::new(&network, &**executor),
-            &kinds,
-            &precision,
+            &asked_alike(&kinds, precision),
             |_| false,
         )
         .expect("no run fails");
@@ -232,10 +239,9 @@ fn joint_intervals_hold_all_together_as_often_as_promised() {
             alpha: 0.1 / 3.0,
             ..Precision::default()
         };
-        let found = estimate_jointly(Behaviour::new(&network, &*jit), &kinds, &precision, |_| {
-            false
-        })
-        .expect("no run fails");
+        let asked = asked_alike(&kinds, precision);
+        let behaviour = Behaviour::new(&network, &*jit);
+        let found = estimate_jointly(behaviour, &asked, |_| false).expect("no run fails");
         let holds = found
             .iter()
             .zip(1..)

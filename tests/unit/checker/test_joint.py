@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from ntagen.checker import Model, load_file
+from ntagen.checker import Model, Options, load_file
 from ntagen.cli import main
 from ntagen.errors import InputError
 
@@ -67,6 +69,61 @@ def test_other_queries_have_no_part_in_it(model: Model) -> None:
             model.check_jointly([QUERIES[0], query])
     # The model answers on.
     assert model.check(QUERIES[0]).satisfied
+
+
+def test_each_query_may_have_its_own_precision(model: Model) -> None:
+    asked = [
+        (QUERIES[0], Options(epsilon=0.02, alpha=0.02)),
+        ("Pr[<=6](<> Q.B)", Options(runs=300, alpha=0.1)),
+        ("E[<=6; 200](max: n)", Options(seed=9)),
+    ]
+    together = model.answer_jointly(asked)
+    for (query, options), answer in zip(asked, together, strict=True):
+        alone = model.answer(query, replace(options, alpha=options.alpha / 3))
+        assert answer.estimate == alone.estimate
+        # 2 %, 10 % and 5 %, each divided by 3.
+        assert "all 3 intervals hold together at 94.3333 %" in (answer.message or "")
+
+
+XML = """<?xml version="1.0" encoding="utf-8"?>
+<!DOCTYPE nta PUBLIC '-//Uppaal Team//DTD Flat System 1.1//EN'
+  'http://www.it.uu.se/research/group/darts/uppaal/flat-1_2.dtd'>
+<nta>
+  <declaration>clock x;</declaration>
+  <template><name>P</name>
+    <location id="id0"><name>A</name><label kind="exponentialrate">1</label></location>
+    <location id="id1"><name>B</name></location>
+    <init ref="id0"/>
+    <transition><source ref="id0"/><target ref="id1"/></transition>
+  </template>
+  <system>system P;</system>
+  <queries>
+    <query><formula>Pr[&lt;=1](&lt;&gt; P.B)</formula>
+      <option key="--epsilon" value="0.02"/></query>
+    <query><formula>Pr[&lt;=1]([] P.A)</formula>
+      <option key="--alpha" value="0.02"/></query>
+  </queries>
+</nta>
+"""
+
+
+def test_options_of_the_file_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "model.xml"
+    path.write_text(XML, "utf-8")
+
+    def records(*words: str) -> list[dict[str, Any]]:
+        assert main(["check", str(path), "--joint", "--json", *words]) == 0
+        return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+    first, second = records()
+    assert first["upper"] - first["lower"] <= 0.04
+    assert 0.04 < second["upper"] - second["lower"] <= 0.1
+    assert first["confidence"] == pytest.approx(0.975)
+    assert second["confidence"] == pytest.approx(0.99)
+    # What the command line says counts for all.
+    first, second = records("--epsilon", "0.05", "--alpha", "0.1")
+    assert 0.04 < first["upper"] - first["lower"] <= 0.1
+    assert first["confidence"] == second["confidence"] == pytest.approx(0.95)
 
 
 def test_the_command_line_answers_jointly(

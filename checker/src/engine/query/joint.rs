@@ -14,7 +14,7 @@ use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Statistical, StatisticalQuery};
 use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::{Estimate, Precision, bound_of, estimate_jointly};
+use crate::stochastic::{Behaviour, Estimate, Precision, bound_of, estimate_jointly};
 use crate::syntax::ast::QueryText;
 
 impl LoadedModel {
@@ -22,6 +22,17 @@ impl LoadedModel {
     pub fn check_jointly(
         &mut self,
         queries: &[QueryText],
+        options: &Options,
+    ) -> Result<Vec<Answer>, Rejection> {
+        let asked = |query: &QueryText| (query.clone(), options.precision);
+        let queries: Vec<(QueryText, Precision)> = queries.iter().map(asked).collect();
+        self.check_each_jointly(&queries, options)
+    }
+
+    /// The same with what is asked of each query, in place of what `options` say of precision.
+    pub fn check_each_jointly(
+        &mut self,
+        queries: &[(QueryText, Precision)],
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
         self.in_stochastic_reading(options, |kept, stochastic| {
@@ -32,14 +43,18 @@ impl LoadedModel {
     fn joint_answers(
         &mut self,
         stochastic: &mut StochasticModel,
-        queries: &[QueryText],
+        queries: &[(QueryText, Precision)],
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
         let start = Instant::now();
         let mut compiled = Vec::new();
         let mut warnings = Vec::new();
-        for text in queries {
-            let (query, found) = self.joint_query(stochastic, text, options)?;
+        for (text, precision) in queries {
+            let alone = Options {
+                precision: *precision,
+                ..options.clone()
+            };
+            let (query, found) = self.joint_query(stochastic, text, &alone)?;
             compiled.push(query);
             warnings.push(found);
         }
@@ -49,23 +64,31 @@ impl LoadedModel {
         self.prepare_stochastic(stochastic, (first.span, start), options)?;
         let network = &stochastic.model.network;
         let behaviour = stochastic.behaviour(None, options);
+        let threads = stochastic.precision(options).threads;
         let count = compiled.len() as f64;
-        let precision = Precision {
-            alpha: options.precision.alpha / count,
-            beta: options.precision.beta / count,
-            ..stochastic.precision(options)
+        let alone = |precision: &Precision| Precision {
+            alpha: precision.alpha / count,
+            beta: precision.beta / count,
+            threads,
+            ..*precision
         };
+        let precisions: Vec<Precision> = queries.iter().map(|(_, asked)| alone(asked)).collect();
         let start = Instant::now();
         let mut watch = LimitWatch::new(options.limits.clone());
         let kinds: Vec<&Statistical> = compiled.iter().map(|query| &query.kind).collect();
         // The first query of the group whose runs are made.
         let mut at_hand = 0;
         let result = watch.bound(|watch| {
-            let _hooks = begin_libraries(behaviour, &kinds, precision.seed)?;
+            let _hooks = begin_libraries(behaviour, &kinds, precisions[0].seed)?;
             let mut estimates: Vec<Option<Estimate>> = vec![None; compiled.len()];
-            for group in same_bounds(&compiled) {
+            for group in same_runs(&compiled, &precisions) {
                 at_hand = group[0];
-                let kinds: Vec<&Statistical> = group.iter().map(|&i| kinds[i]).collect();
+                let asked: Vec<(&Statistical, Precision)> =
+                    group.iter().map(|&i| (kinds[i], precisions[i])).collect();
+                let behaviour = Behaviour {
+                    fixed_step: precisions[at_hand].discretisation,
+                    ..behaviour
+                };
                 let ends = |runs| {
                     let counters = Counters {
                         explored: runs,
@@ -73,7 +96,7 @@ impl LoadedModel {
                     };
                     watch.look(&counters).is_some()
                 };
-                let found = estimate_jointly(behaviour, &kinds, &precision, ends)?;
+                let found = estimate_jointly(behaviour, &asked, ends)?;
                 for (&index, estimate) in group.iter().zip(found) {
                     estimates[index] = Some(estimate);
                 }
@@ -91,7 +114,7 @@ impl LoadedModel {
             Ok(Ok(estimates)) => estimates,
         };
         let seconds = start.elapsed().as_secs_f64();
-        let together = together(queries.len(), options.precision.alpha);
+        let together = together(&precisions);
         let parts = compiled.iter().zip(estimates).zip(warnings);
         let answers = parts.map(|((query, estimate), warnings)| {
             let verdict = verdict(&query.kind, estimate.as_ref(), &watch);
@@ -146,14 +169,18 @@ impl LoadedModel {
     }
 }
 
-/// The queries by the bound of their runs, in order.
-fn same_bounds(queries: &[StatisticalQuery]) -> Vec<Vec<usize>> {
+/// The queries by the runs that they can share, in order.
+fn same_runs(queries: &[StatisticalQuery], precisions: &[Precision]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (index, query) in queries.iter().enumerate() {
         let bound = bound_of(&query.kind);
         let known = groups.iter_mut().find(|group| {
             let other = bound_of(&queries[group[0]].kind);
-            other.limit == bound.limit && other.value.to_bits() == bound.value.to_bits()
+            let (one, another) = (&precisions[index], &precisions[group[0]]);
+            other.limit == bound.limit
+                && other.value.to_bits() == bound.value.to_bits()
+                && one.seed == another.seed
+                && one.discretisation.map(f64::to_bits) == another.discretisation.map(f64::to_bits)
         });
         match known {
             Some(group) => group.push(index),
@@ -163,9 +190,11 @@ fn same_bounds(queries: &[StatisticalQuery]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// What the intervals promise together; `None` for a single one.
-fn together(queries: usize, alpha: f64) -> Option<String> {
+/// What the intervals promise together: the sum of their risks; `None` for a single one.
+fn together(precisions: &[Precision]) -> Option<String> {
+    let count = precisions.len();
+    let alpha: f64 = precisions.iter().map(|precision| precision.alpha).sum();
     // Without the last digits, which are rounding.
     let percent = (1e6 * (1.0 - alpha)).round() / 1e4;
-    (queries > 1).then(|| format!("all {queries} intervals hold together at {percent} %"))
+    (count > 1).then(|| format!("all {count} intervals hold together at {percent} %"))
 }
