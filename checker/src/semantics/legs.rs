@@ -3,8 +3,8 @@
 //! on from there with the update of the leg.
 //!
 //! That is as published models mean it where nothing can keep the edge from being taken: the
-//! channel must be a broadcast one, which is seen to where its type is known. A leg that receives, or sends
-//! for an edge that has synchronised already, is refused as it stands.
+//! channel must be a broadcast one, which is seen to where its type is known. A leg that receives,
+//! or sends for an edge that has synchronised already, is refused as it stands.
 
 use std::borrow::Cow;
 
