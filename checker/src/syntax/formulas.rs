@@ -2,8 +2,9 @@
 //! behind them or without.
 //!
 //! An operator over time binds more loosely than all others, and its last operand extends as far to
-//! the right as it can: `p && q U[0,1] r || s` is `(p && q) U[0,1] (r || s)`. So does the body of
-//! a quantifier. What holds no such operator is read as an expression, so conditions on states are the same as in all queries.
+//! the right as it can: `p && q U[0,1] r || s` is `(p && q) U[0,1] (r || s)`. So does the body of a
+//! quantifier. What holds no such operator is read as an expression, so conditions on states are
+//! the same as in all queries.
 //!
 //! Source: UPPAAL's grammar of MITL. Where we differ: operators over time need no parentheses
 //! around them, and bounds are any constant expressions.

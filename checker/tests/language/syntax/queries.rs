@@ -119,6 +119,10 @@ fn statistical_queries_are_read() {
         "simulate 5 [<=10] {x} : 2 : p",
         "simulate[<=10; 5]{ x} : 2 : p",
     );
+    check(
+        "simulate [<=10] {x, foreach (c : T) c.n + 1}",
+        "simulate[<=10]{ x (foreach c:T (Add (. c n) 1))}",
+    );
     check("simulate N [#<=10] {x} : p", "simulate[#<=10; N]{ x} : p");
     check(
         "Pr[<=9](<> p) >= Pr[#<=3; 50]([] q)",
@@ -147,6 +151,14 @@ fn formulas_over_time() {
     check(
         "Pr(a && b U[0,1] c || d)",
         "Pr((U[0,1] (And a b) (Or c d)))",
+    );
+    check(
+        "Pr(forall (c : T) p || <>[0,1] q)",
+        "Pr((forall c:T (or p (<>[0,1] q))))",
+    );
+    check(
+        "Pr(!exists (c : T) (X p) && q)",
+        "Pr((not (exists c:T (and (X p) q))))",
     );
     check("Pr(p || <>[0,1] q && r)", "Pr((or p (<>[0,1] (And q r))))");
     check(

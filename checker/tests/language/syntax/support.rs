@@ -3,7 +3,7 @@
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
     Control, Document, Estimated, Expr, ExprKind, Formula, Interval, Objective, Path, Query,
-    QueryKind, RunBound, RunLimit, Statistical, TypeExpr, TypeKind,
+    QueryKind, RunBound, RunLimit, Shown, Statistical, TypeExpr, TypeKind,
 };
 use checker::syntax::{Parsed, parse_query, print_type, read_model};
 
@@ -227,7 +227,7 @@ fn statistical_shape(query: &Statistical) -> String {
 
 fn simulation_shape(
     bound: &RunBound,
-    items: &[Expr],
+    items: &[Shown],
     filter: Option<&(Option<Expr>, Expr)>,
 ) -> String {
     let filter = filter.map_or(String::new(), |(runs, reached)| {
@@ -235,11 +235,16 @@ fn simulation_shape(
         let runs = runs.map_or(String::new(), |runs| format!(" : {}", shape(runs)));
         format!("{runs} : {}", shape(reached))
     });
-    format!(
-        "simulate{}{{{}}}{filter}",
-        bound_shape(bound),
-        shapes(items)
-    )
+    let items: String = items.iter().map(shown_shape).collect();
+    format!("simulate{}{{{items}}}{filter}", bound_shape(bound))
+}
+
+fn shown_shape(shown: &Shown) -> String {
+    let value = shape(&shown.value);
+    match &shown.each {
+        Some((name, ty)) => format!(" (foreach {}:{} {value})", name.text, print_type(ty)),
+        None => format!(" {value}"),
+    }
 }
 
 fn estimated_shape(estimated: &Estimated) -> String {
@@ -267,6 +272,11 @@ fn formula_shape(formula: &Formula) -> String {
         Formula::Next(f) => format!("(X {})", formula_shape(f)),
         Formula::Eventually(i, f) => format!("(<>{} {})", interval(i), formula_shape(f)),
         Formula::Always(i, f) => format!("([]{} {})", interval(i), formula_shape(f)),
+        Formula::Quantified(is_for_all, name, ty, f) => {
+            let word = if *is_for_all { "forall" } else { "exists" };
+            let (ty, f) = (print_type(ty), formula_shape(f));
+            format!("({word} {}:{ty} {f})", name.text)
+        }
         Formula::Until(i, f, g) => {
             format!(
                 "(U{} {} {})",
