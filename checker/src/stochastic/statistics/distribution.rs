@@ -10,9 +10,9 @@
 //! 1 / [`CELLS`] of the bounds at most.
 //!
 //! Sources: P. Massart, "The tight constant in the Dvoretzky-Kiefer-Wolfowitz inequality", Annals
-//! of Probability 18 (1990), for both sides at once; T. W. Anderson (1969), for the mean, as told by
-//! M. Phan, P. Thomas and E. Learned-Miller, "Towards practical mean bounds for small samples", ICML
-//! 2021; C. E. Budde et al., "Sound statistical model checking for probabilities and expected
+//! of Probability 18 (1990), for both sides at once; T. W. Anderson (1969), for the mean, as told
+//! by M. Phan, P. Thomas and E. Learned-Miller, "Towards practical mean bounds for small samples",
+//! ICML 2021; C. E. Budde et al., "Sound statistical model checking for probabilities and expected
 //! rewards", TACAS 2025, who recommend it.
 
 use super::binomial::Interval;
