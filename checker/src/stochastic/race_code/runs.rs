@@ -18,6 +18,8 @@ use crate::stochastic::program::Program;
 
 /// A race of more instructions is not written as code.
 const MOST_INSTRUCTIONS: usize = 100_000;
+/// Of more processes there would be too many instructions anyway.
+const MOST_PROCESSES: usize = 1_000;
 /// Functions of the network that are at most so large are taken into those that call them.
 const SMALL: usize = 60;
 /// Likewise plans and moves, which have one caller each.
@@ -138,7 +140,8 @@ fn is_known(program: &Program<'_>, conditions: &Conditions<'_, '_>) -> bool {
         legs.chain([edge.update.function]).flatten()
     });
     let mut spots = (0..processes as usize).flat_map(|process| program.spots_of(process));
-    program.rated.is_empty()
+    processes as usize <= MOST_PROCESSES
+        && program.rated.is_empty()
         && !program.has_flows
         && !program.places_others()
         && network.before_update.is_none()
