@@ -22,8 +22,8 @@ pub(super) fn first_root(cubic: &Cubic, low: f64, high: f64) -> Option<f64> {
     }
     // Between its extremes a cubic changes its sign once at most.
     let root = (c * c - 3.0 * b * d).max(0.0).sqrt();
-    let q = -(c + c.signum() * root);
-    let mut turns = [q / (3.0 * d), b / q];
+    let sum = -(c + c.signum() * root);
+    let mut turns = [sum / (3.0 * d), b / sum];
     if turns[1] < turns[0] {
         turns.swap(0, 1);
     }

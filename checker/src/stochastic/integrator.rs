@@ -115,10 +115,8 @@ impl Integrator {
         let index = self.step_at(time, slopes)?;
         let Step { start, length } = self.steps[index];
         let part = ((time - start) / length).clamp(0.0, 1.0);
-        let rest = 1.0 - part;
         for polynomial in self.polynomials(index) {
-            let &[a, b, c, d, e] = polynomial;
-            values.push(a + part * (b + rest * (c + part * (d + rest * e))));
+            values.push(read(polynomial, part));
             rates.push(value_of(&slope_of(polynomial), part) / length);
         }
         Ok(())
@@ -263,6 +261,17 @@ impl Integrator {
         self.slopes.swap(0, 6);
         self.push(length);
     }
+}
+
+/// The value of a polynomial.
+fn read(polynomial: &Polynomial, part: f64) -> f64 {
+    let rest = 1.0 - part;
+    let mut value = 0.0;
+    for (place, &coefficient) in polynomial.iter().enumerate().rev() {
+        let factor = if place % 2 == 0 { part } else { rest };
+        value = coefficient + factor * value;
+    }
+    value
 }
 
 /// The slope of a polynomial, where the length of the step is 1.

@@ -290,14 +290,12 @@ fn first_change(
         if !is_between(time, same, other) {
             break;
         }
-        match probe(time)? {
-            Some(longer) => (same, differs_in) = (time, longer),
-            None => {
-                other = time;
-                is_beyond = true;
-                break;
-            }
-        }
+        let Some(longer) = probe(time)? else {
+            other = time;
+            is_beyond = true;
+            break;
+        };
+        (same, differs_in) = (time, longer);
     }
     let mut step = NEAR * other.abs().max(f64::MIN_POSITIVE);
     loop {
