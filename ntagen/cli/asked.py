@@ -59,6 +59,33 @@ def queries_of(model: Model, asked: Sequence[str], file: Path | None) -> list[As
     return from_file or known
 
 
+def with_strategies(model: Model, asked: Sequence[Asked]) -> list[Asked]:
+    """Queries, each after the query of the model that defines the strategy that it is asked under.
+
+    A strategy that is defined by one of the queries before, or nowhere, adds none.
+    """
+    definitions = {
+        query.form.defines: query
+        for query in map(_asked, model.queries)
+        if query.form and query.form.defines
+    }
+    complete: list[Asked] = []
+    added: list[Asked] = []
+
+    def add(query: Asked) -> None:
+        defined = {one.form.defines for one in complete if one.form}
+        uses = query.form and query.form.uses
+        if uses and uses not in defined and uses in definitions:
+            added.append(definitions.pop(uses))
+            add(added[-1])
+        complete.append(query)
+
+    for query in asked:
+        if query not in added:
+            add(query)
+    return complete
+
+
 def is_used_by(query: Asked, later: Sequence[Asked]) -> bool:
     """Whether the strategy that a query defines is used by those after it."""
     name = query.form and query.form.defines

@@ -15,7 +15,7 @@ from ntagen.cli import INTERNAL_ERROR
 from ntagen.cli.against import answer_of, defence_notes
 from ntagen.cli.answer_formats import FORMATS, Format, GitHub, JsonLines, JUnit, Sarif
 from ntagen.cli.answer_rows import Human
-from ntagen.cli.asked import is_used_by, queries_of
+from ntagen.cli.asked import is_used_by, queries_of, with_strategies
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, write_evidence
 from ntagen.cli.joint import joint_answers
@@ -257,7 +257,7 @@ def command(
     with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
         loaded = load_model(model_path, include, overflow, constants, allow_external)
         shown_already = len(loaded.model.warnings)
-        todo = queries_of(loaded.model, asked, query_path)
+        todo = with_strategies(loaded.model, queries_of(loaded.model, asked, query_path))
         if loaded.task is not None:
             # The generated model is no file of the user's.
             todo = [replace(query, place=None) for query in todo]

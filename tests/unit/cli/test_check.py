@@ -120,6 +120,17 @@ def test_queries_of_a_file_and_their_names(
     assert "two files of queries" in err
 
 
+@pytest.mark.parametrize("more", [[], ["ReachFinalTR"]])
+def test_the_strategy_that_a_query_is_asked_under_is_made_before(
+    more: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    chance = str(PAPER.parent / "chance" / "chance.nsl")
+    asked = [part for name in ["ReachProbability", *more] for part in ("--query", name)]
+    assert main(["check", chance, *asked, "--json", "--runs", "50"]) == 0
+    answers = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [answer["name"] for answer in answers] == ["ReachFinalTR", "ReachProbability"]
+
+
 def test_a_limit_is_an_answer(gate: Path, capsys: pytest.CaptureFixture[str]) -> None:
     loop = "--query", "E<> Checker.UR_Reached && Checker.Path_Invalid"
     out, _ = check_run(capsys, 3, PAPER, *loop, "--states", "50", "--json")
