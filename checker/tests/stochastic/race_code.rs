@@ -142,6 +142,22 @@ fn delays_in_windows_are_the_same() {
     all_are_written(WINDOWS, "E[<=40; 9](min: P1.B ? -n : n)");
 }
 
+#[test]
+fn conditions_on_clocks_are_decided_at_the_same_moments() {
+    for query in [
+        "Pr[<=30](<> P1.x > 6.5 && P2.B)",
+        "Pr[<=30](<> g >= 12 && g <= 12.5 && (P1.A || P2.x == 1))",
+        "Pr[<=30]([] P1.x <= 6.5 || n < 3)",
+        "Pr[<=30](P1.x < 6.9 && g != 17 U P3.C && g > 10)",
+        "Pr[<=8](<> g == 8)",
+        "Pr[<=8]([] g < 8)",
+    ] {
+        all_are_written(WINDOWS, query);
+    }
+    let runs = compare(MEETINGS, "Pr[<=100](<> Listener(1).x > 9)", RUNS);
+    assert!(runs.is_some_and(|runs| runs > RUNS / 2), "{runs:?}");
+}
+
 /// Arrays of channels whose numbers are computed on both sides, several inputs of one process,
 /// branches with weights, committed and urgent locations of several processes.
 const MEETINGS: &str = "
@@ -273,7 +289,8 @@ fn what_the_code_does_not_know_is_left_to_the_race() {
         assert_eq!(compare(&model, "Pr[<=4](<> n == 9)", 1), None, "{rest}");
     }
     let model = model("", "state A; init A;");
-    assert_eq!(compare(&model, "Pr[<=4](<> x >= 2)", 1), None);
+    assert_eq!(compare(&model, "Pr[<=4](<> x * x >= 2)", 1), None);
+    assert_eq!(compare(&model, "E[<=4; 9](max: x)", 1), None);
     assert_eq!(compare(&model, "Pr[x<=4](<> n == 9)", 1), None);
     assert_eq!(compare(&model, "Pr[#<=4](<> n == 9)", 1), None);
 }

@@ -46,8 +46,8 @@ impl Watched {
             Watched::Until(keep, goal) => [keep, goal],
             Watched::Extreme(..) => return None,
         };
-        let is_timed = conditions.iter().any(|one| one.is_timed());
-        (!is_timed).then_some(watched)
+        let is_curved = |one: &Condition| matches!(one, Condition::Curved(_));
+        (!conditions.iter().any(is_curved)).then_some(watched)
     }
 }
 

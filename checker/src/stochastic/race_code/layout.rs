@@ -25,6 +25,8 @@ pub(super) struct Layout {
     pub(super) committed: u32,
     /// How long the run has lasted.
     pub(super) time: u32,
+    /// How much later than that what was asked of it has been decided.
+    pub(super) decided_after: u32,
     /// How long it lasts.
     pub(super) bound: u32,
     /// How many moves may be made before the code returns.
@@ -84,6 +86,7 @@ impl Layout {
             stale_words,
             committed: take(1),
             time: take(2),
+            decided_after: take(2),
             bound: take(2),
             moves_left: take(1),
             best: take(2),

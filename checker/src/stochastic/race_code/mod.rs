@@ -20,6 +20,7 @@ mod race_writer;
 mod rounds;
 mod runs;
 mod stages;
+mod watching;
 mod writer;
 
 pub use asked::Asked;

@@ -96,7 +96,7 @@ impl RaceWriter<'_, '_> {
         (broken, done): (BlockId, BlockId),
     ) {
         let bound = self.bound(w, spot, broken);
-        // What a process does that does not try to move at all.
+        // Where the plan of a process goes on that never tries to move.
         let never = w.block();
         let exits = Exits {
             never,

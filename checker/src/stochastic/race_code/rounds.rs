@@ -1,23 +1,13 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
-use super::conditions::require_words;
 use super::plans::tolerant;
 use super::race_writer::{Ids, RaceWriter};
+use super::watching::{GOES_ON, IS_OVER};
 use super::writer::Writer;
 use crate::ir::{BlockId, Function, IntegerOperator, Register, RegisterType, Relation, Urgency};
-use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::program::Spot;
-
-/// What the code of a run returns: it goes on if it is called again;
-pub(super) const GOES_ON: i32 = 0;
-/// what was asked has been reached;
-pub(super) const REACHED: i32 = 1;
-/// what was asked cannot be reached any more;
-pub(super) const MISSED: i32 = 2;
-/// or its bound has been reached.
-pub(super) const IS_OVER: i32 = 3;
 
 /// The processes that may win, by their attempts, with the least of them.
 enum Tree {
@@ -102,8 +92,9 @@ impl RaceWriter<'_, '_> {
         w.at(bounded);
         self.settle_stays(w, (ids, watched), delay, (&moves, free, over));
         w.at(free);
-        self.watch(w, watched);
         let (rest, slack) = self.rest(w);
+        let passing = w.least(delay, rest);
+        self.watch(w, watched, Some(passing));
         let latest_end = w.add(rest, slack);
         let is_late = w.compare_doubles(latest_end, Relation::Less, delay);
         let in_time = w.block();
@@ -115,7 +106,6 @@ impl RaceWriter<'_, '_> {
         w.at(in_time);
         if let Some(tree) = tree {
             let latest = tolerant(w, delay);
-            let passing = w.least(delay, rest);
             self.wait(w, passing, &attempts);
             let tied = w.block();
             tree.find(w, latest, (&moves, tied));
@@ -168,7 +158,7 @@ impl RaceWriter<'_, '_> {
         let passing = w.greatest(delay, zero);
         self.wait_until_the_end(w, passing);
         if let Watched::Extreme(..) = watched {
-            self.watch(w, watched);
+            self.watch(w, watched, None);
         }
         let result = w.integer(IS_OVER);
         w.return_value(Some(result));
@@ -253,7 +243,7 @@ impl RaceWriter<'_, '_> {
         }
         let nobody = w.block();
         w.unless(ties, nobody);
-        self.watch(w, watched);
+        self.watch(w, watched, None);
         let wins: Vec<(i32, BlockId)> = processes
             .iter()
             .map(|&process| (process as i32, moves[process]))
@@ -294,8 +284,9 @@ impl RaceWriter<'_, '_> {
             let all = (0..moves.len()).collect();
             self.let_one_move(w, (ids, watched), (all, false), moves);
             w.at(later);
-            self.watch(w, watched);
             let (rest, slack) = self.rest(w);
+            let passing = w.least(least, rest);
+            self.watch(w, watched, Some(passing));
             let end = w.add(rest, slack);
             let is_over = w.compare_doubles(end, Relation::Less, least);
             w.unless(is_over, stuck);
@@ -328,63 +319,6 @@ impl RaceWriter<'_, '_> {
             w.copy(slack, size);
         });
         (rest, slack)
-    }
-
-    /// Ends the run if what was asked is decided.
-    fn watch(&self, w: &mut Writer, watched: &Watched) {
-        let end_at = |w: &mut Writer, condition: Condition, result: i32, if_it_holds: bool| {
-            if if_it_holds && condition == Condition::Never
-                || !if_it_holds && condition == Condition::Always
-            {
-                return;
-            }
-            let (holds, fails) = (w.block(), w.block());
-            match condition {
-                Condition::Words(function) => {
-                    require_words(w, function, &[], fails);
-                    w.jump(holds);
-                }
-                Condition::Always => w.jump(holds),
-                _ => w.jump(fails),
-            }
-            let (ends, next) = if if_it_holds {
-                (holds, fails)
-            } else {
-                (fails, holds)
-            };
-            w.at(ends);
-            let result = w.integer(result);
-            w.return_value(Some(result));
-            w.at(next);
-        };
-        match *watched {
-            Watched::Eventually(goal) => end_at(w, goal, REACHED, true),
-            Watched::Always(keep) => end_at(w, keep, MISSED, false),
-            Watched::Until(keep, goal) => {
-                end_at(w, goal, REACHED, true);
-                end_at(w, keep, MISSED, false);
-            }
-            Watched::Extreme(value, sign) => {
-                w.call(value, &[]);
-                let value = w.load_double(self.network().chances.result);
-                let sign = w.double(sign);
-                let value = w.multiply(sign, value);
-                let infinity = w.double(f64::INFINITY);
-                let negative = w.negate(value);
-                let size = w.greatest(value, negative);
-                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
-                let wrong = w.block();
-                w.unless(is_finite, wrong);
-                let best = w.load_double(self.layout.best);
-                let best = w.greatest(value, best);
-                w.store_double(self.layout.best, best);
-                let next = w.block();
-                w.jump(next);
-                w.at(wrong);
-                w.give_up();
-                w.at(next);
-            }
-        }
     }
 
     /// Lets time pass, if it is more than none.

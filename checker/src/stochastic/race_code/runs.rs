@@ -5,7 +5,7 @@ use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, RaceWriter};
-use super::rounds::{GOES_ON, IS_OVER, MISSED, REACHED};
+use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
 use crate::cancellation;
 use crate::exec::arithmetic::{double_of_words, double_words};
@@ -217,7 +217,7 @@ impl RaceCode {
                 IS_OVER => None,
                 _ => return None,
             },
-            time: self.double(self.layout.time),
+            time: self.double(self.layout.time) + self.double(self.layout.decided_after),
             moves,
             best: self.double(self.layout.best),
         })

@@ -1,0 +1,186 @@
+//! Code that watches for what is asked of a run, as `stochastic/run.rs` says it: at every state, and
+//! all through the delay behind it.
+
+use super::asked::Watched;
+use super::conditions::require_words;
+use super::race_writer::RaceWriter;
+use super::writer::Writer;
+use crate::ir::{BlockId, IntegerOperator, Register, Relation};
+use crate::stochastic::condition::Condition;
+
+/// What the code of a run returns: it goes on if it is called again;
+pub(super) const GOES_ON: i32 = 0;
+/// what was asked has been reached;
+pub(super) const REACHED: i32 = 1;
+/// what was asked cannot be reached any more;
+pub(super) const MISSED: i32 = 2;
+/// or its bound has been reached.
+pub(super) const IS_OVER: i32 = 3;
+
+/// What a condition says of a moment and of the time behind it: registers of integers, and of the
+/// double that says for how long.
+struct Mask {
+    now: Register,
+    behind: Register,
+    horizon: Register,
+}
+
+impl RaceWriter<'_, '_> {
+    /// Ends the run if what was asked is decided by the state, or within the delay that follows, if
+    /// there is one.
+    pub(super) fn watch(&self, w: &mut Writer, watched: &Watched, delay: Option<Register>) {
+        match *watched {
+            Watched::Eventually(goal) => self.watch_for(w, (Condition::Always, goal), delay),
+            Watched::Always(keep) => self.watch_for(w, (keep, Condition::Never), delay),
+            Watched::Until(keep, goal) => self.watch_for(w, (keep, goal), delay),
+            Watched::Extreme(value, sign) => {
+                w.call(value, &[]);
+                let value = w.load_double(self.network().chances.result);
+                let sign = w.double(sign);
+                let value = w.multiply(sign, value);
+                let infinity = w.double(f64::INFINITY);
+                let negative = w.negate(value);
+                let size = w.greatest(value, negative);
+                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
+                let wrong = w.block();
+                w.unless(is_finite, wrong);
+                let best = w.load_double(self.layout.best);
+                let best = w.greatest(value, best);
+                w.store_double(self.layout.best, best);
+                let next = w.block();
+                w.jump(next);
+                w.at(wrong);
+                w.give_up();
+                w.at(next);
+            }
+        }
+    }
+
+    /// Ends the run if the goal is reached, or what must be kept until then does not hold.
+    fn watch_for(
+        &self,
+        w: &mut Writer,
+        (keep, goal): (Condition, Condition),
+        delay: Option<Register>,
+    ) {
+        let (reached, missed, next) = (w.block(), w.block(), w.block());
+        if keep.is_timed() || goal.is_timed() {
+            self.watch_through(w, (keep, goal), delay, (reached, missed, next));
+        } else {
+            // Both stay what they are until somebody moves.
+            require_not(w, goal, reached);
+            require(w, keep, missed);
+            w.jump(next);
+        }
+        for (block, result) in [(reached, REACHED), (missed, MISSED)] {
+            w.at(block);
+            let result = w.integer(result);
+            w.return_value(Some(result));
+        }
+        w.at(next);
+    }
+
+    /// Looks at all moments of a delay at which a condition may change.
+    fn watch_through(
+        &self,
+        w: &mut Writer,
+        (keep, goal): (Condition, Condition),
+        delay: Option<Register>,
+        (reached, missed, next): (BlockId, BlockId, BlockId),
+    ) {
+        let ahead = w.double(0.0);
+        let head = w.block();
+        w.jump(head);
+        w.at(head);
+        // A run that ends has been decided so much later than its words say.
+        w.store_double(self.layout.decided_after, ahead);
+        let keep = self.mask(w, keep, ahead);
+        let goal = self.mask(w, goal, ahead);
+        let end_unless_open = |w: &mut Writer, goal: Register, keep: Register| {
+            let open = w.block();
+            w.branch(goal, reached, open);
+            w.at(open);
+            w.unless(keep, missed);
+        };
+        end_unless_open(w, goal.now, keep.now);
+        let after = w.block();
+        if let Some(delay) = delay {
+            let is_inside = w.compare_doubles(ahead, Relation::Less, delay);
+            w.unless(is_inside, after);
+            end_unless_open(w, goal.behind, keep.behind);
+            let horizon = w.least(goal.horizon, keep.horizon);
+            let later = w.add(ahead, horizon);
+            let is_inside = w.compare_doubles(later, Relation::LessEqual, delay);
+            w.unless(is_inside, after);
+            let infinity = w.double(f64::INFINITY);
+            let is_finite = w.compare_doubles(later, Relation::Less, infinity);
+            w.unless(is_finite, after);
+            let gets_on = w.compare_doubles(later, Relation::Greater, ahead);
+            w.unless(gets_on, after);
+            w.copy(ahead, later);
+            w.jump(head);
+        } else {
+            w.jump(after);
+        }
+        w.at(after);
+        let none = w.double(0.0);
+        w.store_double(self.layout.decided_after, none);
+        w.jump(next);
+    }
+
+    /// What a condition says of the state after this time, if nothing happens until then.
+    fn mask(&self, w: &mut Writer, condition: Condition, ahead: Register) -> Mask {
+        let chances = &self.network().chances;
+        if let Condition::Timed(function) = condition {
+            w.store_double(chances.ahead, ahead);
+            let mask = w.call_for(function, Vec::new());
+            let (first, second) = (w.integer(1), w.integer(2));
+            return Mask {
+                now: w.arithmetic(IntegerOperator::And, mask, first),
+                behind: w.arithmetic(IntegerOperator::And, mask, second),
+                horizon: w.load_double(chances.result),
+            };
+        }
+        let holds = match condition {
+            Condition::Words(function) => w.call_for(function, Vec::new()),
+            Condition::Always => w.integer(1),
+            _ => w.integer(0),
+        };
+        Mask {
+            now: holds,
+            behind: holds,
+            horizon: w.double(f64::INFINITY),
+        }
+    }
+}
+
+/// Goes on if a condition on words holds, else elsewhere.
+fn require(w: &mut Writer, condition: Condition, otherwise: BlockId) {
+    match condition {
+        Condition::Always => {}
+        Condition::Words(function) => require_words(w, function, &[], otherwise),
+        _ => {
+            w.jump(otherwise);
+            let unreached = w.block();
+            w.at(unreached);
+        }
+    }
+}
+
+/// Goes on if a condition on words does not hold, else elsewhere.
+fn require_not(w: &mut Writer, condition: Condition, otherwise: BlockId) {
+    match condition {
+        Condition::Never => {}
+        Condition::Words(function) => {
+            let next = w.block();
+            let mask = w.call_for(function, Vec::new());
+            w.branch(mask, otherwise, next);
+            w.at(next);
+        }
+        _ => {
+            w.jump(otherwise);
+            let unreached = w.block();
+            w.at(unreached);
+        }
+    }
+}
