@@ -158,6 +158,48 @@ fn conditions_on_clocks_are_decided_at_the_same_moments() {
     assert!(runs.is_some_and(|runs| runs > RUNS / 2), "{runs:?}");
 }
 
+/// Clocks that stand still, run backwards, or at rates that depend on variables of others.
+const RATES: &str = "
+    clock work, cost;
+    int[0, 4] load = 1;
+    broadcast chan done;
+    process Pump() {
+        clock x;
+        state Off { work' == 0 && x <= 6 },
+              On { work' == load && work <= 12; 1 },
+              Back { work' == -2 && work >= 1 && x <= 9 };
+        init Off;
+        trans Off -> On { guard x >= 2; assign work = 0; },
+              On -> Back { guard work >= 4 && work <= 10; sync done!; assign x = 0; },
+              On -> Off { guard work == 11; assign x = 0; },
+              Back -> Off { guard work <= 3; assign x = 0; };
+    }
+    process Load() {
+        state A { ; 2 }, B { cost' == load + 0.5 && cost <= 20 };
+        init A;
+        trans A -> A { guard load < 4; assign load = load + 1; },
+              A -> B { guard load >= 2; assign cost = 0; },
+              B -> A { guard cost >= 10; assign cost = -1.5, load = 0; },
+              B -> B { guard load > 0 && cost >= 3; sync done?; assign load = load - 1; };
+    }
+    system Pump, Load;";
+
+#[test]
+fn clocks_with_rates_are_the_same() {
+    for query in [
+        "Pr[<=60](<> Pump.Back && Load.B && load == 4)",
+        "Pr[<=40]([] work < 9 || cost < 12)",
+        "Pr[<=90](<> work == 0 && cost > 4)",
+        "E[<=50; 9](max: load * 2)",
+    ] {
+        let runs = compare(RATES, query, RUNS);
+        assert!(
+            runs.is_some_and(|runs| runs > RUNS / 2),
+            "{query}: {runs:?}"
+        );
+    }
+}
+
 /// Arrays of channels whose numbers are computed on both sides, several inputs of one process,
 /// branches with weights, committed and urgent locations of several processes.
 const MEETINGS: &str = "
@@ -282,9 +324,9 @@ fn what_the_code_does_not_know_is_left_to_the_race() {
         )
     };
     let binary = "state A { ; 1 }; init A; trans A -> A { sync c!; }, A -> A { sync c?; };";
-    let rated = "state A { x' == 2 }; init A;";
+    let rated = "state A { x' == y && y' == 1 }; init A;";
     let split = "state A { ; 1 }; init A; trans A -> A { guard x <= 1 || x >= 2; };";
-    for (global, rest) in [("chan c;", binary), ("", rated), ("", split)] {
+    for (global, rest) in [("chan c;", binary), ("clock y;", rated), ("", split)] {
         let model = model(global, rest);
         assert_eq!(compare(&model, "Pr[<=4](<> n == 9)", 1), None, "{rest}");
     }

@@ -1,6 +1,7 @@
 //! Conditions in code: whether they hold now, and when they will; the same arithmetic as in
-//! `stochastic/span.rs`, for clocks that run at rate 1.
+//! `stochastic/span.rs`.
 
+use super::layout::Layout;
 use super::writer::Writer;
 use crate::ir::{BlockId, FunctionId, Register, Relation};
 use crate::stochastic::condition::{Condition, Number};
@@ -10,6 +11,7 @@ use crate::stochastic::program::{Program, Spot};
 /// Writes conditions of a program.
 pub(super) struct Conditions<'p, 'a> {
     pub(super) program: &'p Program<'a>,
+    pub(super) layout: &'p Layout,
     /// Where functions leave doubles.
     pub(super) result: u32,
 }
@@ -86,7 +88,12 @@ impl Conditions<'_, '_> {
                 let is_number = w.compare_doubles(gap, Relation::Equal, gap);
                 w.unless(is_number, otherwise);
             }
-            let one = compared(w, relation, gap, otherwise);
+            let one = if self.layout.is_rated(clock) {
+                let slope = w.load_double(clock + 2);
+                rated(w, relation, (gap, slope), otherwise)
+            } else {
+                compared(w, relation, gap, otherwise)
+            };
             span = both(w, span, one, otherwise);
         }
         span
@@ -136,6 +143,93 @@ pub(super) fn require_words(
     let arguments = values.iter().map(|&value| w.integer(value)).collect();
     let mask = w.call_for(function, arguments);
     w.unless(mask, otherwise);
+}
+
+/// When a clock with this rate that is this far above a number stands in a relation to it.
+fn rated(
+    w: &mut Writer,
+    relation: Relation,
+    (gap, slope): (Register, Register),
+    otherwise: BlockId,
+) -> Span {
+    match relation {
+        Relation::LessEqual => at_most(w, (gap, slope), false, otherwise),
+        Relation::Less => at_most(w, (gap, slope), true, otherwise),
+        Relation::GreaterEqual | Relation::Greater => {
+            let (gap, slope) = (w.negate(gap), w.negate(slope));
+            let is_strict = relation == Relation::Greater;
+            at_most(w, (gap, slope), is_strict, otherwise)
+        }
+        Relation::Equal => {
+            let (low, high, zero) = (w.double(0.0), w.double(0.0), w.double(0.0));
+            let (now, ahead, done) = (w.block(), w.block(), w.block());
+            let is_equal = w.compare_doubles(gap, Relation::Equal, zero);
+            w.branch(is_equal, now, ahead);
+            w.at(now);
+            let stands_still = w.compare_doubles(slope, Relation::Equal, zero);
+            let infinity = w.double(f64::INFINITY);
+            w.when(stands_still, |w| w.copy(high, infinity));
+            w.jump(done);
+            w.at(ahead);
+            let rest = w.negate(gap);
+            let moment = w.divide(rest, slope);
+            let is_ahead = w.compare_doubles(moment, Relation::Greater, zero);
+            w.unless(is_ahead, otherwise);
+            let is_finite = w.compare_doubles(moment, Relation::Less, infinity);
+            w.unless(is_finite, otherwise);
+            w.copy(low, moment);
+            w.copy(high, moment);
+            w.jump(done);
+            w.at(done);
+            Span {
+                low: Some(low),
+                high: Some(high),
+            }
+        }
+        Relation::NotEqual => unreachable!("only conjunctions of intervals are taken apart"),
+    }
+}
+
+/// When `gap + slope * t` is at most 0, or below it if `is_strict`.
+fn at_most(
+    w: &mut Writer,
+    (gap, slope): (Register, Register),
+    is_strict: bool,
+    otherwise: BlockId,
+) -> Span {
+    let (low, high, zero) = (w.double(0.0), w.double(f64::INFINITY), w.double(0.0));
+    let relation = if is_strict {
+        Relation::Less
+    } else {
+        Relation::LessEqual
+    };
+    let holds = w.compare_doubles(gap, relation, zero);
+    let (rising, other, done) = (w.block(), w.block(), w.block());
+    let rises = w.compare_doubles(slope, Relation::Greater, zero);
+    w.branch(rises, rising, other);
+    w.at(rising);
+    w.unless(holds, otherwise);
+    let rest = w.negate(gap);
+    let end = w.divide(rest, slope);
+    w.copy(high, end);
+    w.jump(done);
+    w.at(other);
+    let later = w.block();
+    w.branch(holds, done, later);
+    w.at(later);
+    let falls = w.compare_doubles(slope, Relation::Less, zero);
+    w.unless(falls, otherwise);
+    let is_number = w.compare_doubles(gap, Relation::GreaterEqual, zero);
+    w.unless(is_number, otherwise);
+    let fall = w.negate(slope);
+    let begin = w.divide(gap, fall);
+    w.copy(low, begin);
+    w.jump(done);
+    w.at(done);
+    Span {
+        low: Some(low),
+        high: Some(high),
+    }
 }
 
 /// When a clock that is this far above a number stands in a relation to it.

@@ -40,12 +40,15 @@ pub(super) struct Layout {
     pub(super) rate: u32,
     /// The most windows of a plan.
     pub(super) most_windows: u32,
+    /// The clocks whose rates are set, with the double that keeps what a rate was.
+    pub(super) rates: Vec<(u32, u32)>,
     /// All words, those of the state included.
     pub(super) words: u32,
 }
 
 impl Layout {
-    pub(super) fn of(program: &Program<'_>) -> Layout {
+    /// The words of a race whose locations set the rates of these clocks.
+    pub(super) fn of(program: &Program<'_>, rated: &[(u32, u32)]) -> Layout {
         let network = program.network;
         let mut words = network.initial.len() as u32;
         let mut take = |count: u32| {
@@ -95,8 +98,23 @@ impl Layout {
             highs: take(2 * most_windows),
             rate: take(2),
             most_windows,
+            rates: rated.iter().map(|&(_, clock)| (clock, take(2))).collect(),
             words,
         }
+    }
+
+    /// Whether locations set the rate of a clock.
+    pub(super) fn is_rated(&self, clock: u32) -> bool {
+        self.rates.iter().any(|&(one, _)| one == clock)
+    }
+
+    /// The double that keeps what the rate of a clock was.
+    pub(super) fn rate_before(&self, clock: u32) -> u32 {
+        let mut known = self.rates.iter();
+        let (_, word) = known
+            .find(|&&(one, _)| one == clock)
+            .expect("its rate is set");
+        *word
     }
 
     /// The word and the bit that say whether a process plans anew.

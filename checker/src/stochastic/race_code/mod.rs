@@ -1,5 +1,5 @@
-//! The race as code of the network, so that whole runs are compiled: for networks whose clocks run
-//! at rate 1 and whose processes synchronise by broadcast.
+//! The race as code of the network, so that whole runs are compiled: for networks whose clocks have
+//! constant rates and whose processes synchronise by broadcast.
 //!
 //! The code makes the same runs as [`Race`](super::race::Race), bit by bit: the same random
 //! numbers in the same order, the same arithmetic. Whatever is rare or goes wrong it leaves to the
@@ -17,6 +17,7 @@ mod layout;
 mod moves;
 mod plans;
 mod race_writer;
+mod rates;
 mod rounds;
 mod runs;
 mod stages;

@@ -10,6 +10,7 @@ use crate::ir::{
 };
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::program::{Channel, Instance, Spot};
+use crate::stochastic::readers::Reader;
 
 /// More channels are not told apart.
 const MOST_CHANNELS: usize = 32;
@@ -199,6 +200,9 @@ impl<'a> RaceWriter<'_, 'a> {
             Self::for_chosen(w, receiver, done, |w, input| {
                 self.apply(w, input, receiver.branch);
             });
+        }
+        if let Some(renewal) = self.renewal_of_rates {
+            w.call(renewal, &[]);
         }
         // Who has won plans first.
         let (word, bit) = self.layout.stale_bit(process);
@@ -452,25 +456,8 @@ impl<'a> RaceWriter<'_, 'a> {
         update(w, &branch.update, &mover.values);
         let process = mover.process as usize;
         let mut stale = vec![mover.process];
-        let mut places: Vec<(u32, u32)> = Vec::new();
-        for reader in self.program.concerned(mover, number) {
-            match reader.location {
-                None => stale.push(reader.process),
-                Some(_) if reader.process == mover.process => {}
-                Some(location) => places.push((reader.process, location)),
-            }
-        }
-        for (process, location) in places {
-            // Only who is there plans anew.
-            let (word, bit) = self.layout.stale_bit(process as usize);
-            let is_at = w.load(process);
-            let is_there = w.compare_to(is_at, Relation::Equal, location as i32);
-            let bit = w.integer(bit);
-            let bit = w.arithmetic(IntegerOperator::Multiply, is_there, bit);
-            let marked = w.load(word);
-            let marked = w.arithmetic(IntegerOperator::Or, marked, bit);
-            w.store(word, marked);
-        }
+        let readers = self.program.concerned(mover, number);
+        self.mark_readers(w, readers, Some(mover.process));
         let (source, target) = (mover.edge.source, branch.target);
         if source != target {
             let place = w.integer(target.0 as i32);
@@ -487,8 +474,13 @@ impl<'a> RaceWriter<'_, 'a> {
             }
             stale.extend(self.program.followers(crate::ir::ProcessId(mover.process)));
         }
+        self.mark_processes(w, stale);
+    }
+
+    /// Lets processes plan anew.
+    fn mark_processes(&self, w: &mut Writer, processes: impl IntoIterator<Item = u32>) {
         let mut masks = vec![0; self.layout.stale_words as usize];
-        for process in stale {
+        for process in processes {
             let (word, bit) = self.layout.stale_bit(process as usize);
             masks[(word - self.layout.stale) as usize] |= bit;
         }
@@ -496,6 +488,26 @@ impl<'a> RaceWriter<'_, 'a> {
             if mask != 0 {
                 mark(w, word, mask);
             }
+        }
+    }
+
+    /// Lets those plan anew who are where their plans depend on what has changed; `but` does so
+    /// anyway.
+    pub(super) fn mark_readers(&self, w: &mut Writer, readers: &[Reader], but: Option<u32>) {
+        let everywhere = readers.iter().filter(|reader| reader.location.is_none());
+        self.mark_processes(w, everywhere.map(|reader| reader.process));
+        for reader in readers {
+            let Some(location) = reader.location.filter(|_| Some(reader.process) != but) else {
+                continue;
+            };
+            let (word, bit) = self.layout.stale_bit(reader.process as usize);
+            let is_at = w.load(reader.process);
+            let is_there = w.compare_to(is_at, Relation::Equal, location as i32);
+            let bit = w.integer(bit);
+            let bit = w.arithmetic(IntegerOperator::Multiply, is_there, bit);
+            let marked = w.load(word);
+            let marked = w.arithmetic(IntegerOperator::Or, marked, bit);
+            w.store(word, marked);
         }
     }
 

@@ -143,7 +143,11 @@ impl RaceWriter<'_, '_> {
             return None;
         };
         let bounds = &self.program.comparisons(place).bounds;
-        let is_finite = bounds.iter().any(|(_, relation, number)| {
+        // A clock with another rate may stand still.
+        let mut plain = bounds
+            .iter()
+            .filter(|(clock, _, _)| !self.layout.is_rated(*clock));
+        let is_finite = plain.any(|(_, relation, number)| {
             let is_upper = matches!(
                 relation,
                 Relation::Less | Relation::LessEqual | Relation::Equal

@@ -20,6 +20,8 @@ pub(super) struct RaceWriter<'p, 'a> {
     pub(super) conditions: Conditions<'p, 'a>,
     /// Draws a delay in windows.
     pub(super) in_windows: FunctionId,
+    /// Sets the rates of clocks, if some location does.
+    pub(super) renewal_of_rates: Option<FunctionId>,
 }
 
 impl<'a> RaceWriter<'_, 'a> {

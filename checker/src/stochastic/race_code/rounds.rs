@@ -62,6 +62,10 @@ impl RaceWriter<'_, '_> {
         let w = &mut w;
         let processes = layout.attempts.len();
         let (round, over) = (w.block(), w.block());
+        if let Some(renewal) = self.renewal_of_rates {
+            // At the start of a run.
+            w.call(renewal, &[]);
+        }
         w.jump(round);
         w.at(round);
         self.plan_anew(w, ids);
@@ -352,7 +356,13 @@ impl RaceWriter<'_, '_> {
     fn advance(&self, w: &mut Writer, delay: Register) {
         for &clock in &self.network().chances.clocks {
             let value = w.load_double(clock);
-            let value = w.add(value, delay);
+            let passed = if self.layout.is_rated(clock) {
+                let rate = w.load_double(clock + 2);
+                w.multiply(rate, delay)
+            } else {
+                delay
+            };
+            let value = w.add(value, passed);
             w.store_double(clock, value);
         }
         let time = w.load_double(self.layout.time);

@@ -5,6 +5,7 @@ use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, RaceWriter};
+use super::rates::rated_clocks;
 use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
 use crate::cancellation;
@@ -41,9 +42,11 @@ impl WrittenRace {
     /// Writes the race of a network; `None` if it has what the code does not know.
     pub(super) fn of(program: &Program<'_>, watched: &Watched) -> Option<WrittenRace> {
         let network = program.network;
-        let layout = Layout::of(program);
+        let rated = rated_clocks(program)?;
+        let layout = Layout::of(program, &rated);
         let conditions = Conditions {
             program,
+            layout: &layout,
             result: network.chances.result,
         };
         if !is_known(program, &conditions) {
@@ -56,8 +59,13 @@ impl WrittenRace {
             layout: &layout,
             conditions,
             in_windows: FunctionId(first),
+            renewal_of_rates: (!rated.is_empty()).then_some(FunctionId(first + 1)),
         };
         functions.push(writer.windows());
+        if !rated.is_empty() {
+            let renewal = writer.renewal_of_rates();
+            functions.push(inlined(renewal, &network.functions, (SMALL, MOST_TAKEN_IN)));
+        }
         let mut instructions = 0;
         let mut add = |function: Function, largest: usize| {
             let function = inlined(function, &functions, (largest, MOST_TAKEN_IN));
@@ -141,7 +149,6 @@ fn is_known(program: &Program<'_>, conditions: &Conditions<'_, '_>) -> bool {
     });
     let mut spots = (0..processes as usize).flat_map(|process| program.spots_of(process));
     processes as usize <= MOST_PROCESSES
-        && program.rated.is_empty()
         && !program.has_flows
         && !program.places_others()
         && network.before_update.is_none()

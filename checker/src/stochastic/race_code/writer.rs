@@ -227,6 +227,10 @@ impl Writer {
         self.doubles(DoubleOperator::Multiply, left, right)
     }
 
+    pub(super) fn divide(&mut self, left: Register, right: Register) -> Register {
+        self.doubles(DoubleOperator::Divide, left, right)
+    }
+
     pub(super) fn least(&mut self, left: Register, right: Register) -> Register {
         self.doubles(DoubleOperator::Minimum, left, right)
     }
@@ -336,6 +340,18 @@ impl Writer {
             arguments: vec![argument],
             stream: word_of_state(self.stream, None),
             site: NOWHERE,
+        });
+        target
+    }
+
+    /// Whether so many words at two places are the same: 0 or 1.
+    pub(super) fn same_words(&mut self, (left, right): (u32, u32), words: u32) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.push(Instruction::EqualWords {
+            target,
+            left: word_of_state(left, None),
+            right: word_of_state(right, None),
+            words,
         });
         target
     }

@@ -1,0 +1,91 @@
+//! Code that sets the rates of clocks, as `stochastic/race/transition.rs` says it, where each clock
+//! has its rate from one process only.
+
+use std::collections::BTreeSet;
+
+use super::race_writer::RaceWriter;
+use super::writer::Writer;
+use crate::ir::{BlockId, Function, IntegerOperator, Relation};
+use crate::stochastic::program::Program;
+
+/// The clocks whose rates some location of a process sets.
+fn clocks_of(program: &Program<'_>, process: u32) -> BTreeSet<u32> {
+    let locations = &program.network.processes[process as usize].locations;
+    let clocks = locations.iter().flat_map(|one| &one.chances.rated_clocks);
+    clocks.copied().collect()
+}
+
+/// The clocks with rates that are set, by the process that sets them; `None` if some clock has its
+/// rate from several.
+pub(super) fn rated_clocks(program: &Program<'_>) -> Option<Vec<(u32, u32)>> {
+    let mut found = Vec::new();
+    for &process in &program.rated {
+        let clocks = clocks_of(program, process);
+        found.extend(clocks.into_iter().map(|clock| (process, clock)));
+    }
+    let different: BTreeSet<u32> = found.iter().map(|&(_, clock)| clock).collect();
+    (different.len() == found.len()).then_some(found)
+}
+
+impl RaceWriter<'_, '_> {
+    /// The function that lets those set rates who plan anew, and finds whose plans that concerns.
+    pub(super) fn renewal_of_rates(&self) -> Function {
+        let mut w = self.writer("rates of clocks", (0, None));
+        let w = &mut w;
+        for &process in &self.program.rated {
+            let (word, bit) = self.layout.stale_bit(process as usize);
+            let (marked, bit) = (w.load(word), w.integer(bit));
+            let is_stale = w.arithmetic(IntegerOperator::And, marked, bit);
+            w.when(is_stale, |w| self.set_rates(w, process));
+        }
+        w.return_value(None);
+        std::mem::replace(w, self.writer("", (0, None))).finish()
+    }
+
+    fn set_rates(&self, w: &mut Writer, process: u32) {
+        let clocks = clocks_of(self.program, process);
+        for &clock in &clocks {
+            let before = w.load_double(clock + 2);
+            w.store_double(self.layout.rate_before(clock), before);
+            let one = w.double(1.0);
+            w.store_double(clock + 2, one);
+        }
+        let (start, done) = (w.block(), w.block());
+        let location = w.load(process);
+        w.jump(start);
+        let mut places: Vec<(i32, BlockId)> = Vec::new();
+        let locations = &self.network().processes[process as usize].locations;
+        for (number, location) in (0..).zip(locations) {
+            let Some(rates) = location.chances.rates else {
+                places.push((number, done));
+                continue;
+            };
+            let (block, wrong) = (w.block(), w.block());
+            places.push((number, block));
+            w.at(block);
+            w.call(rates, &[]);
+            for &clock in &location.chances.rated_clocks {
+                let rate = w.load_double(clock + 2);
+                let negative = w.negate(rate);
+                let size = w.greatest(rate, negative);
+                let infinity = w.double(f64::INFINITY);
+                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
+                w.unless(is_finite, wrong);
+            }
+            w.jump(done);
+            w.at(wrong);
+            w.give_up();
+        }
+        w.at(start);
+        w.select(location, &places);
+        w.at(done);
+        for clock in clocks {
+            let Some(readers) = self.program.rate_readers.get(&clock) else {
+                continue;
+            };
+            let is_same = w.same_words((self.layout.rate_before(clock), clock + 2), 2);
+            let is_other = w.compare_to(is_same, Relation::Equal, 0);
+            w.when(is_other, |w| self.mark_readers(w, readers, None));
+        }
+    }
+}
