@@ -1,5 +1,5 @@
-//! Code that watches for what is asked of a run, as `stochastic/run.rs` says it: at every state, and
-//! all through the delay behind it.
+//! Code that watches for what is asked of a run, as `stochastic/run.rs` says it: at every state,
+//! and all through the delay behind it.
 
 use super::asked::Watched;
 use super::conditions::require_words;
