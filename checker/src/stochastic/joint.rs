@@ -2,7 +2,8 @@
 //! all of them.
 //!
 //! Watching changes nothing, so each query sees the results that it would see alone. A query that
-//! has seen enough is not watched for any more.
+//! has seen enough is not watched for any more. When that is found depends on the threads, so a run
+//! may be longer than it must: a failure counts only for queries that were not decided before.
 //!
 //! With a risk of alpha / k for each of k queries, all intervals hold together but for a risk of
 //! alpha, whatever the queries have to do with each other (C. E. Bonferroni, "Teoria statistica
@@ -18,7 +19,7 @@ use super::in_order::in_order;
 use super::mitl::Watch;
 use super::precision::{Estimate, Precision};
 use super::run::{Runner, watched};
-use super::run_watch::Ends;
+use super::run_watch::{Ends, Shows};
 use crate::ir::{Path, RunBound, Statistical};
 
 /// Answers queries for estimates or tests from the same runs, each with what is asked of it alone;
@@ -46,15 +47,19 @@ pub fn estimate_jointly(
     in_order(
         behaviour,
         *threads,
-        |runner, run| runner.all((*seed, run), bound, &queries, &open),
-        |results| {
+        |runner, run| Ok(runner.all((*seed, run), bound, &queries, &open)),
+        |run| {
             let mut is_over = true;
-            for ((collector, result), open) in collectors.iter_mut().zip(results).zip(&open) {
+            let results = collectors.iter_mut().zip(run.results);
+            for ((collector, result), open) in results.zip(&open) {
                 // A run that began before the query was closed has a result that does not count.
                 if !open.load(Ordering::Relaxed) {
                     continue;
                 }
-                let result = result.expect("open queries are watched for");
+                let Some(result) = result else {
+                    failure = run.failure;
+                    return true;
+                };
                 match collector.push(result) {
                     Ok(is_last) => open.store(!is_last, Ordering::Relaxed),
                     Err(found) => {
@@ -104,15 +109,24 @@ enum Seen<'q> {
     Extreme(Extreme, bool),
 }
 
+/// What a run says of several queries.
+struct JointRun {
+    /// By query: the result; none if it is closed, or was not decided before the run failed.
+    results: Vec<Option<f64>>,
+    failure: Option<Failure>,
+}
+
+impl Shows for JointRun {}
+
 impl Runner<'_> {
-    /// The results of run number `run` of a seed, for each query that is open when it begins.
+    /// What run number `run` of a seed says of each query that is open when it begins.
     fn all(
         &mut self,
         (seed, run): (u64, u64),
         bound: &RunBound,
         queries: &[&Statistical],
         open: &[AtomicBool],
-    ) -> Result<Vec<Option<f64>>, Failure> {
+    ) -> JointRun {
         let mut seen: Vec<Seen<'_>> = queries
             .iter()
             .zip(open)
@@ -129,7 +143,7 @@ impl Runner<'_> {
                 _ => Seen::Open,
             })
             .collect();
-        self.until_bound((seed, run), bound, &mut |race, delay| {
+        let ended = self.until_bound((seed, run), bound, &mut |race, delay| {
             let mut is_over = true;
             for (query, seen) in queries.iter().zip(&mut seen) {
                 match (&mut *seen, query) {
@@ -161,21 +175,23 @@ impl Runner<'_> {
                 }
             }
             Ok(is_over)
-        })?;
+        });
+        let mut failure = ended.err();
         let mut results = Vec::with_capacity(seen.len());
         for (query, seen) in queries.iter().zip(&mut seen) {
-            if let Seen::Extreme(extreme, _) = seen {
-                extreme.look(&mut self.race.machine)?;
+            if let (Seen::Extreme(extreme, _), None) = (&mut *seen, &failure) {
+                failure = extreme.look(&mut self.race.machine).err();
             }
             results.push(match seen {
+                Seen::Decided(satisfied) => Some(f64::from(*satisfied)),
                 Seen::Closed => None,
+                _ if failure.is_some() => None,
                 Seen::Open => Some(f64::from(holds_at_the_end(query))),
                 Seen::Formula(watch) => Some(f64::from(watch.finish())),
-                Seen::Decided(satisfied) => Some(f64::from(*satisfied)),
                 Seen::Extreme(extreme, _) => Some(extreme.value()),
             });
         }
-        Ok(results)
+        JointRun { results, failure }
     }
 }
 

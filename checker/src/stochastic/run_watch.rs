@@ -39,9 +39,6 @@ impl Shows for (f64, u64) {}
 /// Whether the two runs of a pair have what was asked.
 impl Shows for (bool, bool) {}
 
-/// Results for several queries, or none.
-impl Shows for Vec<Option<f64>> {}
-
 /// Watches runs.
 pub trait RunWatch {
     /// Sees what a run shows; runs come in the order of their numbers.

@@ -212,6 +212,49 @@ fn queries_that_share_runs_have_the_answers_that_they_have_alone() {
     }
 }
 
+/// What fails after a query was decided is no matter to it, however long others are watched for.
+#[test]
+fn a_failure_counts_only_for_queries_that_it_precedes() {
+    let model = "
+        int n = 0;
+        process P() {
+            clock x;
+            state A { x <= 1 }, B { x <= 6 }, C;
+            branchpoint F;
+            init A;
+            trans A -> B { guard x >= 1; assign n = 1; },
+                  B -> F { guard x >= 5; },
+                  F -> C { probability 20; },
+                  F -> C { assign n = 6 / (n - 1); probability 1; };
+        }
+        system P;";
+    let (network, kinds) = together(model, &["E[<=10; 5](max: n)", "Pr[<=10](<> n == 1)"]);
+    let [_, jit] = executors(&network);
+    let precision = |seed, runs, threads| Precision {
+        seed,
+        runs: Some(runs),
+        threads,
+        ..Precision::default()
+    };
+    let alone = |kind, seed, runs| asked((&network, &*jit), kind, &precision(seed, runs, 1));
+    // The first query has enough before the run that fails, which is made together with others.
+    let mut seeds = 0..;
+    let seed = seeds
+        .find(|&seed| alone(&kinds[0], seed, 5).is_ok() && alone(&kinds[0], seed, 6).is_err())
+        .expect("some seed has five runs that do not fail, and one that does");
+    let expected = alone(&kinds[1], seed, 2_000).expect("it is decided before");
+    for threads in [1, 2] {
+        let asked = [
+            (&kinds[0], precision(seed, 5, threads)),
+            (&kinds[1], precision(seed, 2_000, threads)),
+        ];
+        let found = estimate_jointly(Behaviour::new(&network, &*jit), &asked, |_| false);
+        let found = found.expect("no failure counts");
+        assert_eq!(found[0].runs, 5);
+        assert_eq!(found[1], expected);
+    }
+}
+
 #[test]
 fn joint_intervals_hold_all_together_as_often_as_promised() {
     let (network, kinds) = together(
