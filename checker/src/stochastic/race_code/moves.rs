@@ -113,25 +113,8 @@ impl<'a> RaceWriter<'_, 'a> {
         if flags.iter().all(Option::is_none) {
             return rest;
         }
-        let (chosen, found) = (w.integer(0), w.block());
-        let minus_one = w.integer(-1);
-        for (number, flag) in (0..).zip(flags) {
-            let next = w.block();
-            if let Some(flag) = flag {
-                w.unless(flag, next);
-            }
-            let this = w.integer(number);
-            w.copy(chosen, this);
-            let goes_on = w.block();
-            w.branch(rest, goes_on, found);
-            w.at(goes_on);
-            let less = w.add_integers(rest, minus_one);
-            w.copy(rest, less);
-            w.jump(next);
-            w.at(next);
-        }
-        w.jump(found);
-        w.at(found);
+        let chosen = w.integer(0);
+        take_one_of(w, (0..).zip(flags), rest, chosen);
         chosen
     }
 
@@ -141,11 +124,11 @@ impl<'a> RaceWriter<'_, 'a> {
             Channel::None => None,
             Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
             Channel::Computed(first, index) => {
-                let arguments = sender.values.iter().map(|&one| w.integer(one)).collect();
-                let offset = w.call_for(index, arguments);
-                let base = w.integer(first as i32);
                 let count = sender.edge.sync.map_or(1, |sync| sync.count);
-                Some((w.add_integers(base, offset), first..first + count))
+                Some((
+                    computed_channel(w, sender, (first, index)),
+                    first..first + count,
+                ))
             }
         };
         match channels {
@@ -298,10 +281,7 @@ impl<'a> RaceWriter<'_, 'a> {
                     w.unless(is_it, otherwise);
                 }
                 Channel::Computed(own, index) => {
-                    let arguments = input.values.iter().map(|&one| w.integer(one)).collect();
-                    let offset = w.call_for(index, arguments);
-                    let own = w.integer(own as i32);
-                    let own = w.add_integers(own, offset);
+                    let own = computed_channel(w, input, (own, index));
                     let is_it = w.compare(channel, Relation::Equal, own);
                     w.unless(is_it, otherwise);
                 }
@@ -322,22 +302,8 @@ impl<'a> RaceWriter<'_, 'a> {
             let are_many = w.compare_to(count, Relation::Greater, 1);
             w.when(are_many, |w| {
                 let rest = w.draw_below(count);
-                let (found, minus_one) = (w.block(), w.integer(-1));
-                for (number, flag) in (first..).zip(flags) {
-                    let after = w.block();
-                    w.unless(flag, after);
-                    let this = w.integer(number);
-                    w.copy(taken, this);
-                    let goes_on = w.block();
-                    w.branch(rest, goes_on, found);
-                    w.at(goes_on);
-                    let less = w.add_integers(rest, minus_one);
-                    w.copy(rest, less);
-                    w.jump(after);
-                    w.at(after);
-                }
-                w.jump(found);
-                w.at(found);
+                let flags = flags.into_iter().map(Some);
+                take_one_of(w, (first..).zip(flags), rest, taken);
             });
         }
         w.copy(chosen, taken);
@@ -549,6 +515,47 @@ impl<'a> RaceWriter<'_, 'a> {
         w.return_value(Some(zero));
         w.finish()
     }
+}
+
+/// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
+/// `rest` says, which counts down. A number without a flag counts always.
+fn take_one_of(
+    w: &mut Writer,
+    numbers: impl Iterator<Item = (i32, Option<Register>)>,
+    rest: Register,
+    chosen: Register,
+) {
+    let (found, minus_one) = (w.block(), w.integer(-1));
+    for (number, flag) in numbers {
+        let next = w.block();
+        if let Some(flag) = flag {
+            w.unless(flag, next);
+        }
+        let this = w.integer(number);
+        w.copy(chosen, this);
+        let goes_on = w.block();
+        w.branch(rest, goes_on, found);
+        w.at(goes_on);
+        let less = w.add_integers(rest, minus_one);
+        w.copy(rest, less);
+        w.jump(next);
+        w.at(next);
+    }
+    w.jump(found);
+    w.at(found);
+}
+
+/// The number of the channel of an instance that computes it.
+fn computed_channel(
+    w: &mut Writer,
+    instance: &Instance<'_>,
+    (first, index): (u32, FunctionId),
+) -> Register {
+    let values = instance.values.iter();
+    let arguments = values.map(|&one| w.integer(one)).collect();
+    let offset = w.call_for(index, arguments);
+    let first = w.integer(first as i32);
+    w.add_integers(first, offset)
 }
 
 fn update(w: &mut Writer, update: &Update, values: &[i32]) {

@@ -440,7 +440,8 @@ impl RaceWriter<'_, '_> {
     pub(super) fn windows(&self) -> Function {
         let layout = self.layout;
         let result = (1, Some(RegisterType::Double));
-        let w = &mut self.writer("a delay in windows", result);
+        let mut writer = self.writer("a delay in windows", result);
+        let w = &mut writer;
         let is_bounded = Register(0);
         let count = w.load(layout.windows);
         let place = |w: &mut Writer, number| w.place_of_double(number, layout.most_windows);
@@ -574,7 +575,7 @@ impl RaceWriter<'_, '_> {
         );
         let infinity = w.double(f64::INFINITY);
         w.return_value(Some(infinity));
-        std::mem::replace(w, self.writer("", (0, None))).finish()
+        writer.finish()
     }
 }
 

@@ -30,8 +30,8 @@ pub(super) fn rated_clocks(program: &Program<'_>) -> Option<Vec<(u32, u32)>> {
 impl RaceWriter<'_, '_> {
     /// The function that lets those set rates who plan anew, and finds whose plans that concerns.
     pub(super) fn renewal_of_rates(&self) -> Function {
-        let mut w = self.writer("rates of clocks", (0, None));
-        let w = &mut w;
+        let mut writer = self.writer("rates of clocks", (0, None));
+        let w = &mut writer;
         for &process in &self.program.rated {
             let (word, bit) = self.layout.stale_bit(process as usize);
             let (marked, bit) = (w.load(word), w.integer(bit));
@@ -39,7 +39,7 @@ impl RaceWriter<'_, '_> {
             w.when(is_stale, |w| self.set_rates(w, process));
         }
         w.return_value(None);
-        std::mem::replace(w, self.writer("", (0, None))).finish()
+        writer.finish()
     }
 
     fn set_rates(&self, w: &mut Writer, process: u32) {

@@ -58,8 +58,8 @@ impl RaceWriter<'_, '_> {
     /// The function that makes moves until the run has ended, or so many as its words say.
     pub(super) fn rounds(&self, ids: &Ids, watched: &Watched) -> Function {
         let layout = self.layout;
-        let mut w = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
-        let w = &mut w;
+        let mut writer = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
+        let w = &mut writer;
         let processes = layout.attempts.len();
         let (round, over) = (w.block(), w.block());
         if let Some(renewal) = self.renewal_of_rates {
@@ -166,7 +166,7 @@ impl RaceWriter<'_, '_> {
         }
         let result = w.integer(IS_OVER);
         w.return_value(Some(result));
-        std::mem::replace(w, self.writer("", (0, None))).finish()
+        writer.finish()
     }
 
     fn plan_anew(&self, w: &mut Writer, ids: &Ids) {

@@ -52,6 +52,17 @@ impl Writer {
             .push(instruction);
     }
 
+    /// Writes an instruction that has a result.
+    fn result(
+        &mut self,
+        kind: RegisterType,
+        instruction: impl FnOnce(Register) -> Instruction,
+    ) -> Register {
+        let target = self.register(kind);
+        self.push(instruction(target));
+        target
+    }
+
     /// A block that nothing leads to yet.
     pub(super) fn block(&mut self) -> BlockId {
         self.function.blocks.push(empty_block());
@@ -119,9 +130,10 @@ impl Writer {
     }
 
     pub(super) fn integer(&mut self, value: i32) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::Integer { target, value });
-        target
+        self.result(RegisterType::Integer, |target| Instruction::Integer {
+            target,
+            value,
+        })
     }
 
     pub(super) fn double(&mut self, value: f64) -> Register {
@@ -136,10 +148,11 @@ impl Writer {
     }
 
     pub(super) fn load(&mut self, word: u32) -> Register {
-        let target = self.register(RegisterType::Integer);
         let address = word_of_state(word, None);
-        self.push(Instruction::LoadInteger { target, address });
-        target
+        self.result(RegisterType::Integer, |target| Instruction::LoadInteger {
+            target,
+            address,
+        })
     }
 
     pub(super) fn store(&mut self, word: u32, source: Register) {
@@ -158,10 +171,11 @@ impl Writer {
 
     /// Reads the double so many words behind a place, if that is given.
     pub(super) fn load_double_at(&mut self, word: u32, index: Option<Register>) -> Register {
-        let target = self.register(RegisterType::Double);
         let address = word_of_state(word, index);
-        self.push(Instruction::LoadDouble { target, address });
-        target
+        self.result(RegisterType::Double, |target| Instruction::LoadDouble {
+            target,
+            address,
+        })
     }
 
     /// Writes a double that is never a NaN.
@@ -184,15 +198,13 @@ impl Writer {
         left: Register,
         right: Register,
     ) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::Arithmetic {
+        self.result(RegisterType::Integer, |target| Instruction::Arithmetic {
             operator,
             target,
             left,
             right,
             site: NOWHERE,
-        });
-        target
+        })
     }
 
     pub(super) fn add_integers(&mut self, left: Register, right: Register) -> Register {
@@ -205,14 +217,14 @@ impl Writer {
         left: Register,
         right: Register,
     ) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.push(Instruction::DoubleArithmetic {
-            operator,
-            target,
-            left,
-            right,
-        });
-        target
+        self.result(RegisterType::Double, |target| {
+            Instruction::DoubleArithmetic {
+                operator,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     pub(super) fn add(&mut self, left: Register, right: Register) -> Register {
@@ -251,14 +263,14 @@ impl Writer {
         relation: Relation,
         right: Register,
     ) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::CompareIntegers {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
+        self.result(RegisterType::Integer, |target| {
+            Instruction::CompareIntegers {
+                relation,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     pub(super) fn compare_to(
@@ -277,20 +289,20 @@ impl Writer {
         relation: Relation,
         right: Register,
     ) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::CompareDoubles {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
+        self.result(RegisterType::Integer, |target| {
+            Instruction::CompareDoubles {
+                relation,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     pub(super) fn double_of(&mut self, source: Register) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.push(Instruction::IntegerToDouble { target, source });
-        target
+        self.result(RegisterType::Double, |target| {
+            Instruction::IntegerToDouble { target, source }
+        })
     }
 
     /// Calls a function of integers; returns its result, if it has one.
@@ -323,64 +335,57 @@ impl Writer {
         arguments: Vec<Register>,
         kind: RegisterType,
     ) -> Register {
-        let target = self.register(kind);
-        self.push(Instruction::Call {
+        self.result(kind, |target| Instruction::Call {
             target: Some(target),
             function,
             arguments,
-        });
-        target
+        })
     }
 
     pub(super) fn draw(&mut self, distribution: Distribution, argument: Register) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.push(Instruction::Random {
+        let stream = word_of_state(self.stream, None);
+        self.result(RegisterType::Double, |target| Instruction::Random {
             distribution,
             target,
             arguments: vec![argument],
-            stream: word_of_state(self.stream, None),
+            stream,
             site: NOWHERE,
-        });
-        target
+        })
     }
 
     /// Whether so many words at two places are the same: 0 or 1.
     pub(super) fn same_words(&mut self, (left, right): (u32, u32), words: u32) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::EqualWords {
+        self.result(RegisterType::Integer, |target| Instruction::EqualWords {
             target,
             left: word_of_state(left, None),
             right: word_of_state(right, None),
             words,
-        });
-        target
+        })
     }
 
     /// The place of the double with this number in an array of so many.
     pub(super) fn place_of_double(&mut self, number: Register, length: u32) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::ScaleIndex {
+        self.result(RegisterType::Integer, |target| Instruction::ScaleIndex {
             target,
             index: number,
             first: 0,
             length,
             stride: 2,
             site: NOWHERE,
-        });
-        target
+        })
     }
 
     /// An integer less than `count`, each with the same probability.
     pub(super) fn draw_below(&mut self, count: Register) -> Register {
         let count = self.double_of(count);
         let drawn = self.draw(Distribution::Below, count);
-        let target = self.register(RegisterType::Integer);
-        self.push(Instruction::DoubleToInteger {
-            target,
-            source: drawn,
-            site: NOWHERE,
-        });
-        target
+        self.result(RegisterType::Integer, |target| {
+            Instruction::DoubleToInteger {
+                target,
+                source: drawn,
+                site: NOWHERE,
+            }
+        })
     }
 
     /// Goes to one of several places by a number that is one of theirs; they are in ascending
