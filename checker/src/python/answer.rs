@@ -16,7 +16,7 @@ use crate::engine::format::{
     strategy_text, text,
 };
 use crate::engine::session::plan_texts::PlanTexts;
-use crate::engine::{self, LoadedModel, Options, Verdict};
+use crate::engine::{self, LoadedModel, Options, Rejection, Verdict};
 use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
 use crate::stochastic::Precision;
@@ -29,18 +29,7 @@ pub(super) fn check(
     options: &Bound<'_, PyAny>,
 ) -> PyResult<Answer> {
     let (options, raised) = options::read(options)?;
-    let inner = model.get();
-    let answer = model.py().detach(|| {
-        inner.with(|model| {
-            let text = model.add_query(query);
-            let overflow = model.network().overflow;
-            let options = Options {
-                overflow,
-                ..options
-            };
-            model.check(&text, &options)
-        })
-    });
+    let answer = answered(model, query, options);
     if let Some(failure) = raised.failure(model.py()) {
         return Err(failure);
     }
@@ -60,6 +49,27 @@ pub(super) fn check(
     Ok(answer)
 }
 
+/// Answers a query by the rule for overflows that the model was loaded with, while other threads of
+/// Python run.
+fn answered(
+    model: &Bound<'_, Model>,
+    query: &str,
+    options: Options,
+) -> Result<engine::Answer, Rejection> {
+    let inner = model.get();
+    model.py().detach(|| {
+        inner.with(|model| {
+            let text = model.add_query(query);
+            let overflow = model.network().overflow;
+            let options = Options {
+                overflow,
+                ..options
+            };
+            model.check(&text, &options)
+        })
+    })
+}
+
 /// Makes runs of a statistical query, from number `first` on: their results, for the `run_source`
 /// of whoever answers the query.
 #[pyfunction]
@@ -71,21 +81,12 @@ pub(super) fn block_of_runs<'py>(
     count: u64,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (options, _) = options::read(options)?;
-    let inner = model.get();
-    let answer = model.py().detach(|| {
-        inner.with(|model| {
-            let text = model.add_query(query);
-            let overflow = model.network().overflow;
-            let options = Options {
-                overflow,
-                run_source: None,
-                only_runs: Some(first..first.saturating_add(count)),
-                ..options
-            };
-            model.check(&text, &options)
-        })
-    });
-    let answer = answer.map_err(rejected)?;
+    let options = Options {
+        run_source: None,
+        only_runs: Some(first..first.saturating_add(count)),
+        ..options
+    };
+    let answer = answered(model, query, options).map_err(rejected)?;
     match answer.block {
         Some(block) => Ok(PyBytes::new(model.py(), &block)),
         None if matches!(answer.verdict, Verdict::Unknown(_)) => {
