@@ -13,7 +13,7 @@ mod random;
 pub(crate) use integer_result::IntegerResult;
 pub(crate) use library::canonical;
 pub(crate) use random::{
-    BLOCK as STREAM_BLOCK, BUFFER_WORDS as STREAM_BUFFER, MOST_PARAMETERS,
+    BUFFER as STREAM_BUFFER, BUFFERED as STREAM_BUFFERED, MOST_PARAMETERS,
     POSITION as STREAM_POSITION,
 };
 pub use random::{Distribution, STREAM_WORDS, Stream};

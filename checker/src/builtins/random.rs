@@ -1,42 +1,45 @@
 //! Random numbers of runs: the generator, and the table of the random functions of the language.
 //!
-//! The generator is Philox4x32-10: block number `n` of run `k` with seed `s` is a function of these
+//! The generator is Philox4x64-10: block number `n` of run `k` with seed `s` is a function of these
 //! three numbers alone. So a run is the same whatever ran before it, and on whichever thread. All
 //! that it has to remember lies in [`STREAM_WORDS`] words of the state, which are copied with it.
+//! The generator `Philox` of NumPy gives the same numbers, with key `(s, 0)` and counter `(n, k, 0,
+//! 0)`, of which it takes the successor first.
 //!
 //! The distributions are those of the crate `rand_distr`. A new random function is one row in the
 //! table of [`Distribution`].
 //!
 //! Reference: Salmon, Moraes, Dror and Shaw, "Parallel Random Numbers: As Easy as 1, 2, 3" (2011).
-//! Cost: some 2 ns for a word of 32 random bits.
+//! Cost: some 2 ns for a number of 64 random bits.
 
 use std::convert::Infallible;
 use std::f64::consts::FRAC_PI_2;
 
-use rand_core::{Rng, TryRng};
+use rand_core::TryRng;
 use rand_distr::{
     Beta, Distribution as _, Exp1, Gamma, Normal, OpenClosed01, Poisson, StandardUniform,
     Triangular, Uniform, Weibull,
 };
 
 /// The words that a stream of random numbers takes in the state.
-pub const STREAM_WORDS: usize = BLOCK + BUFFER_WORDS;
+pub const STREAM_WORDS: usize = BUFFER + 2 * BUFFERED;
 
 /// The random functions have at most this number of parameters.
 pub(crate) const MOST_PARAMETERS: usize = 3;
 
-// Where the parts of a stream lie in its words. Numbers of 64 bits have the low word first.
+// Where the parts of a stream lie in its words. All are numbers of 64 bits, with the low word first.
 const SEED: usize = 0;
 const RUN: usize = 2;
-/// How many words were drawn.
+/// How many numbers were drawn.
 pub(crate) const POSITION: usize = 4;
-/// The blocks around the last word that was drawn, if they have further ones.
-pub(crate) const BLOCK: usize = 6;
-const BLOCK_WORDS: usize = 4;
+/// The numbers around the last one that was drawn, if they have further ones.
+pub(crate) const BUFFER: usize = 6;
+/// The numbers of a block.
+const BLOCK: usize = 4;
 /// So many blocks are made together: a processor can work on all of them at once.
-const BLOCKS: usize = 4;
-/// How many words of blocks there are; a power of 2.
-pub(crate) const BUFFER_WORDS: usize = BLOCKS * BLOCK_WORDS;
+const BLOCKS: usize = 2;
+/// How many numbers of blocks there are; a power of 2.
+pub(crate) const BUFFERED: usize = BLOCKS * BLOCK;
 
 /// The random numbers of a run, over the words that hold their state. Words that are all 0 are the
 /// start of run 0 with seed 0.
@@ -97,42 +100,26 @@ impl<'a> Stream<'a> {
         self.0[place + 1] = (number >> 32) as i32;
     }
 
-    /// Makes the words of the blocks from this one on.
+    /// Makes the numbers of the blocks from this one on.
     fn fill(&mut self, first: u64) {
         let (run, seed) = (self.number(RUN), self.number(SEED));
         let counters: [_; BLOCKS] =
-            std::array::from_fn(|block| words_of(first.wrapping_add(block as u64), run));
-        let random = philox(counters, [seed as u32, (seed >> 32) as u32]);
-        for (target, word) in self.0[BLOCK..].iter_mut().zip(random.as_flattened()) {
-            *target = *word as i32;
+            std::array::from_fn(|block| [first.wrapping_add(block as u64), run, 0, 0]);
+        let random = philox(counters, [seed, 0]);
+        for (place, &number) in random.as_flattened().iter().enumerate() {
+            self.set_number(BUFFER + 2 * place, number);
         }
     }
 
     #[inline]
-    fn next_word(&mut self) -> u32 {
+    fn next_number(&mut self) -> u64 {
         let position = self.number(POSITION);
-        let word = (position % BUFFER_WORDS as u64) as usize;
-        if word == 0 {
-            self.fill(position / BLOCK_WORDS as u64);
+        let place = (position % BUFFERED as u64) as usize;
+        if place == 0 {
+            self.fill(position / BLOCK as u64);
         }
         self.set_number(POSITION, position.wrapping_add(1));
-        self.0[BLOCK + word] as u32
-    }
-
-    /// Two words, the first one low.
-    #[inline]
-    fn next_pair(&mut self) -> u64 {
-        let position = self.number(POSITION);
-        let word = (position % BUFFER_WORDS as u64) as usize;
-        if word + 1 == BUFFER_WORDS {
-            let low = u64::from(self.next_word());
-            return u64::from(self.next_word()) << 32 | low;
-        }
-        if word == 0 {
-            self.fill(position / BLOCK_WORDS as u64);
-        }
-        self.set_number(POSITION, position.wrapping_add(2));
-        self.number(BLOCK + word)
+        self.number(BUFFER + 2 * place)
     }
 }
 
@@ -141,51 +128,41 @@ impl TryRng for Stream<'_> {
 
     #[inline]
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-        Ok(self.next_word())
+        Ok((self.next_number() >> 32) as u32)
     }
 
     #[inline]
     fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-        Ok(self.next_pair())
+        Ok(self.next_number())
     }
 
     fn try_fill_bytes(&mut self, target: &mut [u8]) -> Result<(), Infallible> {
-        for bytes in target.chunks_mut(size_of::<u32>()) {
-            bytes.copy_from_slice(&self.next_u32().to_le_bytes()[..bytes.len()]);
+        for bytes in target.chunks_mut(size_of::<u64>()) {
+            bytes.copy_from_slice(&self.next_number().to_le_bytes()[..bytes.len()]);
         }
         Ok(())
     }
 }
 
-#[inline]
-fn words_of(low: u64, high: u64) -> [u32; 4] {
-    [
-        low as u32,
-        (low >> 32) as u32,
-        high as u32,
-        (high >> 32) as u32,
-    ]
-}
-
 const ROUNDS: usize = 10;
-const MULTIPLIERS: [u32; 2] = [0xd251_1f53, 0xcd9e_8d57];
+const MULTIPLIERS: [u64; 2] = [0xd2e7_470e_e14c_6c93, 0xca5a_8263_9512_1157];
 /// What is added to the key from round to round.
-const WEYL: [u32; 2] = [0x9e37_79b9, 0xbb67_ae85];
+const WEYL: [u64; 2] = [0x9e37_79b9_7f4a_7c15, 0xbb67_ae85_84ca_a73b];
 
-/// Philox4x32-10 of several counters.
+/// Philox4x64-10 of several counters.
 #[inline]
-fn philox<const N: usize>(mut counters: [[u32; 4]; N], key: [u32; 2]) -> [[u32; 4]; N] {
+fn philox<const N: usize>(mut counters: [[u64; 4]; N], key: [u64; 2]) -> [[u64; 4]; N] {
     let [mut left, mut right] = key;
     for _ in 0..ROUNDS {
         for counter in &mut counters {
             let [a, b, c, d] = *counter;
-            let first = u64::from(MULTIPLIERS[0]) * u64::from(a);
-            let second = u64::from(MULTIPLIERS[1]) * u64::from(c);
+            let first = u128::from(MULTIPLIERS[0]) * u128::from(a);
+            let second = u128::from(MULTIPLIERS[1]) * u128::from(c);
             *counter = [
-                (second >> 32) as u32 ^ b ^ left,
-                second as u32,
-                (first >> 32) as u32 ^ d ^ right,
-                first as u32,
+                (second >> 64) as u64 ^ b ^ left,
+                second as u64,
+                (first >> 64) as u64 ^ d ^ right,
+                first as u64,
             ];
         }
         left = left.wrapping_add(WEYL[0]);
@@ -350,27 +327,49 @@ fn weibull(stream: &mut Stream<'_>, shape: f64, scale: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use rand_core::Rng;
+
     use super::*;
 
-    /// The vectors that come with Random123.
+    /// The vectors that come with Random123; NumPy gives them too.
     #[test]
     fn the_generator_gives_the_published_numbers() {
-        let pi = [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344];
+        let pi = [
+            0x243f_6a88_85a3_08d3,
+            0x1319_8a2e_0370_7344,
+            0xa409_3822_299f_31d0,
+            0x082e_fa98_ec4e_6c89,
+        ];
         let cases = [
             (
                 [0; 4],
                 [0; 2],
-                [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8],
+                [
+                    0x1655_4d9e_ca36_314c,
+                    0xdb20_fe9d_672d_0fdc,
+                    0xd7e7_72ce_e186_176b,
+                    0x7e68_b68a_ec7b_a23b,
+                ],
             ),
             (
-                [u32::MAX; 4],
-                [u32::MAX; 2],
-                [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd],
+                [u64::MAX; 4],
+                [u64::MAX; 2],
+                [
+                    0x87b0_92c3_013f_e90b,
+                    0x438c_3c67_be8d_0224,
+                    0x9cc7_d7c6_9cd7_77b6,
+                    0xa09c_aebf_594f_0ba0,
+                ],
             ),
             (
                 pi,
-                [0xa409_3822, 0x299f_31d0],
-                [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1],
+                [0x4528_21e6_38d0_1377, 0xbe54_66cf_34e9_0c6c],
+                [
+                    0xa528_f454_03e6_1d95,
+                    0x38c7_2dbd_566e_9788,
+                    0xa5a1_610e_72fd_18b5,
+                    0x57bd_43b5_e52b_7fe6,
+                ],
             ),
         ];
         for (counter, key, expected) in cases {
@@ -383,34 +382,37 @@ mod tests {
         let (seed, run) = (0x0123_4567_89ab_cdef, 0xfedc_ba98_7654_3210);
         let mut words = [7; STREAM_WORDS];
         let mut stream = Stream::start(&mut words, seed, run);
-        let drawn: Vec<u32> = (0..40).map(|_| stream.next_u32()).collect();
-        let blocks = (0..10).flat_map(|block| {
-            let counter = [block, 0, 0x7654_3210, 0xfedc_ba98];
-            philox([counter], [0x89ab_cdef, 0x0123_4567])[0]
-        });
+        let drawn: Vec<u64> = (0..40).map(|_| stream.next_u64()).collect();
+        let blocks = (0..10).flat_map(|block| philox([[block, run, 0, 0]], [seed, 0])[0]);
         assert!(blocks.eq(drawn));
     }
 
     /// A block number of more than 32 bits.
     #[test]
-    fn a_stream_goes_on_behind_many_words() {
+    fn a_stream_goes_on_behind_many_numbers() {
         let mut words = [0; STREAM_WORDS];
         let mut stream = Stream::start(&mut words, 3, 4);
-        stream.set_number(POSITION, (1 << 34) - 1);
-        stream.next_u32();
-        assert_eq!(stream.next_u32(), philox([[0, 1, 4, 0]], [3, 0])[0][0]);
+        stream.set_number(POSITION, (1 << 40) - 1);
+        stream.next_u64();
+        let expected = philox([[1 << 38, 4, 0, 0]], [3, 0]);
+        assert_eq!(stream.next_u64(), expected[0][0]);
     }
 
     #[test]
-    fn bytes_and_pairs_are_those_of_the_words() {
-        let [mut first, mut second] = [[0; STREAM_WORDS]; 2];
+    fn bytes_and_words_are_parts_of_the_numbers() {
+        let [mut first, mut second, mut third] = [[0; STREAM_WORDS]; 3];
         let mut bytes = [0; 14];
         Stream::of(&mut first).fill_bytes(&mut bytes);
         let mut stream = Stream::of(&mut second);
-        assert_eq!(bytes[..8], stream.next_u64().to_le_bytes());
-        assert_eq!(bytes[8..12], stream.next_u32().to_le_bytes());
-        assert_eq!(bytes[12..], stream.next_u32().to_le_bytes()[..2]);
+        let numbers = [stream.next_u64(), stream.next_u64()];
+        assert_eq!(bytes[..8], numbers[0].to_le_bytes());
+        assert_eq!(bytes[8..], numbers[1].to_le_bytes()[..6]);
+        let mut stream = Stream::of(&mut third);
+        for number in numbers {
+            assert_eq!(u64::from(stream.next_u32()), number >> 32);
+        }
         assert_eq!(first, second);
+        assert_eq!(first, third);
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Random numbers in native code.
 //!
-//! The uniform ones, which runs draw all the time, are taken from the words of the stream here as
-//! long as there are some that were made before; all else is called back.
+//! The uniform ones, which runs draw all the time, are taken from the numbers of the stream here
+//! as long as there are some that were made before; all else is called back.
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I64};
 use cranelift_codegen::ir::{InstBuilder, Value};
 
-use crate::builtins::{MOST_PARAMETERS, STREAM_BLOCK, STREAM_BUFFER, STREAM_POSITION};
+use crate::builtins::{MOST_PARAMETERS, STREAM_BUFFER, STREAM_BUFFERED, STREAM_POSITION};
 use crate::exec::jit::runtime;
 use crate::ir::{Address, Distribution, Register, RunTimeErrorKind, SiteId};
 
@@ -74,18 +74,14 @@ impl Translator<'_> {
         let word = |place: usize| 4 * place as i32;
         let ins = self.builder.ins();
         let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
-        let within = (STREAM_BUFFER - 1) as i64;
+        let within = (STREAM_BUFFERED - 1) as i64;
         let place = self.builder.ins().band_imm_s(position, within);
-        // The first and the last word of the buffer are not the first of two that are there.
-        let before = self.builder.ins().iadd_imm_s(place, -1);
-        let has_two = self
-            .builder
-            .ins()
-            .icmp_imm_s(IntCC::UnsignedLessThan, before, within - 1);
+        // The first number of the buffer is the one that fills it.
+        let is_there = self.builder.ins().icmp_imm_s(IntCC::NotEqual, place, 0);
         let size = self.builder.ins().fabs(max);
         let infinity = self.builder.ins().f64const(f64::INFINITY);
         let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, size, infinity);
-        let is_fast = self.builder.ins().band(has_two, is_finite);
+        let is_fast = self.builder.ins().band(is_there, is_finite);
         let (fast, slow, next) = (
             self.builder.create_block(),
             self.builder.create_block(),
@@ -95,11 +91,11 @@ impl Translator<'_> {
         self.builder.set_cold_block(slow);
         self.builder.ins().brif(is_fast, fast, &[], slow, &[]);
         self.builder.switch_to_block(fast);
-        let bytes = self.builder.ins().ishl_imm_u(place, 2);
+        let bytes = self.builder.ins().ishl_imm_u(place, 3);
         let base = self.builder.ins().iadd(stream, bytes);
         let ins = self.builder.ins();
-        let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BLOCK));
-        let after = self.builder.ins().iadd_imm_s(position, 2);
+        let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
+        let after = self.builder.ins().iadd_imm_s(position, 1);
         let ins = self.builder.ins();
         ins.store(MODEL_MEMORY, after, stream, word(STREAM_POSITION));
         let bits = self.builder.ins().ushr_imm_u(bits, 11);
