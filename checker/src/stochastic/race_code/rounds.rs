@@ -32,23 +32,18 @@ impl Tree {
         }
     }
 
-    /// Goes to the place of the process whose attempt comes until then, or to `tied` if there are
-    /// several.
-    fn find(&self, w: &mut Writer, latest: Register, (places, tied): (&[BlockId], BlockId)) {
+    /// Goes to the place of the process with the least attempt, if there is one alone.
+    fn find(&self, w: &mut Writer, places: &[BlockId]) {
         match self {
             Tree::Leaf(process, _) => w.jump(places[*process]),
             Tree::Fork(_, left, right) => {
-                let is_left = w.compare_doubles(left.least(), Relation::LessEqual, latest);
+                let is_left = w.compare_doubles(left.least(), Relation::Less, right.least());
                 let (then, otherwise) = (w.block(), w.block());
                 w.branch(is_left, then, otherwise);
                 w.at(then);
-                let is_right = w.compare_doubles(right.least(), Relation::LessEqual, latest);
-                let alone = w.block();
-                w.branch(is_right, tied, alone);
-                w.at(alone);
-                left.find(w, latest, (places, tied));
+                left.find(w, places);
                 w.at(otherwise);
-                right.find(w, latest, (places, tied));
+                right.find(w, places);
             }
         }
     }
@@ -111,15 +106,19 @@ impl RaceWriter<'_, '_> {
         if let Some(tree) = tree {
             let latest = tolerant(w, delay);
             self.wait(w, passing, &attempts);
-            let tied = w.block();
-            tree.find(w, latest, (&moves, tied));
-            w.at(tied);
             let count = w.integer(0);
             for &(_, attempt) in &attempts {
                 let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
                 let more = w.add_integers(count, is_first);
                 w.copy(count, more);
             }
+            let alone = w.block();
+            let are_many = w.compare_to(count, Relation::Greater, 1);
+            let tied = w.block();
+            w.branch(are_many, tied, alone);
+            w.at(alone);
+            tree.find(w, &moves);
+            w.at(tied);
             let chosen = w.draw_below(count);
             let minus_one = w.integer(-1);
             for &(process, attempt) in &attempts {
