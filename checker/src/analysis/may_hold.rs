@@ -49,7 +49,7 @@ enum NextStep {
     Fork(usize, usize),
     /// Nowhere, with this result.
     Returned(Option<i32>),
-    /// Nowhere: a run-time error.
+    /// Nowhere that is known: a run-time error, or one of many blocks.
     Failed,
 }
 
@@ -148,7 +148,7 @@ impl<'a> Possibility<'a> {
         };
         let code = &self.network.functions[active.function.0 as usize].blocks[active.block];
         let Some(instruction) = code.instructions.get(active.next) else {
-            return self.leave(way, code.terminator);
+            return self.leave(way, &code.terminator);
         };
         active.next += 1;
         if let Instruction::Call {
@@ -170,16 +170,23 @@ impl<'a> Possibility<'a> {
     }
 
     /// Takes the end of a block.
-    fn leave(&self, way: &mut Path, terminator: Terminator) -> NextStep {
+    fn leave(&self, way: &mut Path, terminator: &Terminator) -> NextStep {
         let Some(active) = way.calls.last_mut() else {
             return NextStep::Failed;
         };
-        match terminator {
+        match *terminator {
             Terminator::Jump(block) => way.enter(block.0 as usize),
             Terminator::Branch(condition, yes, no) => match active.value(condition) {
                 None => return NextStep::Fork(yes.0 as usize, no.0 as usize),
                 Some(0) => way.enter(no.0 as usize),
                 Some(_) => way.enter(yes.0 as usize),
+            },
+            Terminator::Switch(number, ref list, otherwise) => match active.value(number) {
+                None => return NextStep::Failed,
+                Some(number) => {
+                    let block = list.get(number as usize).unwrap_or(&otherwise);
+                    way.enter(block.0 as usize);
+                }
             },
             Terminator::Fail(..) => return NextStep::Failed,
             Terminator::Return(register) => {

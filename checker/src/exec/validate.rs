@@ -111,27 +111,25 @@ impl FunctionCheck<'_> {
             self.instruction(instruction)
                 .map_err(|what| (number, what))?;
         }
-        self.terminator(block.terminator)
+        self.terminator(&block.terminator)
             .map_err(|what| (block.instructions.len(), what))
     }
 
-    fn terminator(&self, terminator: Terminator) -> Verdict {
-        match terminator {
-            Terminator::Jump(target) => self.target(target),
-            Terminator::Branch(condition, then, otherwise) => {
-                self.wants(condition, Integer)?;
-                self.target(then)?;
-                self.target(otherwise)
+    fn terminator(&self, terminator: &Terminator) -> Verdict {
+        match *terminator {
+            Terminator::Branch(number, ..) | Terminator::Switch(number, ..) => {
+                self.wants(number, Integer)?;
             }
             Terminator::Return(value) => {
                 let types = value.map(|register| self.kind(register)).transpose()?;
                 if types != self.function.result {
                     return Err("it returns something else than it says");
                 }
-                Ok(())
             }
-            Terminator::Fail(..) => Ok(()),
+            Terminator::Jump(_) | Terminator::Fail(..) => {}
         }
+        let mut targets = terminator.successors();
+        targets.try_for_each(|target| self.target(target))
     }
 
     fn target(&self, BlockId(target): BlockId) -> Verdict {
@@ -238,6 +236,7 @@ impl FunctionCheck<'_> {
             I::Integer { .. }
             | I::Arithmetic { .. }
             | I::CompareIntegers { .. }
+            | I::Select { .. }
             | I::AddIndices { .. }
             | I::Not { .. }
             | I::CheckRange { .. }

@@ -78,12 +78,14 @@ pub struct Block {
 }
 
 /// Where execution continues.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Terminator {
     /// To a block.
     Jump(BlockId),
     /// To the first block if the integer is not 0, to the second if it is.
     Branch(Register, BlockId, BlockId),
+    /// To the block whose place in the list the integer is, or to the last one if there is none.
+    Switch(Register, Box<[BlockId]>, BlockId),
     /// Back to the caller.
     Return(Option<Register>),
     /// Nowhere: a run-time error.
@@ -181,6 +183,13 @@ pub enum Instruction {
         target: Register,
         left: Register,
         right: Register,
+    },
+    /// The integer `then` if the condition is not 0, else the integer `otherwise`.
+    Select {
+        target: Register,
+        condition: Register,
+        then: Register,
+        otherwise: Register,
     },
     /// An integer as a double.
     IntegerToDouble { target: Register, source: Register },

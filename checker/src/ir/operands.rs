@@ -71,6 +71,12 @@ macro_rules! operand_walk {
                     visit(Source(right));
                     visit(Target(target));
                 }
+                Instruction::Select { target, condition, then, otherwise } => {
+                    visit(Source(condition));
+                    visit(Source(then));
+                    visit(Source(otherwise));
+                    visit(Target(target));
+                }
                 Instruction::Math { target, arguments, .. } => {
                     for argument in arguments {
                         visit(Source(argument));
@@ -231,20 +237,34 @@ impl Terminator {
     /// The register that it reads, to change it.
     pub(crate) fn used_mut(&mut self) -> Option<&mut Register> {
         match self {
-            Terminator::Branch(condition, ..) => Some(condition),
+            Terminator::Branch(condition, ..) | Terminator::Switch(condition, ..) => {
+                Some(condition)
+            }
             Terminator::Return(result) => result.as_mut(),
             Terminator::Jump(_) | Terminator::Fail(..) => None,
         }
     }
 
     /// The blocks that it leads to.
-    pub(crate) fn successors(self) -> impl Iterator<Item = BlockId> {
-        let (first, second) = match self {
-            Terminator::Jump(target) => (Some(target), None),
-            Terminator::Branch(_, then, otherwise) => (Some(then), Some(otherwise)),
-            Terminator::Return(_) | Terminator::Fail(..) => (None, None),
+    pub(crate) fn successors(&self) -> impl Iterator<Item = BlockId> {
+        let (list, first, second) = match self {
+            Terminator::Jump(target) => (&[][..], Some(target), None),
+            Terminator::Branch(_, then, otherwise) => (&[][..], Some(then), Some(otherwise)),
+            Terminator::Switch(_, list, otherwise) => (&list[..], Some(otherwise), None),
+            Terminator::Return(_) | Terminator::Fail(..) => (&[][..], None, None),
         };
-        first.into_iter().chain(second)
+        list.iter().chain(first).chain(second).copied()
+    }
+
+    /// The blocks that it leads to, to redirect it.
+    pub(crate) fn successors_mut(&mut self) -> impl Iterator<Item = &mut BlockId> {
+        let (list, first, second) = match self {
+            Terminator::Jump(target) => (&mut [][..], Some(target), None),
+            Terminator::Branch(_, then, otherwise) => (&mut [][..], Some(then), Some(otherwise)),
+            Terminator::Switch(_, list, otherwise) => (&mut list[..], Some(otherwise), None),
+            Terminator::Return(_) | Terminator::Fail(..) => (&mut [][..], None, None),
+        };
+        list.iter_mut().chain(first).chain(second)
     }
 }
 

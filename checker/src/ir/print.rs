@@ -78,6 +78,13 @@ impl Display for Terminator {
             Terminator::Branch(condition, then, otherwise) => {
                 write!(f, "if {condition} then {then} else {otherwise}")
             }
+            Terminator::Switch(number, list, otherwise) => {
+                write!(f, "switch {number} to")?;
+                for target in list {
+                    write!(f, " {target},")?;
+                }
+                write!(f, " else {otherwise}")
+            }
             Terminator::Return(None) => write!(f, "return"),
             Terminator::Return(Some(result)) => write!(f, "return {result}"),
             Terminator::Fail(kind, site) => write!(f, "fail {kind:?}  {site}"),
@@ -200,6 +207,12 @@ impl Display for Instruction {
                 left,
                 right,
             } => write!(f, "{target} = {left} {operator} {right}"),
+            Instruction::Select {
+                target,
+                condition,
+                then,
+                otherwise,
+            } => write!(f, "{target} = {then} if {condition} else {otherwise}"),
             Instruction::IntegerToDouble { target, source } => {
                 write!(f, "{target} = double {source}")
             }

@@ -29,6 +29,7 @@ impl Execution<'_, '_> {
             | Instruction::CompareIntegers { .. }
             | Instruction::CompareDoubles { .. }
             | Instruction::Not { .. }
+            | Instruction::Select { .. }
             | Instruction::DoubleArithmetic { .. }
             | Instruction::IntegerToDouble { .. }
             | Instruction::AddIndices { .. } => self.compute(active, instruction),
@@ -98,6 +99,16 @@ impl Execution<'_, '_> {
             Instruction::Not { target, source } => {
                 let is_zero = self.integer(active, source) == 0;
                 self.set_integer(active, target, is_zero.into());
+            }
+            Instruction::Select {
+                target,
+                condition,
+                then,
+                otherwise,
+            } => {
+                let holds = self.integer(active, condition) != 0;
+                let value = self.integer(active, if holds { then } else { otherwise });
+                self.set_integer(active, target, value);
             }
             Instruction::DoubleArithmetic {
                 operator,

@@ -168,13 +168,17 @@ impl<'run> Execution<'run, '_> {
                 }
                 continue;
             }
-            match block.terminator {
+            match &block.terminator {
                 Terminator::Jump(target) => go_to(&mut active, target.0),
                 Terminator::Branch(condition, then, otherwise) => {
-                    let holds = self.integer(active, condition) != 0;
+                    let holds = self.integer(active, *condition) != 0;
                     go_to(&mut active, if holds { then.0 } else { otherwise.0 });
                 }
-                Terminator::Fail(kind, site) => return Err(RunTimeError { kind, site }),
+                Terminator::Switch(number, list, otherwise) => {
+                    let number = self.integer(active, *number) as usize;
+                    go_to(&mut active, list.get(number).unwrap_or(otherwise).0);
+                }
+                &Terminator::Fail(kind, site) => return Err(RunTimeError { kind, site }),
                 Terminator::Return(result) => {
                     let result = result.map_or(0, |register| self.register(active, register));
                     let Some(caller) = self.leave(active, result) else {

@@ -2,16 +2,6 @@
 
 use crate::ir::{Block, BlockId, Function, Terminator};
 
-/// The targets of a terminator, to be redirected.
-pub(super) fn targets_mut(terminator: &mut Terminator) -> impl Iterator<Item = &mut BlockId> {
-    let (first, second) = match terminator {
-        Terminator::Jump(target) => (Some(target), None),
-        Terminator::Branch(_, then, otherwise) => (Some(then), Some(otherwise)),
-        Terminator::Return(_) | Terminator::Fail(..) => (None, None),
-    };
-    first.into_iter().chain(second)
-}
-
 /// The successors of a block.
 pub(super) fn successors_of(function: &Function, block: usize) -> impl Iterator<Item = usize> {
     function.blocks[block]
@@ -46,7 +36,7 @@ pub(super) fn clean(function: &mut Function) {
         .collect();
     for index in order {
         let mut block = old[index].take().expect("every block is listed once");
-        for target in targets_mut(&mut block.terminator) {
+        for target in block.terminator.successors_mut() {
             let new = position[target.0 as usize];
             target.0 = new.expect("the successors of a reachable block are reachable");
         }
@@ -58,11 +48,13 @@ fn join_chains(function: &mut Function) {
     let reachable = reachable(function);
     let mut edges = vec![0; function.blocks.len()];
     for block in (0..function.blocks.len()).filter(|&block| reachable[block]) {
-        let terminator = &mut function.blocks[block].terminator;
-        if let Terminator::Branch(_, then, otherwise) = *terminator
-            && then == otherwise
-        {
-            *terminator = Terminator::Jump(then);
+        let mut targets = successors_of(function, block);
+        let only = targets
+            .next()
+            .filter(|only| targets.all(|target| target == *only));
+        drop(targets);
+        if let Some(only) = only {
+            function.blocks[block].terminator = Terminator::Jump(BlockId(only as u32));
         }
         for target in successors_of(function, block) {
             edges[target] += 1;
@@ -75,12 +67,12 @@ fn join_chains(function: &mut Function) {
                 break;
             }
             let rest = std::mem::take(&mut function.blocks[next].instructions);
-            let terminator = function.blocks[next].terminator;
-            function.blocks[block].instructions.extend(rest);
-            function.blocks[block].terminator = terminator;
             // What is left of the joined block leads nowhere, and nothing leads to it.
             edges[next] = 0;
-            function.blocks[next].terminator = Terminator::Return(None);
+            let terminator = &mut function.blocks[next].terminator;
+            let terminator = std::mem::replace(terminator, Terminator::Return(None));
+            function.blocks[block].instructions.extend(rest);
+            function.blocks[block].terminator = terminator;
         }
     }
 }

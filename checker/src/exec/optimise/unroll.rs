@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use crate::exec::arithmetic;
 use crate::ir::{Block, BlockId, Function, Instruction, Register, Terminator};
 
-use super::graph::{dominates, dominators, predecessors, successors_of, targets_mut};
+use super::graph::{dominates, dominators, predecessors, successors_of};
 use super::size_of_blocks;
 
 /// Loops of more rounds are left alone.
@@ -213,7 +213,7 @@ fn write_out(function: &mut Function, found: &Loop, end: &LoopEnd) {
             if is_last && block == end.block {
                 copy.terminator = Terminator::Jump(end.next);
             }
-            for target in targets_mut(&mut copy.terminator) {
+            for target in copy.terminator.successors_mut() {
                 let is_back = block == found.latch && target.0 as usize == found.head;
                 let round = if is_back && !is_last {
                     round + 1

@@ -425,13 +425,9 @@ fn reachable_blocks(blocks: Vec<Block>) -> Vec<Block> {
         .zip(reached)
         .filter(|&(_, reached)| reached);
     kept.map(|(mut block, _)| {
-        block.terminator = match block.terminator {
-            Terminator::Jump(next) => Terminator::Jump(renumber(next)),
-            Terminator::Branch(condition, yes, no) => {
-                Terminator::Branch(condition, renumber(yes), renumber(no))
-            }
-            other => other,
-        };
+        for target in block.terminator.successors_mut() {
+            *target = renumber(*target);
+        }
         block
     })
     .collect()

@@ -87,22 +87,17 @@ fn take_in(
         if let Some(register) = block.terminator.used_mut() {
             register.0 += first_register;
         }
-        let moved = |BlockId(block)| BlockId(block + first_block);
-        block.terminator = match block.terminator {
-            Terminator::Jump(to) => Terminator::Jump(moved(to)),
-            Terminator::Branch(condition, then, otherwise) => {
-                Terminator::Branch(condition, moved(then), moved(otherwise))
+        for target in block.terminator.successors_mut() {
+            target.0 += first_block;
+        }
+        if let Terminator::Return(result) = block.terminator {
+            if let (Some(target), Some(source)) = (target, result) {
+                block
+                    .instructions
+                    .push(Instruction::Copy { target, source });
             }
-            Terminator::Return(result) => {
-                if let (Some(target), Some(source)) = (target, result) {
-                    block
-                        .instructions
-                        .push(Instruction::Copy { target, source });
-                }
-                Terminator::Jump(next)
-            }
-            fails @ Terminator::Fail(..) => fails,
-        };
+            block.terminator = Terminator::Jump(next);
+        }
         function.blocks.push(block);
     }
 }

@@ -9,7 +9,7 @@ use crate::ir::{
     Update, Urgency,
 };
 use crate::stochastic::condition::{Condition, Number};
-use crate::stochastic::program::{Channel, Instance, Spot};
+use crate::stochastic::program::{Channel, Instance};
 use crate::stochastic::readers::Reader;
 
 /// More channels are not told apart.
@@ -31,29 +31,13 @@ struct Receiver<'p, 'a> {
 }
 
 impl<'a> RaceWriter<'_, 'a> {
-    /// The function that lets a process move.
-    pub(super) fn movement(&self, process: usize, plan: FunctionId) -> Function {
+    /// The function that lets a process move from a location.
+    pub(super) fn movement(&self, process: usize, location: usize, plan: FunctionId) -> Function {
         let result = (0, Some(RegisterType::Integer));
-        let mut w = self.writer(&format!("move of process {process}"), result);
-        let location = w.load(process as u32);
-        let start = w.block();
-        w.jump(start);
-        let spots = self.program.spots_of(process);
-        let mut places = Vec::new();
-        for (location, spot) in (0..).zip(spots) {
-            if spot.outputs.0 < spot.outputs.1 {
-                let block = w.block();
-                places.push((location, block));
-                w.at(block);
-                self.move_from(&mut w, (process, spot), plan);
-            }
-        }
-        w.at(start);
-        w.select(location, &places);
-        w.finish()
-    }
-
-    fn move_from(&self, w: &mut Writer, (process, spot): (usize, &Spot), plan: FunctionId) {
+        let name = format!("move of process {process} from location {location}");
+        let mut writer = self.writer(&name, result);
+        let w = &mut writer;
+        let spot = &self.program.spots_of(process)[location];
         let outputs = self.program.range(spot.outputs);
         let missed = w.block();
         if let [only] = outputs {
@@ -78,6 +62,7 @@ impl<'a> RaceWriter<'_, 'a> {
         mark(w, word, bit);
         let result = w.integer(MISSED);
         w.return_value(Some(result));
+        writer.finish()
     }
 
     /// Chooses one of the instances that are enabled, and returns its number; goes elsewhere if
@@ -519,7 +504,7 @@ impl<'a> RaceWriter<'_, 'a> {
 
 /// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
 /// `rest` says, which counts down. A number without a flag counts always.
-fn take_one_of(
+pub(super) fn take_one_of(
     w: &mut Writer,
     numbers: impl Iterator<Item = (i32, Option<Register>)>,
     rest: Register,

@@ -9,7 +9,8 @@ use crate::stochastic::program::Program;
 /// The functions of a race, by process.
 pub(super) struct Ids {
     pub(super) plans: Vec<FunctionId>,
-    pub(super) moves: Vec<FunctionId>,
+    /// By location: what lets it move from there, if it can.
+    pub(super) moves: Vec<Vec<Option<FunctionId>>>,
     pub(super) abilities: Vec<Option<FunctionId>>,
 }
 

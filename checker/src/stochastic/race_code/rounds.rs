@@ -1,50 +1,51 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
+use super::moves::take_one_of;
 use super::plans::tolerant;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};
 use super::writer::Writer;
-use crate::ir::{BlockId, Function, IntegerOperator, Register, RegisterType, Relation, Urgency};
+use crate::ir::{
+    BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Urgency,
+};
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::program::Spot;
 
-/// The processes that may win, by their attempts, with the least of them.
-enum Tree {
-    Leaf(usize, Register),
-    Fork(Register, Box<Tree>, Box<Tree>),
+/// Who wins, in registers.
+#[derive(Clone, Copy)]
+struct First {
+    winner: Register,
+    /// The least attempt.
+    attempt: Register,
+    /// The least attempt of the others, if there are any.
+    second: Option<Register>,
 }
 
-impl Tree {
-    fn of(w: &mut Writer, attempts: &[(usize, Register)]) -> Tree {
+impl First {
+    /// Who wins among some processes with their attempts. No branches: they would be mispredicted
+    /// every other time.
+    fn of(w: &mut Writer, attempts: &[(usize, Register)]) -> First {
         if let [(process, attempt)] = *attempts {
-            return Tree::Leaf(process, attempt);
+            return First {
+                winner: w.integer(process as i32),
+                attempt,
+                second: None,
+            };
         }
         let (left, right) = attempts.split_at(attempts.len() / 2);
-        let (left, right) = (Tree::of(w, left), Tree::of(w, right));
-        let least = w.least(left.least(), right.least());
-        Tree::Fork(least, Box::new(left), Box::new(right))
-    }
-
-    fn least(&self) -> Register {
-        match *self {
-            Tree::Leaf(_, least) | Tree::Fork(least, ..) => least,
+        let (left, right) = (First::of(w, left), First::of(w, right));
+        let is_left = w.compare_doubles(left.attempt, Relation::Less, right.attempt);
+        let winner = w.either(is_left, left.winner, right.winner);
+        let attempt = w.least(left.attempt, right.attempt);
+        let mut second = w.greatest(left.attempt, right.attempt);
+        for other in [left.second, right.second].into_iter().flatten() {
+            second = w.least(second, other);
         }
-    }
-
-    /// Goes to the place of the process with the least attempt, if there is one alone.
-    fn find(&self, w: &mut Writer, places: &[BlockId]) {
-        match self {
-            Tree::Leaf(process, _) => w.jump(places[*process]),
-            Tree::Fork(_, left, right) => {
-                let is_left = w.compare_doubles(left.least(), Relation::Less, right.least());
-                let (then, otherwise) = (w.block(), w.block());
-                w.branch(is_left, then, otherwise);
-                w.at(then);
-                left.find(w, places);
-                w.at(otherwise);
-                right.find(w, places);
-            }
+        First {
+            winner,
+            attempt,
+            second: Some(second),
         }
     }
 }
@@ -55,7 +56,6 @@ impl RaceWriter<'_, '_> {
         let layout = self.layout;
         let mut writer = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
         let w = &mut writer;
-        let processes = layout.attempts.len();
         let (round, over) = (w.block(), w.block());
         if let Some(renewal) = self.renewal_of_rates {
             // At the start of a run.
@@ -64,32 +64,26 @@ impl RaceWriter<'_, '_> {
         w.jump(round);
         w.at(round);
         self.plan_anew(w, ids);
-        // Where a process moves; the delay before it has passed.
-        let moves: Vec<BlockId> = (0..processes).map(|_| w.block()).collect();
+        // Where the winner moves; the delay before it has passed.
+        let (moving, winner) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
         let racing = w.block();
-        self.settle_committed(w, ids, watched, &moves, racing);
+        self.settle_committed(w, (ids, watched), (winner, moving), racing);
         w.at(racing);
         let attempts: Vec<(usize, Register)> = (0..)
             .zip(&layout.attempts)
             .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
             .collect();
         let infinity = w.double(f64::INFINITY);
-        let tree = if attempts.is_empty() {
-            w.copy(delay, infinity);
-            None
-        } else {
-            let tree = Tree::of(w, &attempts);
-            w.copy(delay, tree.least());
-            Some(tree)
-        };
+        let first = (!attempts.is_empty()).then(|| First::of(w, &attempts));
+        w.copy(delay, first.map_or(infinity, |first| first.attempt));
         let bounded = w.block();
         let has_stays = w.load(layout.has_stays);
         let free = w.block();
         w.branch(has_stays, bounded, free);
         // Some process may not stay for ever, and tries to move later than it must.
         w.at(bounded);
-        self.settle_stays(w, (ids, watched), delay, (&moves, free, over));
+        self.settle_stays(w, (ids, watched), delay, (winner, moving), (free, over));
         w.at(free);
         let (rest, slack) = self.rest(w);
         let passing = w.least(delay, rest);
@@ -103,50 +97,25 @@ impl RaceWriter<'_, '_> {
         w.copy(delay, rest);
         w.jump(over);
         w.at(in_time);
-        if let Some(tree) = tree {
-            let latest = tolerant(w, delay);
-            self.wait(w, passing, &attempts);
-            let count = w.integer(0);
-            for &(_, attempt) in &attempts {
-                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
-                let more = w.add_integers(count, is_first);
-                w.copy(count, more);
+        match first {
+            None => w.give_up(),
+            Some(first) => {
+                self.wait(w, passing, &attempts);
+                w.copy(winner, first.winner);
+                if let Some(second) = first.second {
+                    let latest = tolerant(w, delay);
+                    let are_many = w.compare_doubles(second, Relation::LessEqual, latest);
+                    let tied = w.block();
+                    w.branch(are_many, tied, moving);
+                    w.at(tied);
+                    Self::choose_among(w, &attempts, latest, winner);
+                }
+                w.jump(moving);
             }
-            let alone = w.block();
-            let are_many = w.compare_to(count, Relation::Greater, 1);
-            let tied = w.block();
-            w.branch(are_many, tied, alone);
-            w.at(alone);
-            tree.find(w, &moves);
-            w.at(tied);
-            let chosen = w.draw_below(count);
-            let minus_one = w.integer(-1);
-            for &(process, attempt) in &attempts {
-                let next = w.block();
-                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
-                w.unless(is_first, next);
-                let passed_over = w.block();
-                w.branch(chosen, passed_over, moves[process]);
-                w.at(passed_over);
-                let less = w.add_integers(chosen, minus_one);
-                w.copy(chosen, less);
-                w.jump(next);
-                w.at(next);
-            }
-            w.give_up();
-        } else {
-            w.give_up();
         }
+        w.at(moving);
         let (moved, go_on) = (w.block(), w.block());
-        for (process, &block) in moves.iter().enumerate() {
-            w.at(block);
-            if layout.attempts[process].is_none() {
-                w.give_up();
-                continue;
-            }
-            let has_moved = w.call_for(ids.moves[process], Vec::new());
-            w.branch(has_moved, moved, round);
-        }
+        self.let_move(w, ids, winner, (moved, round));
         w.at(moved);
         let left = w.load(layout.moves_left);
         let minus_one = w.integer(-1);
@@ -168,6 +137,63 @@ impl RaceWriter<'_, '_> {
         writer.finish()
     }
 
+    /// Sets the winner to one of the processes whose attempts come until then, all with the same
+    /// chance.
+    fn choose_among(
+        w: &mut Writer,
+        attempts: &[(usize, Register)],
+        latest: Register,
+        winner: Register,
+    ) {
+        let count = w.integer(0);
+        let flags: Vec<Register> = attempts
+            .iter()
+            .map(|&(_, attempt)| {
+                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
+                let more = w.add_integers(count, is_first);
+                w.copy(count, more);
+                is_first
+            })
+            .collect();
+        let rest = w.draw_below(count);
+        let processes = attempts.iter().map(|&(process, _)| process as i32);
+        take_one_of(w, processes.zip(flags.into_iter().map(Some)), rest, winner);
+    }
+
+    /// Lets the winner move from where it is; goes to one of two places, the first one if it could.
+    fn let_move(
+        &self,
+        w: &mut Writer,
+        ids: &Ids,
+        winner: Register,
+        (moved, missed): (BlockId, BlockId),
+    ) {
+        let wrong = w.block();
+        let processes = ids.moves.len() as u32;
+        let most = ids.moves.iter().map(Vec::len).max().unwrap_or(0);
+        let place = w.place(winner, (processes, 1));
+        let location = w.load_at(0, Some(place));
+        let row = w.place(winner, (processes, most as u32));
+        let cell = w.place_behind(row, location);
+        let moves: Vec<Option<FunctionId>> = ids
+            .moves
+            .iter()
+            .flat_map(|moves| (0..most).map(|location| *moves.get(location)?))
+            .collect();
+        let blocks = moves.iter().map(|one| one.map_or(wrong, |_| w.block()));
+        let blocks: Vec<BlockId> = blocks.collect();
+        w.switch(cell, blocks.clone(), wrong);
+        for (function, block) in moves.into_iter().zip(blocks) {
+            if let Some(function) = function {
+                w.at(block);
+                let has_moved = w.call_for(function, Vec::new());
+                w.branch(has_moved, moved, missed);
+            }
+        }
+        w.at(wrong);
+        w.give_up();
+    }
+
     fn plan_anew(&self, w: &mut Writer, ids: &Ids) {
         let layout = self.layout;
         for word in layout.stale..layout.stale + layout.stale_words {
@@ -187,17 +213,16 @@ impl RaceWriter<'_, '_> {
         }
     }
 
-    /// If there are committed locations, lets one of them be left; else goes to `racing`.
+    /// If there are committed locations, chooses who leaves one of them; else goes to `racing`.
     fn settle_committed(
         &self,
         w: &mut Writer,
-        ids: &Ids,
-        watched: &Watched,
-        moves: &[BlockId],
+        (ids, watched): (&Ids, &Watched),
+        (winner, moving): (Register, BlockId),
         racing: BlockId,
     ) {
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
-        let may_commit = (0..moves.len())
+        let may_commit = (0..ids.moves.len())
             .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
         let may_commit: Vec<usize> = may_commit.collect();
         if may_commit.is_empty() {
@@ -208,18 +233,18 @@ impl RaceWriter<'_, '_> {
         let settling = w.block();
         w.branch(committed, settling, racing);
         w.at(settling);
-        self.let_one_move(w, (ids, watched), (may_commit, true), moves);
+        self.let_one_move(w, (ids, watched), (may_commit, true), (winner, moving));
     }
 
-    /// Lets one of those move who can now, all with the same chance.
+    /// Chooses one of those who can move now as the winner, all with the same chance.
     fn let_one_move(
         &self,
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
         (processes, only_committed): (Vec<usize>, bool),
-        moves: &[BlockId],
+        (winner, moving): (Register, BlockId),
     ) {
-        let (winner, ties) = (w.integer(-1), w.integer(0));
+        let ties = w.integer(0);
         for &process in &processes {
             let Some(ability) = ids.abilities[process] else {
                 continue;
@@ -247,11 +272,7 @@ impl RaceWriter<'_, '_> {
         let nobody = w.block();
         w.unless(ties, nobody);
         self.watch(w, watched, None);
-        let wins: Vec<(i32, BlockId)> = processes
-            .iter()
-            .map(|&process| (process as i32, moves[process]))
-            .collect();
-        w.select(winner, &wins);
+        w.jump(moving);
         w.at(nobody);
         w.give_up();
     }
@@ -263,7 +284,8 @@ impl RaceWriter<'_, '_> {
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
         delay: Register,
-        (moves, free, over): (&[BlockId], BlockId, BlockId),
+        (winner, moving): (Register, BlockId),
+        (free, over): (BlockId, BlockId),
     ) {
         let infinity = w.double(f64::INFINITY);
         let mut least = infinity;
@@ -284,8 +306,8 @@ impl RaceWriter<'_, '_> {
             let zero = w.double(0.0);
             let is_zero = w.compare_doubles(least, Relation::LessEqual, zero);
             w.unless(is_zero, stuck);
-            let all = (0..moves.len()).collect();
-            self.let_one_move(w, (ids, watched), (all, false), moves);
+            let all = (0..ids.moves.len()).collect();
+            self.let_one_move(w, (ids, watched), (all, false), (winner, moving));
             w.at(later);
             let (rest, slack) = self.rest(w);
             let passing = w.least(least, rest);

@@ -83,7 +83,15 @@ impl WrittenRace {
         for process in processes {
             let plan = add(writer.plan(process), SMALL)?;
             ids.plans.push(plan);
-            ids.moves.push(add(writer.movement(process, plan), SMALL)?);
+            let mut moves = Vec::new();
+            for (location, spot) in program.spots_of(process).iter().enumerate() {
+                moves.push(if spot.outputs.0 < spot.outputs.1 {
+                    Some(add(writer.movement(process, location, plan), SMALL)?)
+                } else {
+                    None
+                });
+            }
+            ids.moves.push(moves);
             let ability = match layout.attempts[process] {
                 None => None,
                 Some(_) => Some(add(writer.ability(process), SMALL)?),

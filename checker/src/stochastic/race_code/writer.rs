@@ -86,6 +86,11 @@ impl Writer {
         self.end(Terminator::Branch(condition, then, otherwise));
     }
 
+    /// Goes to the block with this place in the list, or elsewhere if there is none.
+    pub(super) fn switch(&mut self, place: Register, list: Vec<BlockId>, otherwise: BlockId) {
+        self.end(Terminator::Switch(place, list.into(), otherwise));
+    }
+
     /// Goes on if the condition holds, else elsewhere.
     pub(super) fn unless(&mut self, condition: Register, otherwise: BlockId) {
         let next = self.block();
@@ -148,7 +153,12 @@ impl Writer {
     }
 
     pub(super) fn load(&mut self, word: u32) -> Register {
-        let address = word_of_state(word, None);
+        self.load_at(word, None)
+    }
+
+    /// Reads the word so many words behind a place, if that is given.
+    pub(super) fn load_at(&mut self, word: u32, index: Option<Register>) -> Register {
+        let address = word_of_state(word, index);
         self.result(RegisterType::Integer, |target| Instruction::LoadInteger {
             target,
             address,
@@ -353,6 +363,21 @@ impl Writer {
         })
     }
 
+    /// One of two integers, the first one if the condition holds.
+    pub(super) fn either(
+        &mut self,
+        condition: Register,
+        then: Register,
+        otherwise: Register,
+    ) -> Register {
+        self.result(RegisterType::Integer, |target| Instruction::Select {
+            target,
+            condition,
+            then,
+            otherwise,
+        })
+    }
+
     /// Whether so many words at two places are the same: 0 or 1.
     pub(super) fn same_words(&mut self, (left, right): (u32, u32), words: u32) -> Register {
         self.result(RegisterType::Integer, |target| Instruction::EqualWords {
@@ -365,13 +390,27 @@ impl Writer {
 
     /// The place of the double with this number in an array of so many.
     pub(super) fn place_of_double(&mut self, number: Register, length: u32) -> Register {
+        self.place(number, (length, 2))
+    }
+
+    /// The place of what has this number among so many of so many words each.
+    pub(super) fn place(&mut self, number: Register, (length, stride): (u32, u32)) -> Register {
         self.result(RegisterType::Integer, |target| Instruction::ScaleIndex {
             target,
             index: number,
             first: 0,
             length,
-            stride: 2,
+            stride,
             site: NOWHERE,
+        })
+    }
+
+    /// A place so many words behind another one.
+    pub(super) fn place_behind(&mut self, place: Register, by: Register) -> Register {
+        self.result(RegisterType::Integer, |target| Instruction::AddIndices {
+            target,
+            left: place,
+            right: by,
         })
     }
 

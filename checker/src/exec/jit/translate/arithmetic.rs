@@ -53,6 +53,19 @@ impl Translator<'_> {
                 let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, source, 0);
                 (target, self.truth(is_zero))
             }
+            Instruction::Select {
+                target,
+                condition,
+                then,
+                otherwise,
+            } => {
+                let [condition, then, otherwise] =
+                    [condition, then, otherwise].map(|register| self.get(register));
+                (
+                    target,
+                    self.builder.ins().select(condition, then, otherwise),
+                )
+            }
             Instruction::DoubleArithmetic {
                 operator,
                 target,
@@ -149,7 +162,8 @@ impl Translator<'_> {
                 self.builder.ins().select(less, left, right)
             }
             DoubleOperator::Maximum => {
-                let greater = ins.fcmp(FloatCC::GreaterThan, left, right);
+                // Cranelift knows the instruction for a maximum by this comparison only.
+                let greater = ins.fcmp(FloatCC::LessThan, right, left);
                 self.builder.ins().select(greater, left, right)
             }
         }

@@ -20,8 +20,8 @@ mod random;
 
 use cranelift_codegen::ir::types::{F64, I32, I64};
 use cranelift_codegen::ir::{
-    AbiParam, Block as NativeBlock, FuncRef, InstBuilder, MemFlagsData, SigRef, Signature, Type,
-    Value,
+    AbiParam, Block as NativeBlock, BlockCall, FuncRef, InstBuilder, JumpTableData, MemFlagsData,
+    SigRef, Signature, Type, Value,
 };
 use cranelift_codegen::isa::{CallConv, TargetFrontendConfig};
 use cranelift_frontend::{FunctionBuilder, Variable};
@@ -143,7 +143,7 @@ pub(super) fn translate(
         for instruction in &block.instructions {
             translator.instruction(instruction);
         }
-        translator.terminator(block.terminator);
+        translator.terminator(&block.terminator);
     }
     translator.write_failures();
     translator.builder.seal_all_blocks();
@@ -201,6 +201,7 @@ impl Translator<'_> {
             | Instruction::CompareIntegers { .. }
             | Instruction::CompareDoubles { .. }
             | Instruction::Not { .. }
+            | Instruction::Select { .. }
             | Instruction::DoubleArithmetic { .. }
             | Instruction::IntegerToDouble { .. }
             | Instruction::AddIndices { .. } => self.compute(instruction),
@@ -318,8 +319,8 @@ impl Translator<'_> {
         }
     }
 
-    fn terminator(&mut self, terminator: Terminator) {
-        match terminator {
+    fn terminator(&mut self, terminator: &Terminator) {
+        match *terminator {
             Terminator::Jump(target) => {
                 self.builder.ins().jump(self.blocks[target.0 as usize], &[]);
             }
@@ -330,6 +331,18 @@ impl Translator<'_> {
                 self.builder
                     .ins()
                     .brif(condition, then, &[], otherwise, &[]);
+            }
+            Terminator::Switch(number, ref list, otherwise) => {
+                let number = self.get(number);
+                let blocks = list.iter().map(|target| self.blocks[target.0 as usize]);
+                let pool = &mut self.builder.func.dfg.value_lists;
+                let calls = blocks.map(|block| BlockCall::new(block, [], pool));
+                let calls: Vec<BlockCall> = calls.collect();
+                let otherwise = self.blocks[otherwise.0 as usize];
+                let otherwise = BlockCall::new(otherwise, [], pool);
+                let table = JumpTableData::new(otherwise, &calls);
+                let table = self.builder.create_jump_table(table);
+                self.builder.ins().br_table(number, table);
             }
             Terminator::Fail(kind, site) => {
                 let block = self.failure(kind, site);

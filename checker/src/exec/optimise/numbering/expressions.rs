@@ -16,6 +16,7 @@ pub(super) enum Expression {
     CompareDoubles(Relation, Register, Register),
     Not(Register),
     DoubleArithmetic(DoubleOperator, Register, Register),
+    Select(Register, Register, Register),
     ToDouble(Register),
     ToInteger(Register),
     Math(MathFunction, Vec<Register>, Option<SiteId>),
@@ -71,6 +72,12 @@ pub(super) fn expression_of(instruction: &Instruction) -> Option<Expression> {
             };
             Expression::DoubleArithmetic(operator, left, right)
         }
+        &Instruction::Select {
+            condition,
+            then,
+            otherwise,
+            ..
+        } => Expression::Select(condition, then, otherwise),
         &Instruction::IntegerToDouble { source, .. } => Expression::ToDouble(source),
         &Instruction::DoubleToInteger { source, .. } => Expression::ToInteger(source),
         Instruction::Math {

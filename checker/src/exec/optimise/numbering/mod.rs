@@ -31,7 +31,7 @@ use crate::ir::{
 };
 
 use super::ConstantMemory;
-use super::graph::{dominators, predecessors, targets_mut};
+use super::graph::{dominators, predecessors};
 
 use expressions::{Expression, expression_of};
 use memory::MAX_WORDS_TO_EXPAND;
@@ -180,14 +180,21 @@ impl Numbering<'_, '_> {
         for instruction in instructions {
             self.instruction(instruction);
         }
-        let mut terminator = function.blocks[index].terminator;
+        let mut terminator = function.blocks[index].terminator.clone();
         if let Some(register) = terminator.used_mut() {
             *register = self.value(*register);
         }
-        if let Terminator::Branch(condition, then, otherwise) = terminator
-            && let Some(Number::Integer(condition)) = self.literal(condition)
-        {
-            terminator = Terminator::Jump(if condition != 0 { then } else { otherwise });
+        let decided = match &terminator {
+            Terminator::Branch(condition, then, otherwise) => self
+                .integer(*condition)
+                .map(|condition| if condition != 0 { *then } else { *otherwise }),
+            Terminator::Switch(number, list, otherwise) => self
+                .integer(*number)
+                .map(|number| *list.get(number as usize).unwrap_or(otherwise)),
+            _ => None,
+        };
+        if let Some(next) = decided {
+            terminator = Terminator::Jump(next);
             self.has_decided = true;
         }
         let carried = self.carried();
@@ -196,7 +203,7 @@ impl Numbering<'_, '_> {
                 self.output.extend(carried);
             }
         } else if !carried.is_empty() {
-            for target in targets_mut(&mut terminator) {
+            for target in terminator.successors_mut() {
                 if is_join[target.0 as usize] {
                     function.blocks.push(Block {
                         instructions: carried.clone(),

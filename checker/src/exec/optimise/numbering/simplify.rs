@@ -105,6 +105,19 @@ impl Numbering<'_, '_> {
                 right,
                 ..
             } => Number::Double(arithmetic::double(*operator, double(left)?, double(right)?)),
+            Instruction::Select {
+                condition,
+                then,
+                otherwise,
+                ..
+            } => {
+                let chosen = if integer(condition)? != 0 {
+                    then
+                } else {
+                    otherwise
+                };
+                Number::Integer(integer(chosen)?)
+            }
             Instruction::IntegerToDouble { source, .. } => {
                 Number::Double(f64::from(integer(source)?))
             }
