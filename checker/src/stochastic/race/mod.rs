@@ -10,7 +10,8 @@
 //!
 //! What a process has drawn is its *plan*. It stays as it is until something changes on which it
 //! depends. Drawing anew at any other moment would give the same law: both distributions,
-//! conditioned on "not yet", are themselves again.
+//! conditioned on "not yet", are themselves again. While somebody is in a committed location,
+//! nobody plans, for the next move comes at once.
 //!
 //! Under a strategy of the controller (`advised.rs`) its moves count only where the strategy
 //! allows them, and processes that have some plan anew before every move.
@@ -18,6 +19,7 @@
 //! Invariants, while no move is being made:
 //! * `attempts` and `bounds` of a process that is not in `stale` are what its plan says, counted
 //!   from now.
+//! * `movers` are those of the last move, the sender first, then the receivers in their order.
 //! * `spots` are the locations that the words of the state hold.
 //!
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
@@ -94,8 +96,8 @@ pub(in crate::stochastic) struct Race<'a> {
     since: (f64, u64),
     /// The moves until plans are drawn anew that wait for a clock.
     until_renewal: u32,
-    /// Who has made the last move and may have to plan anew.
-    winner: Option<usize>,
+    /// Whether those of the last move have still to plan.
+    has_moved: bool,
     /// What the strategy says, if the run is under one.
     advice: Option<Advice<'a>>,
     /// The first time at which an urgent channel stops time for a move that the strategy forbids,
@@ -136,7 +138,7 @@ impl<'a> Race<'a> {
             moves: 0,
             since: (0.0, 0),
             until_renewal: MOVES_OF_A_PLAN,
-            winner: None,
+            has_moved: false,
             advice: restriction.map(Advice::new),
             standstill: None,
             longest_stay: f64::INFINITY,
@@ -160,7 +162,7 @@ impl<'a> Race<'a> {
         self.since = (self.time, 0);
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
-        self.winner = None;
+        self.has_moved = false;
         self.stale.clear();
         self.is_stepped.fill(false);
         self.motion.start();
@@ -239,10 +241,11 @@ impl<'a> Race<'a> {
     ) -> Result<Next, Failure> {
         self.rest = rest;
         self.take_advice(program)?;
-        self.plan_anew(program)?;
         if self.committed > 0 {
+            self.put_plans_off(program)?;
             return self.next_committed(program);
         }
+        self.plan_anew(program)?;
         let mut delay = f64::INFINITY;
         for &attempt in &self.attempts {
             delay = delay.min(attempt);
@@ -405,7 +408,7 @@ impl<'a> Race<'a> {
             }
         }
         self.carry_out(program)?;
-        self.winner = Some(process);
+        self.has_moved = true;
         self.until_renewal -= 1;
         self.count_move(process, true)
     }

@@ -16,16 +16,18 @@ const UNITS_FOR_PLAN: usize = 128;
 impl<'a> Race<'a> {
     /// Lets all processes plan whose plans may have changed.
     pub(super) fn plan_anew(&mut self, program: &Program<'a>) -> Result<(), Failure> {
-        // Random numbers are drawn first for who has won, and then in the order of processes.
-        // Those who look along the motion of clocks come last, so that they need not look farther
-        // than to the first attempt.
-        if let Some(winner) = self.winner.take()
-            && self.is_stale[winner]
-            && !self.is_stepped[winner]
-        {
-            self.is_stale[winner] = false;
+        // Random numbers are drawn first for those that have moved, and then in the order of
+        // processes. Those who look along the motion of clocks come last, so that they need not
+        // look farther than to the first attempt.
+        if std::mem::take(&mut self.has_moved) {
             self.until = self.rest;
-            self.plan(program, winner)?;
+            for index in 0..self.movers.len() {
+                let process = program.instance(self.movers[index].0).process as usize;
+                if self.is_stale[process] && !self.is_stepped[process] {
+                    self.is_stale[process] = false;
+                    self.plan(program, process)?;
+                }
+            }
         }
         if self.until_renewal == 0 {
             self.renew(program);
@@ -53,7 +55,29 @@ impl<'a> Race<'a> {
         Ok(())
     }
 
-    pub(super) fn plan(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
+    /// Where time stands still, no process plans that may have to, but the invariants hold.
+    pub(super) fn put_plans_off(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+        if self.until_renewal == 0 {
+            self.renew(program);
+        }
+        self.until = 0.0;
+        for index in 0..self.stale.len() {
+            let process = self.stale[index] as usize;
+            let invariant = program.spot(process, self.locations[process]).invariant;
+            let is_kept = match invariant {
+                Condition::Compared(_) if !self.steps(program, invariant) => {
+                    self.holds(program, invariant, &[])?
+                }
+                _ => self.mask_of(program, invariant, &[], 0.0)?.now,
+            };
+            if !is_kept {
+                return Err(Failure::InvariantBroken(self.stand(process)));
+            }
+        }
+        Ok(())
+    }
+
+    fn plan(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
         let spot = program.spot(process, self.locations[process]);
         let bound = self.invariant_bound(program, spot, process)?;
         let is_urgent = spot.urgency != Urgency::Normal;

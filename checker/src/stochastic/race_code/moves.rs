@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::race_writer::RaceWriter;
+use super::race_writer::{Plans, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
     BlockId, Distribution, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation,
@@ -24,6 +24,7 @@ pub(super) const MOVED: i32 = 1;
 struct Receiver<'p, 'a> {
     /// By location: its inputs that may be on the channel.
     inputs: Vec<(i32, Vec<&'p Instance<'a>>)>,
+    process: u32,
     /// Which of all its inputs it takes, counted from 1; 0 if none.
     chosen: Register,
     /// Which branch of it.
@@ -32,7 +33,7 @@ struct Receiver<'p, 'a> {
 
 impl<'a> RaceWriter<'_, 'a> {
     /// The function that lets a process move from a location.
-    pub(super) fn movement(&self, process: usize, location: usize, plan: FunctionId) -> Function {
+    pub(super) fn movement(&self, process: usize, location: usize, plans: &[Plans]) -> Function {
         let result = (0, Some(RegisterType::Integer));
         let name = format!("move of process {process} from location {location}");
         let mut writer = self.writer(&name, result);
@@ -44,7 +45,7 @@ impl<'a> RaceWriter<'_, 'a> {
             if !spot.is_plain {
                 self.conditions.require(w, only.guard, &only.values, missed);
             }
-            self.carry_out(w, only, plan);
+            self.carry_out(w, only, plans);
         } else {
             let chosen = self.choose(w, outputs, missed);
             let takes: Vec<(i32, BlockId)> = (0..)
@@ -54,7 +55,7 @@ impl<'a> RaceWriter<'_, 'a> {
             w.select(chosen, &takes);
             for (output, &(_, block)) in outputs.iter().zip(&takes) {
                 w.at(block);
-                self.carry_out(w, output, plan);
+                self.carry_out(w, output, plans);
             }
         }
         w.at(missed);
@@ -104,7 +105,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, plan: FunctionId) {
+    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, plans: &[Plans]) {
         let channels = match sender.channel {
             Channel::None => None,
             Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
@@ -126,10 +127,10 @@ impl<'a> RaceWriter<'_, 'a> {
                     w.at(block);
                     let known = w.integer(channel);
                     let channel = channel as u32;
-                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), plan);
+                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), plans);
                 }
             }
-            channels => self.carry_out_on(w, sender, channels, plan),
+            channels => self.carry_out_on(w, sender, channels, plans),
         }
     }
 
@@ -147,7 +148,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         sender: &Instance<'a>,
         channels: Option<(Register, Range<u32>)>,
-        plan: FunctionId,
+        plans: &[Plans],
     ) {
         let mut receivers = Vec::new();
         if let Some((channel, channels)) = channels {
@@ -158,7 +159,6 @@ impl<'a> RaceWriter<'_, 'a> {
             }
         }
         let branch = self.branch(w, sender);
-        let process = sender.process as usize;
         for receiver in &receivers {
             self.branch_of_receiver(w, receiver);
         }
@@ -172,23 +172,83 @@ impl<'a> RaceWriter<'_, 'a> {
         if let Some(renewal) = self.renewal_of_rates {
             w.call(renewal, &[]);
         }
-        // Who has won plans first.
-        let (word, bit) = self.layout.stale_bit(process);
-        let (before, others) = (w.load(word), w.integer(!bit));
-        let after = w.arithmetic(IntegerOperator::And, before, others);
-        w.store(word, after);
-        if let [only] = &sender.edge.branches[..] {
-            let spot = self.program.spot(process, only.target);
-            let (broken, done) = (w.block(), w.block());
-            self.plan_at(w, (process, spot), (broken, done));
-            w.at(broken);
-            w.give_up();
-            w.at(done);
-        } else {
-            w.call(plan, &[]);
+        if self.has_committed {
+            let committed = w.load(self.layout.committed);
+            let (put_off, now) = (w.block(), w.block());
+            w.branch(committed, put_off, now);
+            w.at(put_off);
+            self.put_plans_off(w, sender, &receivers);
+            w.at(now);
+        }
+        self.plan_movers(w, (sender, branch), &receivers, plans);
+        let result = w.integer(MOVED);
+        w.return_value(Some(result));
+    }
+
+    /// Ends a move after which those that have moved do not plan yet.
+    fn put_plans_off(&self, w: &mut Writer, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) {
+        self.mark_processes(w, [sender.process]);
+        for receiver in receivers {
+            w.when(receiver.chosen, |w| {
+                self.mark_processes(w, [receiver.process]);
+            });
         }
         let result = w.integer(MOVED);
         w.return_value(Some(result));
+    }
+
+    /// Lets those plan that have moved, the sender first; the others do so later.
+    fn plan_movers(
+        &self,
+        w: &mut Writer,
+        (sender, branch): (&Instance<'a>, Register),
+        receivers: &[Receiver<'_, 'a>],
+        plans: &[Plans],
+    ) {
+        let branches = &sender.edge.branches;
+        self.unmark(w, sender.process);
+        for receiver in receivers {
+            w.when(receiver.chosen, |w| self.unmark(w, receiver.process));
+        }
+        let (start, done) = (w.block(), w.block());
+        w.jump(start);
+        let mut places = Vec::new();
+        for (number, branch) in (0..).zip(branches) {
+            let block = w.block();
+            places.push((number, block));
+            w.at(block);
+            let process = sender.process as usize;
+            let spot = self.program.spot(process, branch.target);
+            if spot.urgency == Urgency::Committed {
+                w.give_up();
+                continue;
+            }
+            let broken = w.block();
+            self.plan_at(w, (process, spot), (broken, done));
+            w.at(broken);
+            w.give_up();
+        }
+        w.at(start);
+        w.select(branch, &places);
+        w.at(done);
+        for receiver in receivers {
+            let done = w.block();
+            let plans = &plans[receiver.process as usize];
+            Self::for_chosen(w, receiver, done, |w, input| {
+                let plan = match &input.edge.branches[..] {
+                    [only] => plans.by_location[only.target.0 as usize],
+                    _ => Some(plans.anywhere),
+                };
+                match plan {
+                    None => {
+                        w.give_up();
+                        let unreached = w.block();
+                        w.at(unreached);
+                    }
+                    Some(plan) => w.call(plan, &[]),
+                }
+            });
+        }
     }
 
     /// Lets a process choose what it receives on one of some channels.
@@ -239,6 +299,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w.select(location, &places);
         w.at(next);
         Some(Receiver {
+            process,
             inputs,
             chosen,
             branch,
@@ -406,7 +467,9 @@ impl<'a> RaceWriter<'_, 'a> {
         let branch = &mover.edge.branches[number];
         update(w, &branch.update, &mover.values);
         let process = mover.process as usize;
-        let mut stale = vec![mover.process];
+        // Who has moved plans anyway, but who sets rates is looked at before.
+        let sets_rates = self.program.rated.contains(&mover.process);
+        let mut stale: Vec<u32> = sets_rates.then_some(mover.process).into_iter().collect();
         let readers = self.program.concerned(mover, number);
         self.mark_readers(w, readers, Some(mover.process));
         let (source, target) = (mover.edge.source, branch.target);
@@ -440,6 +503,14 @@ impl<'a> RaceWriter<'_, 'a> {
                 mark(w, word, mask);
             }
         }
+    }
+
+    /// Lets a process not plan anew.
+    fn unmark(&self, w: &mut Writer, process: u32) {
+        let (word, bit) = self.layout.stale_bit(process as usize);
+        let (before, others) = (w.load(word), w.integer(!bit));
+        let after = w.arithmetic(IntegerOperator::And, before, others);
+        w.store(word, after);
     }
 
     /// Lets those plan anew who are where their plans depend on what has changed; `but` does so

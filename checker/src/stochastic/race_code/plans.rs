@@ -4,7 +4,8 @@ use super::conditions::Span;
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{
-    BlockId, Distribution, Function, IntegerOperator, Register, RegisterType, Relation, Urgency,
+    BlockId, Distribution, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation,
+    Urgency,
 };
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::constants::TOLERANCE;
@@ -27,40 +28,82 @@ struct Exits {
 }
 
 impl RaceWriter<'_, '_> {
-    /// The function that lets a process plan.
-    pub(super) fn plan(&self, process: usize) -> Function {
-        let mut w = self.writer(&format!("plan of process {process}"), (0, None));
-        let location = w.load(process as u32);
-        let start = w.block();
-        w.jump(start);
-        let (idle, broken, done) = (w.block(), w.block(), w.block());
-        let spots = self.program.spots_of(process);
-        let places: Vec<(i32, BlockId)> = (0..)
-            .zip(spots)
-            .map(|(location, spot)| {
-                let is_idle = spot.outputs.0 == spot.outputs.1
-                    && spot.urgency == Urgency::Normal
-                    && spot.invariant == Condition::Always;
-                (location, if is_idle { idle } else { w.block() })
-            })
-            .collect();
-        w.at(start);
-        w.select(location, &places);
-        for (spot, &(_, block)) in spots.iter().zip(&places) {
-            if block != idle {
-                w.at(block);
-                self.plan_at(&mut w, (process, spot), (broken, done));
-            }
-        }
-        w.at(idle);
-        self.set_attempt(&mut w, process, None);
-        self.set_stay(&mut w, process, None);
-        w.jump(done);
+    /// The function that lets a process plan in a location.
+    pub(super) fn plan_in(&self, process: usize, location: usize) -> Function {
+        let name = format!("plan of process {process} in location {location}");
+        let mut w = self.writer(&name, (0, None));
+        let (broken, done) = (w.block(), w.block());
+        let spot = &self.program.spots_of(process)[location];
+        self.plan_at(&mut w, (process, spot), (broken, done));
         w.at(done);
         w.return_value(None);
         w.at(broken);
         w.give_up();
         w.finish()
+    }
+
+    /// The function that lets a process plan wherever it is.
+    pub(super) fn plan(&self, process: usize, by_location: &[Option<FunctionId>]) -> Function {
+        let mut w = self.writer(&format!("plan of process {process}"), (0, None));
+        let location = w.load(process as u32);
+        let (idle, wrong) = (w.block(), w.block());
+        let mut places = Vec::new();
+        let mut calls = Vec::new();
+        for (spot, &function) in self.program.spots_of(process).iter().zip(by_location) {
+            places.push(match function {
+                None => wrong,
+                Some(_) if is_idle(spot) => idle,
+                Some(function) => {
+                    let block = w.block();
+                    calls.push((block, function));
+                    block
+                }
+            });
+        }
+        w.switch(location, places, wrong);
+        for (block, function) in calls {
+            w.at(block);
+            w.call(function, &[]);
+            w.return_value(None);
+        }
+        w.at(idle);
+        self.set_attempt(&mut w, process, None);
+        self.set_stay(&mut w, process, None);
+        w.return_value(None);
+        w.at(wrong);
+        w.give_up();
+        w.finish()
+    }
+
+    /// The function that gives up unless the invariant of a process holds; `None` if it has none.
+    pub(super) fn invariant(&self, process: usize) -> Option<Function> {
+        let spots = self.program.spots_of(process);
+        if spots.iter().all(|spot| spot.invariant == Condition::Always) {
+            return None;
+        }
+        let mut w = self.writer(&format!("invariant of process {process}"), (0, None));
+        let location = w.load(process as u32);
+        let (kept, broken) = (w.block(), w.block());
+        let places: Vec<BlockId> = spots
+            .iter()
+            .map(|spot| match spot.invariant {
+                Condition::Always => kept,
+                _ => w.block(),
+            })
+            .collect();
+        w.switch(location, places.clone(), broken);
+        for (spot, block) in spots.iter().zip(places) {
+            if block != kept {
+                w.at(block);
+                self.conditions.require(&mut w, spot.invariant, &[], broken);
+                w.jump(kept);
+            }
+        }
+        w.at(kept);
+        w.return_value(None);
+        w.at(broken);
+        w.give_up();
+        Some(w.finish())
     }
 
     /// Sets in how long a process tries to move; without a moment it never does.
@@ -577,6 +620,13 @@ impl RaceWriter<'_, '_> {
         w.return_value(Some(infinity));
         writer.finish()
     }
+}
+
+/// Whether nothing ever comes of a plan.
+fn is_idle(spot: &Spot) -> bool {
+    spot.outputs.0 == spot.outputs.1
+        && spot.urgency == Urgency::Normal
+        && spot.invariant == Condition::Always
 }
 
 /// A number, as much greater as counts as equal.

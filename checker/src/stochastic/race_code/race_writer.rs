@@ -6,12 +6,22 @@ use super::writer::Writer;
 use crate::ir::{FunctionId, Network, RegisterType};
 use crate::stochastic::program::Program;
 
+/// The functions that let a process plan.
+pub(super) struct Plans {
+    /// Wherever it is.
+    pub(super) anywhere: FunctionId,
+    /// By location; none in committed ones.
+    pub(super) by_location: Vec<Option<FunctionId>>,
+}
+
 /// The functions of a race, by process.
 pub(super) struct Ids {
-    pub(super) plans: Vec<FunctionId>,
+    pub(super) plans: Vec<Plans>,
     /// By location: what lets it move from there, if it can.
     pub(super) moves: Vec<Vec<Option<FunctionId>>>,
     pub(super) abilities: Vec<Option<FunctionId>>,
+    /// What gives up unless its invariant holds, if it has any.
+    pub(super) invariants: Vec<Option<FunctionId>>,
 }
 
 /// Writes the functions of a race.
@@ -23,6 +33,8 @@ pub(super) struct RaceWriter<'p, 'a> {
     pub(super) in_windows: FunctionId,
     /// Sets the rates of clocks, if some location does.
     pub(super) renewal_of_rates: Option<FunctionId>,
+    /// Whether some location is committed.
+    pub(super) has_committed: bool,
 }
 
 impl<'a> RaceWriter<'_, 'a> {

@@ -63,13 +63,18 @@ impl RaceWriter<'_, '_> {
         }
         w.jump(round);
         w.at(round);
-        self.plan_anew(w, ids);
         // Where the winner moves; the delay before it has passed.
         let (moving, winner) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
         let racing = w.block();
-        self.settle_committed(w, (ids, watched), (winner, moving), racing);
+        if self.has_committed {
+            self.settle_committed(w, (ids, watched), (winner, moving), racing);
+        } else {
+            w.jump(racing);
+        }
         w.at(racing);
+        let plans = ids.plans.iter().map(|plans| Some(plans.anywhere));
+        self.call_for_stale(w, &plans.collect::<Vec<_>>(), true);
         let attempts: Vec<(usize, Register)> = (0..)
             .zip(&layout.attempts)
             .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
@@ -194,21 +199,24 @@ impl RaceWriter<'_, '_> {
         w.give_up();
     }
 
-    fn plan_anew(&self, w: &mut Writer, ids: &Ids) {
+    /// Calls the functions, by process, of those that plan anew; afterwards they do not any more if
+    /// `settles`.
+    fn call_for_stale(&self, w: &mut Writer, functions: &[Option<FunctionId>], settles: bool) {
         let layout = self.layout;
         for word in layout.stale..layout.stale + layout.stale_words {
             let mask = w.load(word);
             w.when(mask, |w| {
-                for (process, &plan) in ids.plans.iter().enumerate() {
+                for (process, &function) in functions.iter().enumerate() {
                     let (own, bit) = layout.stale_bit(process);
-                    if own != word {
-                        continue;
+                    if let Some(function) = function.filter(|_| own == word) {
+                        let bit = w.integer(bit);
+                        let is_stale = w.arithmetic(IntegerOperator::And, mask, bit);
+                        w.when(is_stale, |w| w.call(function, &[]));
                     }
-                    let bit = w.integer(bit);
-                    let is_stale = w.arithmetic(IntegerOperator::And, mask, bit);
-                    w.when(is_stale, |w| w.call(plan, &[]));
                 }
-                w.store_integer(word, 0);
+                if settles {
+                    w.store_integer(word, 0);
+                }
             });
         }
     }
@@ -224,16 +232,17 @@ impl RaceWriter<'_, '_> {
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
         let may_commit = (0..ids.moves.len())
             .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
-        let may_commit: Vec<usize> = may_commit.collect();
-        if may_commit.is_empty() {
-            w.jump(racing);
-            return;
-        }
         let committed = w.load(self.layout.committed);
         let settling = w.block();
         w.branch(committed, settling, racing);
         w.at(settling);
-        self.let_one_move(w, (ids, watched), (may_commit, true), (winner, moving));
+        self.call_for_stale(w, &ids.invariants, false);
+        self.let_one_move(
+            w,
+            (ids, watched),
+            (may_commit.collect(), true),
+            (winner, moving),
+        );
     }
 
     /// Chooses one of those who can move now as the winner, all with the same chance.

@@ -4,7 +4,7 @@ use super::asked::{End, Watched};
 use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
-use super::race_writer::{Ids, RaceWriter};
+use super::race_writer::{Ids, Plans, RaceWriter};
 use super::rates::rated_clocks;
 use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
@@ -52,6 +52,8 @@ impl WrittenRace {
         if !is_known(program, &conditions) {
             return None;
         }
+        let mut spots = (0..network.processes.len()).flat_map(|one| program.spots_of(one));
+        let has_committed = spots.any(|spot| spot.urgency == Urgency::Committed);
         let mut functions = network.functions.clone();
         let first = functions.len() as u32;
         let writer = RaceWriter {
@@ -60,6 +62,7 @@ impl WrittenRace {
             conditions,
             in_windows: FunctionId(first),
             renewal_of_rates: (!rated.is_empty()).then_some(FunctionId(first + 1)),
+            has_committed,
         };
         functions.push(writer.windows());
         if !rated.is_empty() {
@@ -75,28 +78,46 @@ impl WrittenRace {
             (instructions <= MOST_INSTRUCTIONS).then_some(id)
         };
         let processes = 0..network.processes.len();
+        let mut plans = Vec::new();
+        for process in processes.clone() {
+            let mut by_location = Vec::new();
+            for (location, spot) in program.spots_of(process).iter().enumerate() {
+                let is_committed = spot.urgency == Urgency::Committed;
+                by_location.push(if is_committed {
+                    None
+                } else {
+                    Some(add(writer.plan_in(process, location), SMALL)?)
+                });
+            }
+            plans.push(Plans {
+                anywhere: add(writer.plan(process, &by_location), SMALL)?,
+                by_location,
+            });
+        }
         let mut ids = Ids {
-            plans: Vec::new(),
+            plans,
             moves: Vec::new(),
             abilities: Vec::new(),
+            invariants: Vec::new(),
         };
         for process in processes {
-            let plan = add(writer.plan(process), SMALL)?;
-            ids.plans.push(plan);
             let mut moves = Vec::new();
             for (location, spot) in program.spots_of(process).iter().enumerate() {
                 moves.push(if spot.outputs.0 < spot.outputs.1 {
-                    Some(add(writer.movement(process, location, plan), SMALL)?)
+                    Some(add(writer.movement(process, location, &ids.plans), SMALL)?)
                 } else {
                     None
                 });
             }
             ids.moves.push(moves);
-            let ability = match layout.attempts[process] {
+            ids.abilities.push(match layout.attempts[process] {
                 None => None,
                 Some(_) => Some(add(writer.ability(process), SMALL)?),
-            };
-            ids.abilities.push(ability);
+            });
+            ids.invariants.push(match writer.invariant(process) {
+                Some(function) if has_committed => Some(add(function, SMALL)?),
+                _ => None,
+            });
         }
         let rounds = add(writer.rounds(&ids, watched), LARGE)?;
         Some(WrittenRace {
