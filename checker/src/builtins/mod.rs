@@ -13,8 +13,8 @@ mod random;
 pub(crate) use integer_result::IntegerResult;
 pub(crate) use library::canonical;
 pub(crate) use random::{
-    BUFFER as STREAM_BUFFER, BUFFERED as STREAM_BUFFERED, MOST_PARAMETERS,
-    POSITION as STREAM_POSITION,
+    BUFFER as STREAM_BUFFER, BUFFERED as STREAM_BUFFERED, LAYERS, MOST_PARAMETERS,
+    POSITION as STREAM_POSITION, exponential_edges,
 };
 pub use random::{Distribution, STREAM_WORDS, Stream};
 

@@ -14,6 +14,7 @@
 
 use std::convert::Infallible;
 use std::f64::consts::FRAC_PI_2;
+use std::sync::LazyLock;
 
 use rand_core::TryRng;
 use rand_distr::{
@@ -142,6 +143,34 @@ impl TryRng for Stream<'_> {
         }
         Ok(())
     }
+}
+
+/// The layers of the ziggurat by which exponential numbers are drawn; a power of 2.
+pub(crate) const LAYERS: usize = 256;
+
+/// Where the layers of the ziggurat end that [`Exp1`] draws from, the widest first; behind them the
+/// end of none, 0. A number below the next end is drawn with one multiplication (J. A. Doornik, "An
+/// improved ziggurat method to generate normal random samples", 2005).
+///
+/// The distribution does not tell them, but a stream can ask: the smallest number that it draws
+/// from a layer is its end, but for a power of 2.
+pub(crate) fn exponential_edges() -> &'static [f64; LAYERS + 1] {
+    static EDGES: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(|| {
+        std::array::from_fn(|layer| {
+            if layer == LAYERS {
+                return 0.0;
+            }
+            let mut words = [0; STREAM_WORDS];
+            let mut stream = Stream::of(&mut words);
+            // The number that chooses the layer; then one that accepts it, should it be asked for.
+            stream.set_number(POSITION, 1);
+            stream.set_number(BUFFER + 2, layer as u64);
+            stream.set_number(BUFFER + 4, u64::MAX);
+            let least: f64 = Exp1.sample(&mut stream);
+            least * (1_u64 << 53) as f64
+        })
+    });
+    &EDGES
 }
 
 const ROUNDS: usize = 10;

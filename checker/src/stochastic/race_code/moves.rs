@@ -526,7 +526,8 @@ impl<'a> RaceWriter<'_, 'a> {
             let is_at = w.load(reader.process);
             let is_there = w.compare_to(is_at, Relation::Equal, location as i32);
             let bit = w.integer(bit);
-            let bit = w.arithmetic(IntegerOperator::Multiply, is_there, bit);
+            let none = w.integer(0);
+            let bit = w.either(is_there, bit, none);
             let marked = w.load(word);
             let marked = w.arithmetic(IntegerOperator::Or, marked, bit);
             w.store(word, marked);

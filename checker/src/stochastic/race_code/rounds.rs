@@ -179,7 +179,7 @@ impl RaceWriter<'_, '_> {
         let place = w.place(winner, (processes, 1));
         let location = w.load_at(0, Some(place));
         let row = w.place(winner, (processes, most as u32));
-        let cell = w.place_behind(row, location);
+        let cell = w.add_integers(row, location);
         let moves: Vec<Option<FunctionId>> = ids
             .moves
             .iter()

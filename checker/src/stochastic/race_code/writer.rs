@@ -217,8 +217,13 @@ impl Writer {
         })
     }
 
+    /// The sum of small integers: nobody looks whether it fits.
     pub(super) fn add_integers(&mut self, left: Register, right: Register) -> Register {
-        self.arithmetic(IntegerOperator::Add, left, right)
+        self.result(RegisterType::Integer, |target| Instruction::AddIndices {
+            target,
+            left,
+            right,
+        })
     }
 
     pub(super) fn doubles(
@@ -402,15 +407,6 @@ impl Writer {
             length,
             stride,
             site: NOWHERE,
-        })
-    }
-
-    /// A place so many words behind another one.
-    pub(super) fn place_behind(&mut self, place: Register, by: Register) -> Register {
-        self.result(RegisterType::Integer, |target| Instruction::AddIndices {
-            target,
-            left: place,
-            right: by,
         })
     }
 

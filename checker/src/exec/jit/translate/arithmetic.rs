@@ -135,14 +135,20 @@ impl Translator<'_> {
                 site,
             } => {
                 let index = self.get(index);
-                let position = self.builder.ins().iadd_imm_s(index, -i64::from(first));
+                let position = match first {
+                    0 => index,
+                    _ => self.builder.ins().iadd_imm_s(index, -i64::from(first)),
+                };
                 let outside = self.builder.ins().icmp_imm_u(
                     IntCC::UnsignedGreaterThanOrEqual,
                     position,
                     i64::from(length),
                 );
                 self.fail_if(outside, RunTimeErrorKind::IndexOutOfBounds, site);
-                let scaled = self.builder.ins().imul_imm_u(position, i64::from(stride));
+                let scaled = match stride {
+                    1 => position,
+                    _ => self.builder.ins().imul_imm_u(position, i64::from(stride)),
+                };
                 (target, scaled)
             }
             _ => unreachable!("sorted out by instruction"),

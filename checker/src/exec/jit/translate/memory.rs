@@ -4,7 +4,7 @@ use std::mem::offset_of;
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I32, I64};
-use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value};
+use cranelift_codegen::ir::{InstBuilder, InstructionData, MemFlagsData, Opcode, Value};
 
 use crate::exec::jit::runtime::{self, NativeContext};
 use crate::ir::{Address, Base, Instruction};
@@ -66,9 +66,25 @@ impl Translator<'_> {
 
     /// The value, with one NaN for all.
     pub(super) fn canonical(&mut self, value: Value) -> Value {
+        if self.is_number(value) {
+            return value;
+        }
         let is_nan = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
         let nan = self.builder.ins().f64const(f64::NAN);
         self.builder.ins().select(is_nan, nan, value)
+    }
+
+    /// Whether a value is known not to be a NaN.
+    fn is_number(&self, value: Value) -> bool {
+        let graph = &self.builder.func.dfg;
+        let Some(instruction) = graph.value_def(value).inst() else {
+            return false;
+        };
+        match graph.insts[instruction] {
+            InstructionData::UnaryIeee64 { imm, .. } => !f64::from_bits(imm.bits()).is_nan(),
+            InstructionData::Unary { opcode, .. } => opcode == Opcode::FcvtFromSint,
+            _ => false,
+        }
     }
 
     fn copy_words(&mut self, target: Address, source: Address, words: u32) {

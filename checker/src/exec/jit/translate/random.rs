@@ -1,13 +1,15 @@
 //! Random numbers in native code.
 //!
-//! The uniform ones, which runs draw all the time, are taken from the numbers of the stream here
-//! as long as there are some that were made before; all else is called back.
+//! The uniform and the exponential ones, which runs draw all the time, are taken from the numbers of
+//! the stream here as long as there are some that were made before; all else is called back.
 
 use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift_codegen::ir::types::{F64, I64};
-use cranelift_codegen::ir::{InstBuilder, Value};
+use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value};
 
-use crate::builtins::{MOST_PARAMETERS, STREAM_BUFFER, STREAM_BUFFERED, STREAM_POSITION};
+use crate::builtins::{
+    LAYERS, MOST_PARAMETERS, STREAM_BUFFER, STREAM_BUFFERED, STREAM_POSITION, exponential_edges,
+};
 use crate::exec::jit::runtime;
 use crate::ir::{Address, Distribution, Register, RunTimeErrorKind, SiteId};
 
@@ -26,6 +28,15 @@ const fn place_of(distribution: Distribution) -> usize {
     place
 }
 
+/// The next number of a stream.
+struct Next {
+    /// How many were drawn before.
+    position: Value,
+    bits: Value,
+    /// Whether it was made before; else `bits` say nothing.
+    is_there: Value,
+}
+
 impl Translator<'_> {
     pub(super) fn draw(
         &mut self,
@@ -42,12 +53,13 @@ impl Translator<'_> {
                 None => self.builder.ins().f64const(0.0),
             });
         }
-        let value = match distribution {
-            Distribution::Uniform => self.uniform(stream, values[1]),
-            Distribution::Exponential => {
-                self.draw_one(runtime::draw_one::<EXPONENTIAL> as *const (), &values)
+        let code = match distribution {
+            Distribution::Uniform => return self.uniform(stream, values[1], site),
+            Distribution::Exponential => return self.exponential(stream, values[1], site),
+            Distribution::Below => {
+                values.truncate(2);
+                runtime::draw_one::<BELOW> as *const ()
             }
-            Distribution::Below => self.draw_one(runtime::draw_one::<BELOW> as *const (), &values),
             _ => {
                 let number = Distribution::ALL
                     .iter()
@@ -55,50 +67,32 @@ impl Translator<'_> {
                 let number = number.expect("the list has every distribution");
                 let number = self.integer(number as i32);
                 values.insert(1, number);
-                let code = runtime::draw as *const () as usize;
-                self.call_back(code, Some(F64), &values)
+                runtime::draw as *const ()
             }
         };
+        self.draw_elsewhere((distribution, code), &values, site)
+    }
+
+    /// Calls back what draws; fails if an argument is out of its domain.
+    fn draw_elsewhere(
+        &mut self,
+        (distribution, code): (Distribution, *const ()),
+        values: &[Value],
+        site: SiteId,
+    ) -> Value {
+        let value = self.call_back(code as usize, Some(F64), values);
         let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
         self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
         value
     }
 
-    /// Calls back what draws from a distribution of one parameter.
-    fn draw_one(&mut self, code: *const (), values: &[Value]) -> Value {
-        self.call_back(code as usize, Some(F64), &values[..2])
-    }
-
     /// A uniform number below `max`, as [`Distribution::sample`] draws it.
-    fn uniform(&mut self, stream: Value, max: Value) -> Value {
-        let word = |place: usize| 4 * place as i32;
-        let ins = self.builder.ins();
-        let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
-        let within = (STREAM_BUFFERED - 1) as i64;
-        let place = self.builder.ins().band_imm_s(position, within);
-        // The first number of the buffer is the one that fills it.
-        let is_there = self.builder.ins().icmp_imm_s(IntCC::NotEqual, place, 0);
+    fn uniform(&mut self, stream: Value, max: Value, site: SiteId) -> Value {
+        let next = self.next_number(stream);
         let size = self.builder.ins().fabs(max);
         let infinity = self.builder.ins().f64const(f64::INFINITY);
         let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, size, infinity);
-        let is_fast = self.builder.ins().band(is_there, is_finite);
-        let (fast, slow, next) = (
-            self.builder.create_block(),
-            self.builder.create_block(),
-            self.builder.create_block(),
-        );
-        self.builder.append_block_param(next, F64);
-        self.builder.set_cold_block(slow);
-        self.builder.ins().brif(is_fast, fast, &[], slow, &[]);
-        self.builder.switch_to_block(fast);
-        let bytes = self.builder.ins().ishl_imm_u(place, 3);
-        let base = self.builder.ins().iadd(stream, bytes);
-        let ins = self.builder.ins();
-        let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
-        let after = self.builder.ins().iadd_imm_s(position, 1);
-        let ins = self.builder.ins();
-        ins.store(MODEL_MEMORY, after, stream, word(STREAM_POSITION));
-        let bits = self.builder.ins().ushr_imm_u(bits, 11);
+        let bits = self.builder.ins().ushr_imm_u(next.bits, 11);
         let whole = self.builder.ins().fcvt_from_sint(F64, bits);
         let scale = self.builder.ins().f64const(1.0 / (1_u64 << 53) as f64);
         let part = self.builder.ins().fmul(whole, scale);
@@ -106,11 +100,93 @@ impl Translator<'_> {
         // The sum is the same number, but never the negative 0.
         let zero = self.builder.ins().f64const(0.0);
         let value = self.builder.ins().fadd(value, zero);
-        self.builder.ins().jump(next, &[value.into()]);
-        self.builder.switch_to_block(slow);
-        let value = self.draw_one(runtime::draw_one::<UNIFORM> as *const (), &[stream, max]);
-        self.builder.ins().jump(next, &[value.into()]);
-        self.builder.switch_to_block(next);
-        self.builder.block_params(next)[0]
+        let code = runtime::draw_one::<UNIFORM> as *const ();
+        let elsewhere = (Distribution::Uniform, code);
+        self.take_if(is_finite, (stream, &next, value), (elsewhere, max, site))
+    }
+
+    /// An exponential number with this rate, as [`Distribution::sample`] draws it.
+    fn exponential(&mut self, stream: Value, rate: Value, site: SiteId) -> Value {
+        let next = self.next_number(stream);
+        let zero = self.builder.ins().f64const(0.0);
+        let is_positive = self.builder.ins().fcmp(FloatCC::GreaterThan, rate, zero);
+        let infinity = self.builder.ins().f64const(f64::INFINITY);
+        let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, rate, infinity);
+        let is_rate = self.builder.ins().band(is_positive, is_finite);
+        // The low bits choose a layer of the ziggurat, the high ones a place in it.
+        let layer = self.builder.ins().band_imm_s(next.bits, LAYERS as i64 - 1);
+        let layer = self.builder.ins().ishl_imm_u(layer, 3);
+        let high = self.builder.ins().ushr_imm_u(next.bits, 12);
+        let one = self.builder.ins().iconst(I64, 1.0_f64.to_bits() as i64);
+        let from_one = self.builder.ins().bor(high, one);
+        let from_one = self
+            .builder
+            .ins()
+            .bitcast(F64, MemFlagsData::new(), from_one);
+        let almost_one = self.builder.ins().f64const(1.0 - f64::EPSILON / 2.0);
+        let part = self.builder.ins().fsub(from_one, almost_one);
+        let edges = exponential_edges().as_ptr() as i64;
+        let edges = self.builder.ins().iconst(I64, edges);
+        let edges = self.builder.ins().iadd(edges, layer);
+        let ins = self.builder.ins();
+        let edge = ins.load(F64, MODEL_MEMORY, edges, 0);
+        let ins = self.builder.ins();
+        let next_edge = ins.load(F64, MODEL_MEMORY, edges, 8);
+        let drawn = self.builder.ins().fmul(part, edge);
+        let is_inside = self.builder.ins().fcmp(FloatCC::LessThan, drawn, next_edge);
+        let is_known = self.builder.ins().band(is_rate, is_inside);
+        let value = self.builder.ins().fdiv(drawn, rate);
+        let code = runtime::draw_one::<EXPONENTIAL> as *const ();
+        let elsewhere = (Distribution::Exponential, code);
+        self.take_if(is_known, (stream, &next, value), (elsewhere, rate, site))
+    }
+
+    /// The next number of a stream, if it was made before.
+    fn next_number(&mut self, stream: Value) -> Next {
+        let word = |place: usize| 4 * place as i32;
+        let ins = self.builder.ins();
+        let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
+        let within = (STREAM_BUFFERED - 1) as i64;
+        let place = self.builder.ins().band_imm_s(position, within);
+        // The first number of the buffer is the one that fills it.
+        let is_there = self.builder.ins().icmp_imm_s(IntCC::NotEqual, place, 0);
+        let bytes = self.builder.ins().ishl_imm_u(place, 3);
+        let base = self.builder.ins().iadd(stream, bytes);
+        let ins = self.builder.ins();
+        let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
+        Next {
+            position,
+            bits,
+            is_there,
+        }
+    }
+
+    /// The value that was made of the next number, if that is there and the condition holds; else
+    /// one that is drawn elsewhere.
+    fn take_if(
+        &mut self,
+        condition: Value,
+        (stream, next, value): (Value, &Next, Value),
+        (elsewhere, argument, site): ((Distribution, *const ()), Value, SiteId),
+    ) -> Value {
+        let is_known = self.builder.ins().band(next.is_there, condition);
+        let (known, unknown, done) = (
+            self.builder.create_block(),
+            self.builder.create_block(),
+            self.builder.create_block(),
+        );
+        self.builder.append_block_param(done, F64);
+        self.builder.set_cold_block(unknown);
+        self.builder.ins().brif(is_known, known, &[], unknown, &[]);
+        self.builder.switch_to_block(known);
+        let after = self.builder.ins().iadd_imm_s(next.position, 1);
+        let ins = self.builder.ins();
+        ins.store(MODEL_MEMORY, after, stream, 4 * STREAM_POSITION as i32);
+        self.builder.ins().jump(done, &[value.into()]);
+        self.builder.switch_to_block(unknown);
+        let value = self.draw_elsewhere(elsewhere, &[stream, argument], site);
+        self.builder.ins().jump(done, &[value.into()]);
+        self.builder.switch_to_block(done);
+        self.builder.block_params(done)[0]
     }
 }
