@@ -3,6 +3,8 @@
 //! The optimiser of the engine leaves calls as they are, for it gains nothing in symbolic queries.
 //! In a race a guard or an update is often cheaper than its call.
 
+use rustc_hash::FxHashMap;
+
 use crate::ir::{Block, BlockId, Function, FunctionId, Instruction, Register, Terminator};
 
 /// How large a function is: its instructions, ends of blocks included.
@@ -72,12 +74,19 @@ fn take_in(
         &mut before.terminator,
         Terminator::Jump(BlockId(first_block)),
     );
+    // Where a call decides how its caller goes on, a constant result leads there directly.
+    let decides = after.is_empty().then(|| end.clone());
+    let constants = constants_of(callee);
     function.blocks.push(Block {
         instructions: after,
         terminator: end,
     });
     for block in &callee.blocks {
         let mut block = block.clone();
+        let returned = match block.terminator {
+            Terminator::Return(result) => result,
+            _ => None,
+        };
         for instruction in &mut block.instructions {
             instruction.each_use_mut(&mut |register| register.0 += first_register);
             if let Some(register) = instruction.target_mut() {
@@ -91,13 +100,46 @@ fn take_in(
             target.0 += first_block;
         }
         if let Terminator::Return(result) = block.terminator {
+            let value = returned.and_then(|result| *constants.get(&result)?);
             if let (Some(target), Some(source)) = (target, result) {
                 block
                     .instructions
                     .push(Instruction::Copy { target, source });
             }
-            block.terminator = Terminator::Jump(next);
+            block.terminator = Terminator::Jump(match (&decides, value) {
+                (Some(Terminator::Branch(condition, then, otherwise)), Some(value))
+                    if Some(*condition) == target =>
+                {
+                    if value == 0 {
+                        *otherwise
+                    } else {
+                        *then
+                    }
+                }
+                _ => next,
+            });
         }
         function.blocks.push(block);
     }
+}
+
+/// The registers of a function that are written once, with an integer that is known; `None` for
+/// those that are written in another way.
+fn constants_of(function: &Function) -> FxHashMap<Register, Option<i32>> {
+    let mut constants = FxHashMap::default();
+    for instruction in function.instructions() {
+        if let Some(target) = instruction.target() {
+            let value = match *instruction {
+                Instruction::Integer { value, .. } if target.0 >= function.parameters => {
+                    Some(value)
+                }
+                _ => None,
+            };
+            let known = constants.entry(target).or_insert(value);
+            if *known != value {
+                *known = None;
+            }
+        }
+    }
+    constants
 }
