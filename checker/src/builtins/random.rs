@@ -79,7 +79,7 @@ impl<'a> Stream<'a> {
     #[inline]
     pub fn exponential(&mut self, rate: f64) -> f64 {
         let one: f64 = Exp1.sample(self);
-        one / rate
+        one * (1.0 / rate)
     }
 
     /// An integer less than `n`, each with the same probability. `n` is not 0.

@@ -100,7 +100,8 @@ impl<'a> RaceWriter<'_, 'a> {
             return rest;
         }
         let chosen = w.integer(0);
-        take_one_of(w, (0..).zip(flags), rest, chosen);
+        let numbers: Vec<Register> = (0..).take(flags.len()).map(|one| w.integer(one)).collect();
+        take_one_of(w, numbers.into_iter().zip(flags), rest, chosen);
         chosen
     }
 
@@ -348,8 +349,10 @@ impl<'a> RaceWriter<'_, 'a> {
             let are_many = w.compare_to(count, Relation::Greater, 1);
             w.when(are_many, |w| {
                 let rest = w.draw_below(count);
+                let numbers = (first..).take(flags.len()).map(|one| w.integer(one));
+                let numbers: Vec<Register> = numbers.collect();
                 let flags = flags.into_iter().map(Some);
-                take_one_of(w, (first..).zip(flags), rest, taken);
+                take_one_of(w, numbers.into_iter().zip(flags), rest, taken);
             });
         }
         w.copy(chosen, taken);
@@ -578,7 +581,7 @@ impl<'a> RaceWriter<'_, 'a> {
 /// `rest` says, which counts down. A number without a flag counts always.
 pub(super) fn take_one_of(
     w: &mut Writer,
-    numbers: impl Iterator<Item = (i32, Option<Register>)>,
+    numbers: impl Iterator<Item = (Register, Option<Register>)>,
     rest: Register,
     chosen: Register,
 ) {
@@ -588,8 +591,7 @@ pub(super) fn take_one_of(
         if let Some(flag) = flag {
             w.unless(flag, next);
         }
-        let this = w.integer(number);
-        w.copy(chosen, this);
+        w.copy(chosen, number);
         let goes_on = w.block();
         w.branch(rest, goes_on, found);
         w.at(goes_on);

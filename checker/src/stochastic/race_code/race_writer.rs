@@ -24,6 +24,13 @@ pub(super) struct Ids {
     pub(super) invariants: Vec<Option<FunctionId>>,
 }
 
+impl Ids {
+    /// The most locations of a process.
+    pub(super) fn locations(&self) -> usize {
+        self.moves.iter().map(Vec::len).max().unwrap_or(0)
+    }
+}
+
 /// Writes the functions of a race.
 pub(super) struct RaceWriter<'p, 'a> {
     pub(super) program: &'p Program<'a>,

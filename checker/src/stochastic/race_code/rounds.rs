@@ -15,7 +15,8 @@ use crate::stochastic::program::Spot;
 /// Who wins, in registers.
 #[derive(Clone, Copy)]
 struct First {
-    winner: Register,
+    /// The cell of the winner and its location in the table of moves.
+    cell: Register,
     /// The least attempt.
     attempt: Register,
     /// The least attempt of the others, if there are any.
@@ -23,27 +24,23 @@ struct First {
 }
 
 impl First {
-    /// Who wins among some processes with their attempts. No branches: they would be mispredicted
+    /// Who wins among some of which everyone is first alone. No branches: they would be mispredicted
     /// every other time.
-    fn of(w: &mut Writer, attempts: &[(usize, Register)]) -> First {
-        if let [(process, attempt)] = *attempts {
-            return First {
-                winner: w.integer(process as i32),
-                attempt,
-                second: None,
-            };
+    fn of(w: &mut Writer, all: &[First]) -> First {
+        if let [only] = *all {
+            return only;
         }
-        let (left, right) = attempts.split_at(attempts.len() / 2);
+        let (left, right) = all.split_at(all.len() / 2);
         let (left, right) = (First::of(w, left), First::of(w, right));
         let is_left = w.compare_doubles(left.attempt, Relation::Less, right.attempt);
-        let winner = w.either(is_left, left.winner, right.winner);
+        let cell = w.either(is_left, left.cell, right.cell);
         let attempt = w.least(left.attempt, right.attempt);
         let mut second = w.greatest(left.attempt, right.attempt);
         for other in [left.second, right.second].into_iter().flatten() {
             second = w.least(second, other);
         }
         First {
-            winner,
+            cell,
             attempt,
             second: Some(second),
         }
@@ -63,12 +60,13 @@ impl RaceWriter<'_, '_> {
         }
         w.jump(round);
         w.at(round);
-        // Where the winner moves; the delay before it has passed.
-        let (moving, winner) = (w.block(), w.integer(0));
+        // Where the winner moves, from the location that the cell says; the delay before it has
+        // passed.
+        let (moving, cell) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
         let racing = w.block();
         if self.has_committed {
-            self.settle_committed(w, (ids, watched), (winner, moving), racing);
+            self.settle_committed(w, (ids, watched), (cell, moving), racing);
         } else {
             w.jump(racing);
         }
@@ -80,7 +78,17 @@ impl RaceWriter<'_, '_> {
             .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
             .collect();
         let infinity = w.double(f64::INFINITY);
-        let first = (!attempts.is_empty()).then(|| First::of(w, &attempts));
+        // Where a process is is read before it is known who wins: the jump that follows then waits
+        // for nothing but the attempts.
+        let alone: Vec<First> = attempts
+            .iter()
+            .map(|&(process, attempt)| First {
+                cell: Self::cell(w, ids, process),
+                attempt,
+                second: None,
+            })
+            .collect();
+        let first = (!alone.is_empty()).then(|| First::of(w, &alone));
         w.copy(delay, first.map_or(infinity, |first| first.attempt));
         let bounded = w.block();
         let has_stays = w.load(layout.has_stays);
@@ -88,7 +96,7 @@ impl RaceWriter<'_, '_> {
         w.branch(has_stays, bounded, free);
         // Some process may not stay for ever, and tries to move later than it must.
         w.at(bounded);
-        self.settle_stays(w, (ids, watched), delay, (winner, moving), (free, over));
+        self.settle_stays(w, (ids, watched), delay, (cell, moving), (free, over));
         w.at(free);
         let (rest, slack) = self.rest(w);
         let passing = w.least(delay, rest);
@@ -106,21 +114,21 @@ impl RaceWriter<'_, '_> {
             None => w.give_up(),
             Some(first) => {
                 self.wait(w, passing, &attempts);
-                w.copy(winner, first.winner);
+                w.copy(cell, first.cell);
                 if let Some(second) = first.second {
                     let latest = tolerant(w, delay);
                     let are_many = w.compare_doubles(second, Relation::LessEqual, latest);
                     let tied = w.block();
                     w.branch(are_many, tied, moving);
                     w.at(tied);
-                    Self::choose_among(w, &attempts, latest, winner);
+                    Self::choose_among(w, &alone, latest, cell);
                 }
                 w.jump(moving);
             }
         }
         w.at(moving);
         let (moved, go_on) = (w.block(), w.block());
-        self.let_move(w, ids, winner, (moved, round));
+        self.let_move(w, ids, cell, (moved, round));
         w.at(moved);
         let left = w.load(layout.moves_left);
         let minus_one = w.integer(-1);
@@ -142,44 +150,41 @@ impl RaceWriter<'_, '_> {
         writer.finish()
     }
 
-    /// Sets the winner to one of the processes whose attempts come until then, all with the same
-    /// chance.
-    fn choose_among(
-        w: &mut Writer,
-        attempts: &[(usize, Register)],
-        latest: Register,
-        winner: Register,
-    ) {
+    /// Sets the cell to one of those whose attempts come until then, all with the same chance.
+    fn choose_among(w: &mut Writer, all: &[First], latest: Register, cell: Register) {
         let count = w.integer(0);
-        let flags: Vec<Register> = attempts
+        let flags: Vec<Register> = all
             .iter()
-            .map(|&(_, attempt)| {
-                let is_first = w.compare_doubles(attempt, Relation::LessEqual, latest);
+            .map(|one| {
+                let is_first = w.compare_doubles(one.attempt, Relation::LessEqual, latest);
                 let more = w.add_integers(count, is_first);
                 w.copy(count, more);
                 is_first
             })
             .collect();
         let rest = w.draw_below(count);
-        let processes = attempts.iter().map(|&(process, _)| process as i32);
-        take_one_of(w, processes.zip(flags.into_iter().map(Some)), rest, winner);
+        let cells = all.iter().map(|one| one.cell);
+        take_one_of(w, cells.zip(flags.into_iter().map(Some)), rest, cell);
     }
 
-    /// Lets the winner move from where it is; goes to one of two places, the first one if it could.
+    /// The cell of a process and the location where it is in the table of moves.
+    fn cell(w: &mut Writer, ids: &Ids, process: usize) -> Register {
+        let location = w.load(process as u32);
+        let row = w.integer((process * ids.locations()) as i32);
+        w.add_integers(location, row)
+    }
+
+    /// Lets the winner move from where it is, as its cell says; goes to one of two places, the first
+    /// one if it could.
     fn let_move(
         &self,
         w: &mut Writer,
         ids: &Ids,
-        winner: Register,
+        cell: Register,
         (moved, missed): (BlockId, BlockId),
     ) {
         let wrong = w.block();
-        let processes = ids.moves.len() as u32;
-        let most = ids.moves.iter().map(Vec::len).max().unwrap_or(0);
-        let place = w.place(winner, (processes, 1));
-        let location = w.load_at(0, Some(place));
-        let row = w.place(winner, (processes, most as u32));
-        let cell = w.add_integers(row, location);
+        let most = ids.locations();
         let moves: Vec<Option<FunctionId>> = ids
             .moves
             .iter()
@@ -226,7 +231,7 @@ impl RaceWriter<'_, '_> {
         &self,
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
-        (winner, moving): (Register, BlockId),
+        (cell, moving): (Register, BlockId),
         racing: BlockId,
     ) {
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
@@ -241,7 +246,7 @@ impl RaceWriter<'_, '_> {
             w,
             (ids, watched),
             (may_commit.collect(), true),
-            (winner, moving),
+            (cell, moving),
         );
     }
 
@@ -251,7 +256,7 @@ impl RaceWriter<'_, '_> {
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
         (processes, only_committed): (Vec<usize>, bool),
-        (winner, moving): (Register, BlockId),
+        (cell, moving): (Register, BlockId),
     ) {
         let ties = w.integer(0);
         for &process in &processes {
@@ -272,8 +277,8 @@ impl RaceWriter<'_, '_> {
                 let drawn = w.draw_below(ties);
                 w.branch(drawn, next, wins);
                 w.at(wins);
-                let number = w.integer(process as i32);
-                w.copy(winner, number);
+                let own = Self::cell(w, ids, process);
+                w.copy(cell, own);
                 w.jump(next);
                 w.at(next);
             });
@@ -293,7 +298,7 @@ impl RaceWriter<'_, '_> {
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
         delay: Register,
-        (winner, moving): (Register, BlockId),
+        (cell, moving): (Register, BlockId),
         (free, over): (BlockId, BlockId),
     ) {
         let infinity = w.double(f64::INFINITY);
@@ -316,7 +321,7 @@ impl RaceWriter<'_, '_> {
             let is_zero = w.compare_doubles(least, Relation::LessEqual, zero);
             w.unless(is_zero, stuck);
             let all = (0..ids.moves.len()).collect();
-            self.let_one_move(w, (ids, watched), (all, false), (winner, moving));
+            self.let_one_move(w, (ids, watched), (all, false), (cell, moving));
             w.at(later);
             let (rest, slack) = self.rest(w);
             let passing = w.least(least, rest);

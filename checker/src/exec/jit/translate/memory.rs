@@ -74,17 +74,22 @@ impl Translator<'_> {
         self.builder.ins().select(is_nan, nan, value)
     }
 
+    /// The double that a value always is, if it is a constant.
+    pub(super) fn double(&self, value: Value) -> Option<f64> {
+        let graph = &self.builder.func.dfg;
+        match graph.insts[graph.value_def(value).inst()?] {
+            InstructionData::UnaryIeee64 { imm, .. } => Some(f64::from_bits(imm.bits())),
+            _ => None,
+        }
+    }
+
     /// Whether a value is known not to be a NaN.
     fn is_number(&self, value: Value) -> bool {
         let graph = &self.builder.func.dfg;
-        let Some(instruction) = graph.value_def(value).inst() else {
-            return false;
-        };
-        match graph.insts[instruction] {
-            InstructionData::UnaryIeee64 { imm, .. } => !f64::from_bits(imm.bits()).is_nan(),
-            InstructionData::Unary { opcode, .. } => opcode == Opcode::FcvtFromSint,
-            _ => false,
-        }
+        let definition = graph.value_def(value).inst();
+        let is_integer = definition
+            .is_some_and(|instruction| graph.insts[instruction].opcode() == Opcode::FcvtFromSint);
+        is_integer || self.double(value).is_some_and(|double| !double.is_nan())
     }
 
     fn copy_words(&mut self, target: Address, source: Address, words: u32) {

@@ -94,12 +94,22 @@ impl Translator<'_> {
         let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, size, infinity);
         let bits = self.builder.ins().ushr_imm_u(next.bits, 11);
         let whole = self.builder.ins().fcvt_from_sint(F64, bits);
-        let scale = self.builder.ins().f64const(1.0 / (1_u64 << 53) as f64);
-        let part = self.builder.ins().fmul(whole, scale);
-        let value = self.builder.ins().fmul(max, part);
-        // The sum is the same number, but never the negative 0.
-        let zero = self.builder.ins().f64const(0.0);
-        let value = self.builder.ins().fadd(value, zero);
+        let scale = 1.0 / (1_u64 << 53) as f64;
+        let value = match self.double(max) {
+            // One multiplication rounds as two do where one of them is exact.
+            Some(max) if max * scale >= f64::MIN_POSITIVE => {
+                let unit = self.builder.ins().f64const(max * scale);
+                self.builder.ins().fmul(whole, unit)
+            }
+            _ => {
+                let scale = self.builder.ins().f64const(scale);
+                let part = self.builder.ins().fmul(whole, scale);
+                let value = self.builder.ins().fmul(max, part);
+                // The sum is the same number, but never the negative 0.
+                let zero = self.builder.ins().f64const(0.0);
+                self.builder.ins().fadd(value, zero)
+            }
+        };
         let code = runtime::draw_one::<UNIFORM> as *const ();
         let elsewhere = (Distribution::Uniform, code);
         self.take_if(is_finite, (stream, &next, value), (elsewhere, max, site))
@@ -112,6 +122,13 @@ impl Translator<'_> {
         let is_positive = self.builder.ins().fcmp(FloatCC::GreaterThan, rate, zero);
         let infinity = self.builder.ins().f64const(f64::INFINITY);
         let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, rate, infinity);
+        let mean = match self.double(rate) {
+            Some(rate) => self.builder.ins().f64const(1.0 / rate),
+            None => {
+                let one = self.builder.ins().f64const(1.0);
+                self.builder.ins().fdiv(one, rate)
+            }
+        };
         let is_rate = self.builder.ins().band(is_positive, is_finite);
         // The low bits choose a layer of the ziggurat, the high ones a place in it.
         let layer = self.builder.ins().band_imm_s(next.bits, LAYERS as i64 - 1);
@@ -135,7 +152,7 @@ impl Translator<'_> {
         let drawn = self.builder.ins().fmul(part, edge);
         let is_inside = self.builder.ins().fcmp(FloatCC::LessThan, drawn, next_edge);
         let is_known = self.builder.ins().band(is_rate, is_inside);
-        let value = self.builder.ins().fdiv(drawn, rate);
+        let value = self.builder.ins().fmul(drawn, mean);
         let code = runtime::draw_one::<EXPONENTIAL> as *const ();
         let elsewhere = (Distribution::Exponential, code);
         self.take_if(is_known, (stream, &next, value), (elsewhere, rate, site))
