@@ -101,8 +101,9 @@ impl<'a> Stream<'a> {
         self.0[place + 1] = (number >> 32) as i32;
     }
 
-    /// Makes the numbers of the blocks from this one on.
-    fn fill(&mut self, first: u64) {
+    /// Makes the numbers that come next, where none is left.
+    pub(crate) fn fill(&mut self) {
+        let first = self.number(POSITION) / BLOCK as u64;
         let (run, seed) = (self.number(RUN), self.number(SEED));
         let counters: [_; BLOCKS] =
             std::array::from_fn(|block| [first.wrapping_add(block as u64), run, 0, 0]);
@@ -117,7 +118,7 @@ impl<'a> Stream<'a> {
         let position = self.number(POSITION);
         let place = (position % BUFFERED as u64) as usize;
         if place == 0 {
-            self.fill(position / BLOCK as u64);
+            self.fill();
         }
         self.set_number(POSITION, position.wrapping_add(1));
         self.number(BUFFER + 2 * place)

@@ -125,6 +125,14 @@ pub(super) extern "C" fn power(base: i32, exponent: i32) -> IntegerResult {
     })
 }
 
+/// Makes the next numbers of a stream, of which none is left.
+#[expect(unsafe_code, reason = "compiled code passes raw addresses")]
+pub(super) unsafe extern "C" fn fill(stream: *mut i32) {
+    // SAFETY: as in [`draw_one`].
+    let words = unsafe { std::slice::from_raw_parts_mut(stream, STREAM_WORDS) };
+    Stream::of(words).fill();
+}
+
 /// Draws a random number of one distribution, by its place in [`Distribution::ALL`]: as [`draw`]
 /// does, and faster.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]

@@ -1,5 +1,7 @@
 //! Writes functions: registers and blocks, in the order in which they run.
 
+use std::collections::BTreeSet;
+
 use crate::ir::{
     Address, Base, Block, BlockId, Distribution, DoubleOperator, Function, FunctionId, Instruction,
     IntegerOperator, Register, RegisterType, Relation, RunTimeErrorKind, SiteId, Terminator,
@@ -7,6 +9,9 @@ use crate::ir::{
 
 /// Code that is written here fails nowhere but where it gives up, which needs no place.
 const NOWHERE: SiteId = SiteId(0);
+
+/// From so many different places on, a table leads to them faster than comparisons.
+const WORTH_A_TABLE: usize = 4;
 
 /// A function that is being written. What is written goes to the end of the current block.
 pub(super) struct Writer {
@@ -426,6 +431,18 @@ impl Writer {
     /// Goes to one of several places by a number that is one of theirs; they are in ascending
     /// order of their numbers.
     pub(super) fn select(&mut self, number: Register, places: &[(i32, BlockId)]) {
+        let different: BTreeSet<BlockId> = places.iter().map(|&(_, block)| block).collect();
+        let has_gaps = places.windows(2).any(|two| two[1].0 != two[0].0 + 1);
+        if different.len() >= WORTH_A_TABLE && !has_gaps {
+            let first = self.integer(-places[0].0);
+            let place = self.add_integers(number, first);
+            let list = places.iter().map(|&(_, block)| block).collect();
+            let wrong = self.block();
+            self.switch(place, list, wrong);
+            self.at(wrong);
+            self.give_up();
+            return;
+        }
         let mut open = vec![(self.current, places)];
         while let Some((block, places)) = open.pop() {
             self.current = block;

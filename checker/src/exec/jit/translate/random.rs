@@ -3,7 +3,7 @@
 //! The uniform and the exponential ones, which runs draw all the time, are taken from the numbers of
 //! the stream here as long as there are some that were made before; all else is called back.
 
-use cranelift_codegen::ir::condcodes::{FloatCC, IntCC};
+use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::types::{F64, I64};
 use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value};
 
@@ -33,8 +33,6 @@ struct Next {
     /// How many were drawn before.
     position: Value,
     bits: Value,
-    /// Whether it was made before; else `bits` say nothing.
-    is_there: Value,
 }
 
 impl Translator<'_> {
@@ -89,9 +87,14 @@ impl Translator<'_> {
     /// A uniform number below `max`, as [`Distribution::sample`] draws it.
     fn uniform(&mut self, stream: Value, max: Value, site: SiteId) -> Value {
         let next = self.next_number(stream);
-        let size = self.builder.ins().fabs(max);
-        let infinity = self.builder.ins().f64const(f64::INFINITY);
-        let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, size, infinity);
+        let is_finite = match self.double(max) {
+            Some(max) if max.is_finite() => None,
+            _ => {
+                let size = self.builder.ins().fabs(max);
+                let infinity = self.builder.ins().f64const(f64::INFINITY);
+                Some(self.builder.ins().fcmp(FloatCC::LessThan, size, infinity))
+            }
+        };
         let bits = self.builder.ins().ushr_imm_u(next.bits, 11);
         let whole = self.builder.ins().fcvt_from_sint(F64, bits);
         let scale = 1.0 / (1_u64 << 53) as f64;
@@ -118,18 +121,20 @@ impl Translator<'_> {
     /// An exponential number with this rate, as [`Distribution::sample`] draws it.
     fn exponential(&mut self, stream: Value, rate: Value, site: SiteId) -> Value {
         let next = self.next_number(stream);
-        let zero = self.builder.ins().f64const(0.0);
-        let is_positive = self.builder.ins().fcmp(FloatCC::GreaterThan, rate, zero);
-        let infinity = self.builder.ins().f64const(f64::INFINITY);
-        let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, rate, infinity);
-        let mean = match self.double(rate) {
-            Some(rate) => self.builder.ins().f64const(1.0 / rate),
-            None => {
+        let (mean, is_rate) = match self.double(rate) {
+            Some(rate) if rate > 0.0 && rate.is_finite() => {
+                (self.builder.ins().f64const(1.0 / rate), None)
+            }
+            _ => {
+                let (zero, infinity) = (0.0, f64::INFINITY);
+                let [zero, infinity] = [zero, infinity].map(|it| self.builder.ins().f64const(it));
+                let is_positive = self.builder.ins().fcmp(FloatCC::GreaterThan, rate, zero);
+                let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, rate, infinity);
+                let is_rate = self.builder.ins().band(is_positive, is_finite);
                 let one = self.builder.ins().f64const(1.0);
-                self.builder.ins().fdiv(one, rate)
+                (self.builder.ins().fdiv(one, rate), Some(is_rate))
             }
         };
-        let is_rate = self.builder.ins().band(is_positive, is_finite);
         // The low bits choose a layer of the ziggurat, the high ones a place in it.
         let layer = self.builder.ins().band_imm_s(next.bits, LAYERS as i64 - 1);
         let layer = self.builder.ins().ishl_imm_u(layer, 3);
@@ -151,42 +156,61 @@ impl Translator<'_> {
         let next_edge = ins.load(F64, MODEL_MEMORY, edges, 8);
         let drawn = self.builder.ins().fmul(part, edge);
         let is_inside = self.builder.ins().fcmp(FloatCC::LessThan, drawn, next_edge);
-        let is_known = self.builder.ins().band(is_rate, is_inside);
+        let is_known = match is_rate {
+            None => is_inside,
+            Some(is_rate) => self.builder.ins().band(is_rate, is_inside),
+        };
         let value = self.builder.ins().fmul(drawn, mean);
         let code = runtime::draw_one::<EXPONENTIAL> as *const ();
         let elsewhere = (Distribution::Exponential, code);
-        self.take_if(is_known, (stream, &next, value), (elsewhere, rate, site))
+        self.take_if(
+            Some(is_known),
+            (stream, &next, value),
+            (elsewhere, rate, site),
+        )
     }
 
-    /// The next number of a stream, if it was made before.
+    /// The next number of a stream.
     fn next_number(&mut self, stream: Value) -> Next {
         let word = |place: usize| 4 * place as i32;
         let ins = self.builder.ins();
         let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
         let within = (STREAM_BUFFERED - 1) as i64;
         let place = self.builder.ins().band_imm_s(position, within);
-        // The first number of the buffer is the one that fills it.
-        let is_there = self.builder.ins().icmp_imm_s(IntCC::NotEqual, place, 0);
+        // Whoever takes the first number of the buffer fills it before.
+        let (empty, full) = (self.builder.create_block(), self.builder.create_block());
+        self.builder.set_cold_block(empty);
+        self.builder.ins().brif(place, full, &[], empty, &[]);
+        self.builder.switch_to_block(empty);
+        self.call_back(runtime::fill as *const () as usize, None, &[stream]);
+        self.builder.ins().jump(full, &[]);
+        self.builder.switch_to_block(full);
         let bytes = self.builder.ins().ishl_imm_u(place, 3);
         let base = self.builder.ins().iadd(stream, bytes);
         let ins = self.builder.ins();
         let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
-        Next {
-            position,
-            bits,
-            is_there,
-        }
+        Next { position, bits }
     }
 
-    /// The value that was made of the next number, if that is there and the condition holds; else
-    /// one that is drawn elsewhere.
+    /// Takes the next number of a stream.
+    fn take(&mut self, stream: Value, next: &Next) {
+        let after = self.builder.ins().iadd_imm_s(next.position, 1);
+        let ins = self.builder.ins();
+        ins.store(MODEL_MEMORY, after, stream, 4 * STREAM_POSITION as i32);
+    }
+
+    /// Takes the next number of a stream with the value that was made of it, if the condition holds;
+    /// else the value is drawn elsewhere. Without a condition it always holds.
     fn take_if(
         &mut self,
-        condition: Value,
+        condition: Option<Value>,
         (stream, next, value): (Value, &Next, Value),
         (elsewhere, argument, site): ((Distribution, *const ()), Value, SiteId),
     ) -> Value {
-        let is_known = self.builder.ins().band(next.is_there, condition);
+        let Some(condition) = condition else {
+            self.take(stream, next);
+            return value;
+        };
         let (known, unknown, done) = (
             self.builder.create_block(),
             self.builder.create_block(),
@@ -194,11 +218,9 @@ impl Translator<'_> {
         );
         self.builder.append_block_param(done, F64);
         self.builder.set_cold_block(unknown);
-        self.builder.ins().brif(is_known, known, &[], unknown, &[]);
+        self.builder.ins().brif(condition, known, &[], unknown, &[]);
         self.builder.switch_to_block(known);
-        let after = self.builder.ins().iadd_imm_s(next.position, 1);
-        let ins = self.builder.ins();
-        ins.store(MODEL_MEMORY, after, stream, 4 * STREAM_POSITION as i32);
+        self.take(stream, next);
         self.builder.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(unknown);
         let value = self.draw_elsewhere(elsewhere, &[stream, argument], site);
