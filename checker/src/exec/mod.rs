@@ -27,6 +27,7 @@ pub use interpreter::Interpreter;
 pub use jit::{Jit, JitError};
 pub use libraries::{Libraries, call_hook};
 pub use optimise::optimise;
+pub(crate) use optimise::simplified;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};
 pub use wraps::Wraps;

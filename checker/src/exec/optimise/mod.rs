@@ -55,6 +55,16 @@ pub(super) fn optimised(
     (function, read)
 }
 
+/// A function in a faster form that goes into others, so that its rounds are not counted yet.
+pub(crate) fn simplified(mut function: Function, constants: &Constants) -> Function {
+    let mut memory = ConstantMemory {
+        words: constants,
+        read: FxHashMap::default(),
+    };
+    improve(&mut function, &mut memory, Tuning::default());
+    function
+}
+
 /// The constant memory, and what was read of it.
 struct ConstantMemory<'a> {
     words: &'a [i32],
