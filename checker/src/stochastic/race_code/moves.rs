@@ -1,12 +1,13 @@
 //! Code for what a move does, as `stochastic/race/transition.rs` says it.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::race_writer::{Plans, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
-    BlockId, Distribution, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation,
-    Update, Urgency,
+    BlockId, Distribution, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register,
+    RegisterType, Relation, Update, Urgency,
 };
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::program::{Channel, Instance};
@@ -17,8 +18,10 @@ const MOST_CHANNELS: usize = 32;
 
 /// What the function of a move returns if no output of the process is enabled after all.
 pub(super) const MISSED: i32 = 0;
-/// What it returns if the process has moved.
+/// What it returns if the process has moved, and nobody is in a committed location;
 pub(super) const MOVED: i32 = 1;
+/// or somebody is, so that those who have moved do not plan yet.
+pub(super) const PUT_OFF: i32 = 2;
 
 /// A process that may receive what is sent.
 struct Receiver<'p, 'a> {
@@ -29,6 +32,14 @@ struct Receiver<'p, 'a> {
     chosen: Register,
     /// Which branch of it.
     branch: Register,
+}
+
+impl<'p, 'a> Receiver<'p, 'a> {
+    fn all_inputs(&self) -> impl Iterator<Item = &'p Instance<'a>> {
+        self.inputs
+            .iter()
+            .flat_map(|(_, inputs)| inputs.iter().copied())
+    }
 }
 
 impl<'a> RaceWriter<'_, 'a> {
@@ -173,7 +184,7 @@ impl<'a> RaceWriter<'_, 'a> {
         if let Some(renewal) = self.renewal_of_rates {
             w.call(renewal, &[]);
         }
-        if self.has_committed {
+        if self.may_commit(sender, &receivers) {
             let committed = w.load(self.layout.committed);
             let (put_off, now) = (w.block(), w.block());
             w.branch(committed, put_off, now);
@@ -186,6 +197,50 @@ impl<'a> RaceWriter<'_, 'a> {
         w.return_value(Some(result));
     }
 
+    /// Whether a process may be in a location that is committed when the movers have moved.
+    fn may_commit(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> bool {
+        let inputs = receivers.iter().flat_map(Receiver::all_inputs);
+        let mut entered = inputs.chain([sender]).flat_map(|mover| {
+            let branches = mover.edge.branches.iter();
+            branches.map(|branch| (mover.process, branch.target))
+        });
+        // If the sender is not in such a location, nobody is: it could not move.
+        let mut others = (0..self.network().processes.len() as u32)
+            .filter(|&process| process != sender.process && self.leaves_committed(sender));
+        entered.any(|(process, target)| self.is_committed(process, target))
+            || others.any(|process| {
+                let locations = 0..self.program.spots_of(process as usize).len() as u32;
+                locations
+                    .map(LocationId)
+                    .any(|one| self.is_committed(process, one))
+            })
+    }
+
+    fn is_committed(&self, process: u32, location: LocationId) -> bool {
+        self.program.spot(process as usize, location).urgency == Urgency::Committed
+    }
+
+    fn leaves_committed(&self, sender: &Instance<'a>) -> bool {
+        self.is_committed(sender.process, sender.edge.source)
+    }
+
+    /// Who may be marked when the movers have moved: by them, or before if plans were put off.
+    fn marked_by(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> BTreeSet<u32> {
+        if self.renewal_of_rates.is_some() || self.leaves_committed(sender) {
+            return (0..self.network().processes.len() as u32).collect();
+        }
+        let inputs = receivers.iter().flat_map(Receiver::all_inputs);
+        let marked = inputs.chain([sender]).flat_map(|mover| {
+            let branches = 0..mover.edge.branches.len();
+            let concerned = branches.flat_map(|number| self.program.concerned(mover, number));
+            let followers = self.program.followers(ProcessId(mover.process)).iter();
+            concerned
+                .map(|reader| reader.process)
+                .chain(followers.copied())
+        });
+        marked.collect()
+    }
+
     /// Ends a move after which those that have moved do not plan yet.
     fn put_plans_off(&self, w: &mut Writer, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) {
         self.mark_processes(w, [sender.process]);
@@ -194,7 +249,7 @@ impl<'a> RaceWriter<'_, 'a> {
                 self.mark_processes(w, [receiver.process]);
             });
         }
-        let result = w.integer(MOVED);
+        let result = w.integer(PUT_OFF);
         w.return_value(Some(result));
     }
 
@@ -207,9 +262,14 @@ impl<'a> RaceWriter<'_, 'a> {
         plans: &[Plans],
     ) {
         let branches = &sender.edge.branches;
-        self.unmark(w, sender.process);
+        let marked = self.marked_by(sender, receivers);
+        if marked.contains(&sender.process) {
+            self.unmark(w, sender.process);
+        }
         for receiver in receivers {
-            w.when(receiver.chosen, |w| self.unmark(w, receiver.process));
+            if marked.contains(&receiver.process) {
+                w.when(receiver.chosen, |w| self.unmark(w, receiver.process));
+            }
         }
         let (start, done) = (w.block(), w.block());
         w.jump(start);
@@ -489,7 +549,7 @@ impl<'a> RaceWriter<'_, 'a> {
                 let committed = w.add_integers(committed, change);
                 w.store(self.layout.committed, committed);
             }
-            stale.extend(self.program.followers(crate::ir::ProcessId(mover.process)));
+            stale.extend(self.program.followers(ProcessId(mover.process)));
         }
         self.mark_processes(w, stale);
     }

@@ -64,9 +64,12 @@ impl RaceWriter<'_, '_> {
         // passed.
         let (moving, cell) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
-        let racing = w.block();
+        let (settling, racing) = (w.block(), w.block());
         if self.has_committed {
-            self.settle_committed(w, (ids, watched), (cell, moving), racing);
+            let committed = w.load(layout.committed);
+            w.branch(committed, settling, racing);
+            w.at(settling);
+            self.settle_committed(w, (ids, watched), (cell, moving));
         } else {
             w.jump(racing);
         }
@@ -98,17 +101,29 @@ impl RaceWriter<'_, '_> {
         w.at(bounded);
         self.settle_stays(w, (ids, watched), delay, (cell, moving), (free, over));
         w.at(free);
+        let (inside, beyond, in_time) = (w.block(), w.block(), w.block());
+        let passing = w.double(0.0);
+        let (bound, time) = (w.load_double(layout.bound), w.load_double(layout.time));
+        let rest = w.subtract(bound, time);
+        let is_inside = w.compare_doubles(delay, Relation::LessEqual, rest);
+        w.branch(is_inside, inside, beyond);
+        w.at(beyond);
+        // But for rounding, the run is over before anybody moves.
         let (rest, slack) = self.rest(w);
-        let passing = w.least(delay, rest);
+        let first_end = w.least(delay, rest);
+        w.copy(passing, first_end);
         self.watch(w, watched, Some(passing));
         let latest_end = w.add(rest, slack);
         let is_late = w.compare_doubles(latest_end, Relation::Less, delay);
-        let in_time = w.block();
         let late = w.block();
         w.branch(is_late, late, in_time);
         w.at(late);
         w.copy(delay, rest);
         w.jump(over);
+        w.at(inside);
+        w.copy(passing, delay);
+        self.watch(w, watched, Some(passing));
+        w.jump(in_time);
         w.at(in_time);
         match first {
             None => w.give_up(),
@@ -127,14 +142,17 @@ impl RaceWriter<'_, '_> {
             }
         }
         w.at(moving);
-        let (moved, go_on) = (w.block(), w.block());
-        self.let_move(w, ids, cell, (moved, round));
-        w.at(moved);
-        let left = w.load(layout.moves_left);
-        let minus_one = w.integer(-1);
-        let left = w.add_integers(left, minus_one);
-        w.store(layout.moves_left, left);
-        w.branch(left, round, go_on);
+        w.count_round();
+        let (moved, put_off, go_on) = (w.block(), w.block(), w.block());
+        self.let_move(w, ids, cell, [round, moved, put_off]);
+        for (block, next) in [(moved, racing), (put_off, settling)] {
+            w.at(block);
+            let left = w.load(layout.moves_left);
+            let minus_one = w.integer(-1);
+            let left = w.add_integers(left, minus_one);
+            w.store(layout.moves_left, left);
+            w.branch(left, next, go_on);
+        }
         w.at(go_on);
         let result = w.integer(GOES_ON);
         w.return_value(Some(result));
@@ -174,15 +192,9 @@ impl RaceWriter<'_, '_> {
         w.add_integers(location, row)
     }
 
-    /// Lets the winner move from where it is, as its cell says; goes to one of two places, the first
-    /// one if it could.
-    fn let_move(
-        &self,
-        w: &mut Writer,
-        ids: &Ids,
-        cell: Register,
-        (moved, missed): (BlockId, BlockId),
-    ) {
+    /// Lets the winner move from where it is, as its cell says; goes where what the function of the
+    /// move returns leads.
+    fn let_move(&self, w: &mut Writer, ids: &Ids, cell: Register, next: [BlockId; 3]) {
         let wrong = w.block();
         let most = ids.locations();
         let moves: Vec<Option<FunctionId>> = ids
@@ -196,8 +208,8 @@ impl RaceWriter<'_, '_> {
         for (function, block) in moves.into_iter().zip(blocks) {
             if let Some(function) = function {
                 w.at(block);
-                let has_moved = w.call_for(function, Vec::new());
-                w.branch(has_moved, moved, missed);
+                let result = w.call_for(function, Vec::new());
+                w.switch(result, next.to_vec(), wrong);
             }
         }
         w.at(wrong);
@@ -226,21 +238,16 @@ impl RaceWriter<'_, '_> {
         }
     }
 
-    /// If there are committed locations, chooses who leaves one of them; else goes to `racing`.
+    /// Chooses who leaves one of the committed locations.
     fn settle_committed(
         &self,
         w: &mut Writer,
         (ids, watched): (&Ids, &Watched),
         (cell, moving): (Register, BlockId),
-        racing: BlockId,
     ) {
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
         let may_commit = (0..ids.moves.len())
             .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
-        let committed = w.load(self.layout.committed);
-        let settling = w.block();
-        w.branch(committed, settling, racing);
-        w.at(settling);
         self.call_for_stale(w, &ids.invariants, false);
         self.let_one_move(
             w,

@@ -134,6 +134,11 @@ impl Writer {
         self.end(Terminator::Return(value));
     }
 
+    /// Counts a round of a loop.
+    pub(super) fn count_round(&mut self) {
+        self.push(Instruction::CountRound { site: NOWHERE });
+    }
+
     /// Gives the run up: it is made in another way.
     pub(super) fn give_up(&mut self) {
         self.end(Terminator::Fail(RunTimeErrorKind::Interrupted, NOWHERE));
