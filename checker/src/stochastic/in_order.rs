@@ -1,9 +1,22 @@
 //! Results of runs in the order of their numbers, made by one thread or several.
 //!
-//! Which results are consumed does not depend on the number of threads: run k is the same wherever
-//! it is made, and a failure counts only if its run is reached.
+//! The runs are handed out in chunks to whoever has nothing to do; the calling thread makes runs
+//! like the others, and consumes results between its chunks. Which results are consumed does not
+//! depend on the number of threads: run k is the same wherever it is made, and a failure counts
+//! only if its run is reached.
+//!
+//! Invariants:
+//! * `open` holds the chunks that were handed out and are not consumed, in the order of their runs.
+//!   They are at most [`AHEAD`] a thread, so what is kept does not grow with the number of runs.
+//! * When the calling thread leaves, by whatever way, the others are told, and end behind the run
+//!   that they are making.
 
-use std::sync::mpsc::{self, RecvTimeoutError};
+use std::any::Any;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -13,11 +26,14 @@ use super::run::Runner;
 use super::run_watch::{RunWatch, Shows};
 use crate::cancellation::{self, Cut};
 
-/// How long a block of runs should take.
-const BLOCK_TIME: Duration = Duration::from_millis(10);
+/// How long a chunk of runs should take.
+const CHUNK_TIME: Duration = Duration::from_millis(2);
 
-/// The most runs of one thread in a block, whose results are kept.
-const MOST_RUNS: u64 = 4096;
+/// The most runs of a chunk, whose results are kept.
+const MOST_RUNS: u64 = 1024;
+
+/// How many chunks a thread may be ahead of what is consumed.
+const AHEAD: usize = 4;
 
 /// How often limits and signals are looked at while other threads make runs that take long.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
@@ -32,93 +48,198 @@ pub(super) fn in_order<T: Send + Shows>(
     watch: &mut dyn RunWatch,
 ) -> Result<bool, Failure> {
     let mut runners = Runner::several(behaviour, threads);
-    let (mut first, mut share, mut consumed) = (0_u64, 1_u64, 0_u64);
-    loop {
+    let chunks = Chunks::new(runners.len());
+    let (own, others) = runners.split_first_mut().expect("there is a thread");
+    let look = cancellation::current();
+    thread::scope(|scope| {
+        let chunks = &chunks;
+        let _over = Over(chunks);
+        for runner in others {
+            let (look, run) = (look.clone(), &run);
+            scope.spawn(move || {
+                cancellation::looking_at(look, || {
+                    while let Some(chunk) = chunks.take_or_wait() {
+                        chunks.make(chunk, |one| run(runner, one));
+                    }
+                });
+            });
+        }
+        let mut consumed = 0;
+        loop {
+            while let Some(made) = chunks.next_made() {
+                let results = match made {
+                    Ok(results) => results,
+                    // What was consumed before stands; without it there is no result.
+                    Err(cause) if cause.is::<Cut>() && consumed > 0 => return Ok(false),
+                    Err(cause) => panic::resume_unwind(cause),
+                };
+                for result in results {
+                    consumed += 1;
+                    let result = result?;
+                    if let Some(shown) = result.shows() {
+                        watch.see(shown);
+                    }
+                    if consume(result) {
+                        return Ok(true);
+                    }
+                }
+                if watch.ends(consumed) {
+                    return Ok(false);
+                }
+            }
+            match chunks.take() {
+                Some(chunk) => chunks.make(chunk, |one| run(own, one)),
+                None => {
+                    // Only this thread sees signals. When it is time to end, the others see it too.
+                    if !chunks.wait_for_next() {
+                        cancellation::is_due();
+                    }
+                }
+            }
+        }
+    })
+}
+
+/// The results of a chunk, up to the first failure; or what its thread unwound with.
+type Made<T> = Result<Vec<Result<T, Failure>>, Box<dyn Any + Send>>;
+
+/// Runs that one thread makes: the number of the chunk, and those of its runs.
+type Chunk = (u64, Range<u64>);
+
+/// The runs of all threads.
+struct Chunks<T> {
+    shares: Mutex<Shares<T>>,
+    /// A chunk was made or consumed, or all is over.
+    has_changed: Condvar,
+    most_open: usize,
+    is_over: AtomicBool,
+}
+
+struct Shares<T> {
+    next_run: u64,
+    /// How many runs the next chunk has.
+    share: u64,
+    /// The number of the first open chunk.
+    first_open: u64,
+    /// What was made of the open chunks so far.
+    open: VecDeque<Option<Made<T>>>,
+}
+
+impl<T> Chunks<T> {
+    fn new(threads: usize) -> Chunks<T> {
+        Chunks {
+            shares: Mutex::new(Shares {
+                next_run: 0,
+                share: 1,
+                first_open: 0,
+                open: VecDeque::new(),
+            }),
+            has_changed: Condvar::new(),
+            most_open: AHEAD * threads,
+            is_over: AtomicBool::new(false),
+        }
+    }
+
+    /// The shares are whole between any two statements, so a thread that unwound does no harm.
+    fn shares(&self) -> MutexGuard<'_, Shares<T>> {
+        self.shares.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed)
+    }
+
+    /// Hands out a chunk, if not too many are open.
+    fn take(&self) -> Option<Chunk> {
+        self.hand_out(&mut self.shares())
+    }
+
+    fn hand_out(&self, shares: &mut Shares<T>) -> Option<Chunk> {
+        if shares.open.len() >= self.most_open {
+            return None;
+        }
+        let number = shares.first_open + shares.open.len() as u64;
+        shares.open.push_back(None);
+        let first = shares.next_run;
+        shares.next_run += shares.share;
+        Some((number, first..shares.next_run))
+    }
+
+    /// Hands out a chunk as soon as there is one; none when all is over.
+    fn take_or_wait(&self) -> Option<Chunk> {
+        let mut shares = self.shares();
+        loop {
+            if self.is_over() {
+                return None;
+            }
+            let chunk = self.hand_out(&mut shares);
+            if chunk.is_some() {
+                return chunk;
+            }
+            let waited = self.has_changed.wait(shares);
+            shares = waited.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    /// Makes the runs of a chunk, as long as they are wanted.
+    fn make(&self, (number, runs): Chunk, mut run: impl FnMut(u64) -> Result<T, Failure>) {
         let start = Instant::now();
-        let block = |runner: &mut Runner<'_>, number: usize| -> Vec<Result<T, Failure>> {
-            let from = first + number as u64 * share;
+        let share = runs.end - runs.start;
+        let made = panic::catch_unwind(AssertUnwindSafe(|| {
             let mut results = Vec::with_capacity(share as usize);
-            for one in from..from + share {
-                let result = run(runner, one);
+            for one in runs {
+                let result = run(one);
                 let failed = result.is_err();
                 results.push(result);
-                if failed {
+                if failed || self.is_over() {
                     break;
                 }
             }
             results
-        };
-        let results: Vec<Result<Vec<Result<T, Failure>>, Cut>> = if let [runner] = &mut runners[..]
-        {
-            vec![cancellation::unless_cut(|| block(runner, 0))]
-        } else {
-            blocks_of_all(&mut runners, &block)
-        };
-        for results in results {
-            let Ok(results) = results else {
-                // What was consumed before stands; without it there is no result.
-                if consumed == 0 {
-                    cancellation::cut();
-                }
-                return Ok(false);
-            };
-            for result in results {
-                consumed += 1;
-                let result = result?;
-                if let Some(shown) = result.shows() {
-                    watch.see(shown);
-                }
-                if consume(result) {
-                    return Ok(true);
-                }
-            }
+        }));
+        let is_short = start.elapsed() < CHUNK_TIME;
+        let mut shares = self.shares();
+        if is_short && share == shares.share {
+            shares.share = (share * 2).min(MOST_RUNS);
         }
-        first += share * runners.len() as u64;
-        if watch.ends(first) {
-            return Ok(false);
-        }
-        if start.elapsed() < BLOCK_TIME {
-            share = (share * 2).min(MOST_RUNS);
-        }
+        let place = (number - shares.first_open) as usize;
+        shares.open[place] = Some(made);
+        drop(shares);
+        self.has_changed.notify_all();
+    }
+
+    /// What was made of the first open chunk, if it is ready.
+    fn next_made(&self) -> Option<Made<T>> {
+        let mut shares = self.shares();
+        let made = shares.open.front_mut()?.take()?;
+        shares.open.pop_front();
+        shares.first_open += 1;
+        drop(shares);
+        self.has_changed.notify_all();
+        Some(made)
+    }
+
+    /// Waits until the first open chunk is ready, but not long; returns whether it is.
+    fn wait_for_next(&self) -> bool {
+        let is_made = |shares: &Shares<T>| matches!(shares.open.front(), Some(Some(_)));
+        let shares = self.shares();
+        let waited = self
+            .has_changed
+            .wait_timeout_while(shares, LOOK_EVERY, |shares| !is_made(shares));
+        let (shares, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        is_made(&shares)
     }
 }
 
-/// The block of each runner: the first one's is made by this thread, the others' by a thread each.
-///
-/// Only this thread sees signals, so it looks for them while it waits for the others.
-fn blocks_of_all<T: Send>(
-    runners: &mut [Runner<'_>],
-    block: &(impl Fn(&mut Runner<'_>, usize) -> T + Sync),
-) -> Vec<Result<T, Cut>> {
-    let Some((own, others)) = runners.split_first_mut() else {
-        return Vec::new();
-    };
-    let look = cancellation::current();
-    let (running, all_have_ended) = mpsc::channel::<()>();
-    thread::scope(|scope| {
-        let started: Vec<_> = (1..)
-            .zip(others)
-            .map(|(number, runner)| {
-                let (look, running) = (look.clone(), running.clone());
-                scope.spawn(move || {
-                    // The other end waits until this is dropped.
-                    let _running = running;
-                    cancellation::looking_at(look, || {
-                        cancellation::unless_cut(|| block(runner, number))
-                    })
-                })
-            })
-            .collect();
-        drop(running);
-        let mut results = vec![cancellation::unless_cut(|| block(own, 0))];
-        while all_have_ended.recv_timeout(LOOK_EVERY) == Err(RecvTimeoutError::Timeout) {
-            // When it is time to end, the other threads see it too.
-            cancellation::is_due();
-        }
-        results.extend(started.into_iter().map(|one| match one.join() {
-            Ok(results) => results,
-            Err(panic) => std::panic::resume_unwind(panic),
-        }));
-        results
-    })
+/// Tells the other threads that all is over, when it is dropped.
+struct Over<'c, T>(&'c Chunks<T>);
+
+impl<T> Drop for Over<'_, T> {
+    fn drop(&mut self) {
+        // Under the lock, so that nobody begins to wait meanwhile.
+        let shares = self.0.shares();
+        self.0.is_over.store(true, Ordering::Relaxed);
+        drop(shares);
+        self.0.has_changed.notify_all();
+    }
 }
