@@ -160,7 +160,14 @@ impl<'a> Runner<'a> {
     pub(super) fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
         let first = Runner::of(behaviour);
         let program = Arc::clone(&first.program);
-        let others = (1..threads).map(|_| Runner::with(Arc::clone(&program), behaviour));
+        let others = (1..threads).map(|_| {
+            let stages = first.stages.as_ref();
+            Runner {
+                stages: stages.map(|stages| stages.of_another(behaviour.executor)),
+                ..Runner::with(Arc::clone(&program), behaviour)
+            }
+        });
+        let others: Vec<Runner<'a>> = others.collect();
         iter::once(first).chain(others).collect()
     }
 

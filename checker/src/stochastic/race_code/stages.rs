@@ -1,5 +1,8 @@
 //! When runs are made by code: once they have taken so long that writing and compiling it pays.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use super::asked::{End, Watched};
 use super::runs::{RaceCode, WrittenRace};
 use crate::exec::Executor;
@@ -18,8 +21,8 @@ pub(in crate::stochastic) struct Stages {
     stage: Stage,
     /// What the code watches.
     watched: Option<Watched>,
-    /// How many moves were made without code.
-    moves: u64,
+    /// How many moves were made without code, by all threads.
+    moves: Arc<AtomicU64>,
 }
 
 enum Stage {
@@ -42,7 +45,15 @@ impl Stages {
                 Stage::Without
             },
             watched: None,
-            moves: 0,
+            moves: Arc::default(),
+        }
+    }
+
+    /// Those of another thread, which counts with this one.
+    pub(in crate::stochastic) fn of_another(&self, executor: &dyn Executor) -> Stages {
+        Stages {
+            moves: Arc::clone(&self.moves),
+            ..Stages::new(executor)
         }
     }
 
@@ -96,7 +107,7 @@ impl Stages {
 
     /// Writes or compiles the code if it is time to do so.
     fn go_on(&mut self, program: &Program<'_>, executor: &dyn Executor, watched: Watched) {
-        let moves = self.moves;
+        let moves = self.moves.load(Ordering::Relaxed);
         if matches!(self.stage, Stage::Waiting) && moves >= MOVES_BEFORE_WRITING {
             self.watched = Some(watched);
             self.stage = match WrittenRace::of(program, &watched) {
@@ -124,7 +135,7 @@ impl Stages {
 
     /// Counts the moves of a run that was made without code.
     pub(in crate::stochastic) fn count(&mut self, moves: u64) {
-        self.moves += moves;
+        self.moves.fetch_add(moves, Ordering::Relaxed);
     }
 }
 

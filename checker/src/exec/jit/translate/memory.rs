@@ -39,6 +39,10 @@ impl Translator<'_> {
                 if !is_number {
                     source = self.canonical(source);
                 }
+                if let Some(double) = self.double(source) {
+                    // The bits of a constant need no register of doubles.
+                    source = self.builder.ins().iconst(I64, double.to_bits() as i64);
+                }
                 let (base, offset) = self.place(address);
                 self.builder.ins().store(MODEL_MEMORY, source, base, offset);
             }
