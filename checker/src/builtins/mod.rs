@@ -13,8 +13,9 @@ mod random;
 pub(crate) use integer_result::IntegerResult;
 pub(crate) use library::canonical;
 pub(crate) use random::{
-    BUFFER as STREAM_BUFFER, BUFFERED as STREAM_BUFFERED, LAYERS, MOST_PARAMETERS,
-    POSITION as STREAM_POSITION, exponential_edges,
+    BUFFER as STREAM_BUFFER, BUFFERED as STREAM_BUFFERED, LAYERS, LOW_BITS, MOST_PARAMETERS,
+    NEXT as STREAM_NEXT, NEXT_WHOLE as STREAM_NEXT_WHOLE, POSITION as STREAM_POSITION,
+    exponential_edges,
 };
 pub use random::{Distribution, STREAM_WORDS, Stream};
 

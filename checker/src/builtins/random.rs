@@ -33,14 +33,22 @@ const SEED: usize = 0;
 const RUN: usize = 2;
 /// How many numbers were drawn.
 pub(crate) const POSITION: usize = 4;
+/// The number that is drawn next, unless the buffer must be filled before; it is one of those in
+/// the buffer, read beforehand for code that waits for it.
+pub(crate) const NEXT: usize = 6;
+/// What a double needs of that number: its upper 53 bits as a whole number, which is a double.
+pub(crate) const NEXT_WHOLE: usize = 8;
 /// The numbers around the last one that was drawn, if they have further ones.
-pub(crate) const BUFFER: usize = 6;
+pub(crate) const BUFFER: usize = 10;
 /// The numbers of a block.
 const BLOCK: usize = 4;
 /// So many blocks are made together: a processor can work on all of them at once.
 const BLOCKS: usize = 2;
 /// How many numbers of blocks there are; a power of 2.
 pub(crate) const BUFFERED: usize = BLOCKS * BLOCK;
+
+/// The bits of a number that are not used for a double.
+pub(crate) const LOW_BITS: u32 = u64::BITS - f64::MANTISSA_DIGITS;
 
 /// The random numbers of a run, over the words that hold their state. Words that are all 0 are the
 /// start of run 0 with seed 0.
@@ -111,17 +119,29 @@ impl<'a> Stream<'a> {
         for (place, &number) in random.as_flattened().iter().enumerate() {
             self.set_number(BUFFER + 2 * place, number);
         }
+        self.read_next(0);
+    }
+
+    /// Reads the number that is drawn next from its place in the buffer.
+    #[inline]
+    fn read_next(&mut self, place: usize) {
+        let next = self.number(BUFFER + 2 * place);
+        self.set_number(NEXT, next);
+        let whole = (next >> LOW_BITS) as f64;
+        self.set_number(NEXT_WHOLE, whole.to_bits());
     }
 
     #[inline]
     fn next_number(&mut self) -> u64 {
         let position = self.number(POSITION);
-        let place = (position % BUFFERED as u64) as usize;
-        if place == 0 {
+        if position.is_multiple_of(BUFFERED as u64) {
             self.fill();
         }
-        self.set_number(POSITION, position.wrapping_add(1));
-        self.number(BUFFER + 2 * place)
+        let number = self.number(NEXT);
+        let after = position.wrapping_add(1);
+        self.set_number(POSITION, after);
+        self.read_next((after % BUFFERED as u64) as usize);
+        number
     }
 }
 
@@ -165,7 +185,7 @@ pub(crate) fn exponential_edges() -> &'static [f64; LAYERS + 1] {
             let mut stream = Stream::of(&mut words);
             // The number that chooses the layer; then one that accepts it, should it be asked for.
             stream.set_number(POSITION, 1);
-            stream.set_number(BUFFER + 2, layer as u64);
+            stream.set_number(NEXT, layer as u64);
             stream.set_number(BUFFER + 4, u64::MAX);
             let least: f64 = Exp1.sample(&mut stream);
             least * (1_u64 << 53) as f64

@@ -8,7 +8,8 @@ use cranelift_codegen::ir::types::{F64, I64};
 use cranelift_codegen::ir::{InstBuilder, MemFlagsData, Value};
 
 use crate::builtins::{
-    LAYERS, MOST_PARAMETERS, STREAM_BUFFER, STREAM_BUFFERED, STREAM_POSITION, exponential_edges,
+    LAYERS, LOW_BITS, MOST_PARAMETERS, STREAM_BUFFER, STREAM_BUFFERED, STREAM_NEXT,
+    STREAM_NEXT_WHOLE, STREAM_POSITION, exponential_edges,
 };
 use crate::exec::jit::runtime;
 use crate::ir::{Address, Distribution, Register, RunTimeErrorKind, SiteId};
@@ -28,11 +29,9 @@ const fn place_of(distribution: Distribution) -> usize {
     place
 }
 
-/// The next number of a stream.
-struct Next {
-    /// How many were drawn before.
-    position: Value,
-    bits: Value,
+/// The bytes before a place of a stream.
+fn word(place: usize) -> i32 {
+    4 * place as i32
 }
 
 impl Translator<'_> {
@@ -86,7 +85,7 @@ impl Translator<'_> {
 
     /// A uniform number below `max`, as [`Distribution::sample`] draws it.
     fn uniform(&mut self, stream: Value, max: Value, site: SiteId) -> Value {
-        let next = self.next_number(stream);
+        let position = self.next_number(stream);
         let is_finite = match self.double(max) {
             Some(max) if max.is_finite() => None,
             _ => {
@@ -95,9 +94,9 @@ impl Translator<'_> {
                 Some(self.builder.ins().fcmp(FloatCC::LessThan, size, infinity))
             }
         };
-        let bits = self.builder.ins().ushr_imm_u(next.bits, 11);
-        let whole = self.builder.ins().fcvt_from_sint(F64, bits);
-        let scale = 1.0 / (1_u64 << 53) as f64;
+        let ins = self.builder.ins();
+        let whole = ins.load(F64, MODEL_MEMORY, stream, word(STREAM_NEXT_WHOLE));
+        let scale = 1.0 / (1_u64 << f64::MANTISSA_DIGITS) as f64;
         let value = match self.double(max) {
             // One multiplication rounds as two do where one of them is exact.
             Some(max) if max * scale >= f64::MIN_POSITIVE => {
@@ -115,12 +114,12 @@ impl Translator<'_> {
         };
         let code = runtime::draw_one::<UNIFORM> as *const ();
         let elsewhere = (Distribution::Uniform, code);
-        self.take_if(is_finite, (stream, &next, value), (elsewhere, max, site))
+        self.take_if(is_finite, (stream, position, value), (elsewhere, max, site))
     }
 
     /// An exponential number with this rate, as [`Distribution::sample`] draws it.
     fn exponential(&mut self, stream: Value, rate: Value, site: SiteId) -> Value {
-        let next = self.next_number(stream);
+        let position = self.next_number(stream);
         let (mean, is_rate) = match self.double(rate) {
             Some(rate) if rate > 0.0 && rate.is_finite() => {
                 (self.builder.ins().f64const(1.0 / rate), None)
@@ -135,10 +134,12 @@ impl Translator<'_> {
                 (self.builder.ins().fdiv(one, rate), Some(is_rate))
             }
         };
+        let ins = self.builder.ins();
+        let bits = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_NEXT));
         // The low bits choose a layer of the ziggurat, the high ones a place in it.
-        let layer = self.builder.ins().band_imm_s(next.bits, LAYERS as i64 - 1);
+        let layer = self.builder.ins().band_imm_s(bits, LAYERS as i64 - 1);
         let layer = self.builder.ins().ishl_imm_u(layer, 3);
-        let high = self.builder.ins().ushr_imm_u(next.bits, 12);
+        let high = self.builder.ins().ushr_imm_u(bits, 12);
         let one = self.builder.ins().iconst(I64, 1.0_f64.to_bits() as i64);
         let from_one = self.builder.ins().bor(high, one);
         let from_one = self
@@ -165,18 +166,16 @@ impl Translator<'_> {
         let elsewhere = (Distribution::Exponential, code);
         self.take_if(
             Some(is_known),
-            (stream, &next, value),
+            (stream, position, value),
             (elsewhere, rate, site),
         )
     }
 
-    /// The next number of a stream.
-    fn next_number(&mut self, stream: Value) -> Next {
-        let word = |place: usize| 4 * place as i32;
+    /// Makes sure that there is a next number of a stream; returns how many were drawn before.
+    fn next_number(&mut self, stream: Value) -> Value {
         let ins = self.builder.ins();
         let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
-        let within = (STREAM_BUFFERED - 1) as i64;
-        let place = self.builder.ins().band_imm_s(position, within);
+        let place = self.place_in_buffer(position);
         // Whoever takes the first number of the buffer fills it before.
         let (empty, full) = (self.builder.create_block(), self.builder.create_block());
         self.builder.set_cold_block(empty);
@@ -185,18 +184,31 @@ impl Translator<'_> {
         self.call_back(runtime::fill as *const () as usize, None, &[stream]);
         self.builder.ins().jump(full, &[]);
         self.builder.switch_to_block(full);
+        position
+    }
+
+    fn place_in_buffer(&mut self, position: Value) -> Value {
+        let within = (STREAM_BUFFERED - 1) as i64;
+        self.builder.ins().band_imm_s(position, within)
+    }
+
+    /// Takes the next number of a stream, and reads the one behind it: whoever draws that one need
+    /// not wait for its place.
+    fn take(&mut self, stream: Value, position: Value) {
+        let after = self.builder.ins().iadd_imm_s(position, 1);
+        let ins = self.builder.ins();
+        ins.store(MODEL_MEMORY, after, stream, word(STREAM_POSITION));
+        let place = self.place_in_buffer(after);
         let bytes = self.builder.ins().ishl_imm_u(place, 3);
         let base = self.builder.ins().iadd(stream, bytes);
         let ins = self.builder.ins();
         let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
-        Next { position, bits }
-    }
-
-    /// Takes the next number of a stream.
-    fn take(&mut self, stream: Value, next: &Next) {
-        let after = self.builder.ins().iadd_imm_s(next.position, 1);
         let ins = self.builder.ins();
-        ins.store(MODEL_MEMORY, after, stream, 4 * STREAM_POSITION as i32);
+        ins.store(MODEL_MEMORY, bits, stream, word(STREAM_NEXT));
+        let whole = self.builder.ins().ushr_imm_u(bits, i64::from(LOW_BITS));
+        let whole = self.builder.ins().fcvt_from_sint(F64, whole);
+        let ins = self.builder.ins();
+        ins.store(MODEL_MEMORY, whole, stream, word(STREAM_NEXT_WHOLE));
     }
 
     /// Takes the next number of a stream with the value that was made of it, if the condition holds;
@@ -204,11 +216,11 @@ impl Translator<'_> {
     fn take_if(
         &mut self,
         condition: Option<Value>,
-        (stream, next, value): (Value, &Next, Value),
+        (stream, position, value): (Value, Value, Value),
         (elsewhere, argument, site): ((Distribution, *const ()), Value, SiteId),
     ) -> Value {
         let Some(condition) = condition else {
-            self.take(stream, next);
+            self.take(stream, position);
             return value;
         };
         let (known, unknown, done) = (
@@ -220,7 +232,7 @@ impl Translator<'_> {
         self.builder.set_cold_block(unknown);
         self.builder.ins().brif(condition, known, &[], unknown, &[]);
         self.builder.switch_to_block(known);
-        self.take(stream, next);
+        self.take(stream, position);
         self.builder.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(unknown);
         let value = self.draw_elsewhere(elsewhere, &[stream, argument], site);
