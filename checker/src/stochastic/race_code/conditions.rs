@@ -53,10 +53,20 @@ impl Conditions<'_, '_> {
                 let comparisons = self.program.comparisons(place);
                 self.require(w, comparisons.on_words, values, otherwise);
                 for &(clock, relation, bound) in &comparisons.bounds {
+                    let next = w.block();
+                    if matches!(relation, Relation::LessEqual | Relation::GreaterEqual) {
+                        // What holds without the tolerance holds with it.
+                        let (value, bound) = (w.load_double(clock), self.number(w, bound, values));
+                        let holds = w.compare_doubles(value, relation, bound);
+                        let otherwise = w.block();
+                        w.branch(holds, next, otherwise);
+                        w.at(otherwise);
+                    }
                     let gap = self.gap(w, (clock, bound), values);
                     let zero = w.double(0.0);
                     let holds = w.compare_doubles(gap, relation, zero);
-                    w.unless(holds, otherwise);
+                    w.branch(holds, next, otherwise);
+                    w.at(next);
                 }
             }
             Condition::Never | Condition::Timed(_) | Condition::Curved(_) => {
