@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::race_writer::{Plans, RaceWriter};
+use super::race_writer::{Functions, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
     BlockId, Distribution, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register,
@@ -44,7 +44,12 @@ impl<'p, 'a> Receiver<'p, 'a> {
 
 impl<'a> RaceWriter<'_, 'a> {
     /// The function that lets a process move from a location.
-    pub(super) fn movement(&self, process: usize, location: usize, plans: &[Plans]) -> Function {
+    pub(super) fn movement(
+        &self,
+        process: usize,
+        location: usize,
+        functions: &Functions<'_>,
+    ) -> Function {
         let result = (0, Some(RegisterType::Integer));
         let name = format!("move of process {process} from location {location}");
         let mut writer = self.writer(&name, result);
@@ -56,7 +61,7 @@ impl<'a> RaceWriter<'_, 'a> {
             if !spot.is_plain {
                 self.conditions.require(w, only.guard, &only.values, missed);
             }
-            self.carry_out(w, only, plans);
+            self.carry_out(w, only, functions);
         } else {
             let chosen = self.choose(w, outputs, missed);
             let takes: Vec<(i32, BlockId)> = (0..)
@@ -66,7 +71,7 @@ impl<'a> RaceWriter<'_, 'a> {
             w.select(chosen, &takes);
             for (output, &(_, block)) in outputs.iter().zip(&takes) {
                 w.at(block);
-                self.carry_out(w, output, plans);
+                self.carry_out(w, output, functions);
             }
         }
         w.at(missed);
@@ -117,7 +122,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, plans: &[Plans]) {
+    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, functions: &Functions<'_>) {
         let channels = match sender.channel {
             Channel::None => None,
             Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
@@ -139,10 +144,10 @@ impl<'a> RaceWriter<'_, 'a> {
                     w.at(block);
                     let known = w.integer(channel);
                     let channel = channel as u32;
-                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), plans);
+                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), functions);
                 }
             }
-            channels => self.carry_out_on(w, sender, channels, plans),
+            channels => self.carry_out_on(w, sender, channels, functions),
         }
     }
 
@@ -160,7 +165,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         sender: &Instance<'a>,
         channels: Option<(Register, Range<u32>)>,
-        plans: &[Plans],
+        functions: &Functions<'_>,
     ) {
         let mut receivers = Vec::new();
         if let Some((channel, channels)) = channels {
@@ -189,10 +194,10 @@ impl<'a> RaceWriter<'_, 'a> {
             let (put_off, now) = (w.block(), w.block());
             w.branch(committed, put_off, now);
             w.at(put_off);
-            self.put_plans_off(w, sender, &receivers);
+            self.put_plans_off(w, (sender, branch), &receivers, functions);
             w.at(now);
         }
-        self.plan_movers(w, (sender, branch), &receivers, plans);
+        self.plan_movers(w, (sender, branch), &receivers, functions);
         let result = w.integer(MOVED);
         w.return_value(Some(result));
     }
@@ -229,8 +234,13 @@ impl<'a> RaceWriter<'_, 'a> {
         if self.renewal_of_rates.is_some() || self.leaves_committed(sender) {
             return (0..self.network().processes.len() as u32).collect();
         }
+        self.concerned_by(sender, receivers)
+    }
+
+    /// Whose plans may depend on what the movers have changed.
+    fn concerned_by(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> BTreeSet<u32> {
         let inputs = receivers.iter().flat_map(Receiver::all_inputs);
-        let marked = inputs.chain([sender]).flat_map(|mover| {
+        let concerned = inputs.chain([sender]).flat_map(|mover| {
             let branches = 0..mover.edge.branches.len();
             let concerned = branches.flat_map(|number| self.program.concerned(mover, number));
             let followers = self.program.followers(ProcessId(mover.process)).iter();
@@ -238,19 +248,51 @@ impl<'a> RaceWriter<'_, 'a> {
                 .map(|reader| reader.process)
                 .chain(followers.copied())
         });
-        marked.collect()
+        concerned.collect()
     }
 
-    /// Ends a move after which those that have moved do not plan yet.
-    fn put_plans_off(&self, w: &mut Writer, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) {
+    /// Ends a move after which those that have moved do not plan yet: only the invariants are looked
+    /// at that may not hold any more.
+    fn put_plans_off(
+        &self,
+        w: &mut Writer,
+        (sender, branch): (&Instance<'a>, Register),
+        receivers: &[Receiver<'_, 'a>],
+        functions: &Functions<'_>,
+    ) {
+        let (broken, start, done) = (w.block(), w.block(), w.block());
+        w.jump(start);
+        let mut places = Vec::new();
+        for (number, branch) in (0..).zip(&sender.edge.branches) {
+            let block = w.block();
+            places.push((number, block));
+            w.at(block);
+            let spot = self.program.spot(sender.process as usize, branch.target);
+            self.conditions.require(w, spot.invariant, &[], broken);
+            w.jump(done);
+        }
+        w.at(start);
+        w.select(branch, &places);
+        w.at(done);
         self.mark_processes(w, [sender.process]);
+        let invariant_of = |process: u32| functions.invariants[process as usize];
         for receiver in receivers {
             w.when(receiver.chosen, |w| {
+                if let Some(invariant) = invariant_of(receiver.process) {
+                    w.call(invariant, &[]);
+                }
                 self.mark_processes(w, [receiver.process]);
             });
         }
+        for process in self.concerned_by(sender, receivers) {
+            if let Some(invariant) = invariant_of(process) {
+                w.call(invariant, &[]);
+            }
+        }
         let result = w.integer(PUT_OFF);
         w.return_value(Some(result));
+        w.at(broken);
+        w.give_up();
     }
 
     /// Lets those plan that have moved, the sender first; the others do so later.
@@ -259,7 +301,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         (sender, branch): (&Instance<'a>, Register),
         receivers: &[Receiver<'_, 'a>],
-        plans: &[Plans],
+        functions: &Functions<'_>,
     ) {
         let branches = &sender.edge.branches;
         let marked = self.marked_by(sender, receivers);
@@ -294,7 +336,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w.at(done);
         for receiver in receivers {
             let done = w.block();
-            let plans = &plans[receiver.process as usize];
+            let plans = &functions.plans[receiver.process as usize];
             Self::for_chosen(w, receiver, done, |w, input| {
                 let plan = match &input.edge.branches[..] {
                     [only] => plans.by_location[only.target.0 as usize],

@@ -14,13 +14,19 @@ pub(super) struct Plans {
     pub(super) by_location: Vec<Option<FunctionId>>,
 }
 
+/// The functions that moves call, by process.
+pub(super) struct Functions<'f> {
+    pub(super) plans: &'f [Plans],
+    /// What gives up unless its invariant holds, if it has any.
+    pub(super) invariants: &'f [Option<FunctionId>],
+}
+
 /// The functions of a race, by process.
 pub(super) struct Ids {
     pub(super) plans: Vec<Plans>,
     /// By location: what lets it move from there, if it can.
     pub(super) moves: Vec<Vec<Option<FunctionId>>>,
     pub(super) abilities: Vec<Option<FunctionId>>,
-    /// What gives up unless its invariant holds, if it has any.
     pub(super) invariants: Vec<Option<FunctionId>>,
 }
 

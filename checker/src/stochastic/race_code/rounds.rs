@@ -1,7 +1,7 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
-use super::moves::take_one_of;
+use super::moves::{MISSED, take_one_of};
 use super::plans::tolerant;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};
@@ -58,6 +58,15 @@ impl RaceWriter<'_, '_> {
             // At the start of a run.
             w.call(renewal, &[]);
         }
+        if self.has_committed {
+            // Nobody has planned, which looks at invariants too.
+            let committed = w.load(layout.committed);
+            w.when(committed, |w| {
+                for &invariant in ids.invariants.iter().flatten() {
+                    w.call(invariant, &[]);
+                }
+            });
+        }
         w.jump(round);
         w.at(round);
         // Where the winner moves, from the location that the cell says; the delay before it has
@@ -74,8 +83,7 @@ impl RaceWriter<'_, '_> {
             w.jump(racing);
         }
         w.at(racing);
-        let plans = ids.plans.iter().map(|plans| Some(plans.anywhere));
-        self.call_for_stale(w, &plans.collect::<Vec<_>>(), true);
+        self.plan_anew(w, ids);
         let attempts: Vec<(usize, Register)> = (0..)
             .zip(&layout.attempts)
             .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
@@ -197,43 +205,46 @@ impl RaceWriter<'_, '_> {
     fn let_move(&self, w: &mut Writer, ids: &Ids, cell: Register, next: [BlockId; 3]) {
         let wrong = w.block();
         let most = ids.locations();
-        let moves: Vec<Option<FunctionId>> = ids
-            .moves
-            .iter()
-            .flat_map(|moves| (0..most).map(|location| *moves.get(location)?))
-            .collect();
-        let blocks = moves.iter().map(|one| one.map_or(wrong, |_| w.block()));
+        let cells = ids.moves.iter().enumerate().flat_map(|(process, moves)| {
+            (0..most).map(move |location| Some((process, location, (*moves.get(location)?)?)))
+        });
+        let cells: Vec<Option<(usize, usize, FunctionId)>> = cells.collect();
+        let blocks = cells.iter().map(|one| one.map_or(wrong, |_| w.block()));
         let blocks: Vec<BlockId> = blocks.collect();
         w.switch(cell, blocks.clone(), wrong);
-        for (function, block) in moves.into_iter().zip(blocks) {
-            if let Some(function) = function {
-                w.at(block);
-                let result = w.call_for(function, Vec::new());
-                w.switch(result, next.to_vec(), wrong);
+        for (cell, block) in cells.into_iter().zip(blocks) {
+            let Some((process, location, function)) = cell else {
+                continue;
+            };
+            w.at(block);
+            let result = w.call_for(function, Vec::new());
+            let spot = &self.program.spots_of(process)[location];
+            let mut next = next.to_vec();
+            if spot.urgency == Urgency::Committed {
+                // Somebody else may have to move.
+                next[MISSED as usize] = wrong;
             }
+            w.switch(result, next, wrong);
         }
         w.at(wrong);
         w.give_up();
     }
 
-    /// Calls the functions, by process, of those that plan anew; afterwards they do not any more if
-    /// `settles`.
-    fn call_for_stale(&self, w: &mut Writer, functions: &[Option<FunctionId>], settles: bool) {
+    /// Lets all processes plan whose plans may have changed.
+    fn plan_anew(&self, w: &mut Writer, ids: &Ids) {
         let layout = self.layout;
         for word in layout.stale..layout.stale + layout.stale_words {
             let mask = w.load(word);
             w.when(mask, |w| {
-                for (process, &function) in functions.iter().enumerate() {
+                for (process, plans) in ids.plans.iter().enumerate() {
                     let (own, bit) = layout.stale_bit(process);
-                    if let Some(function) = function.filter(|_| own == word) {
+                    if own == word {
                         let bit = w.integer(bit);
                         let is_stale = w.arithmetic(IntegerOperator::And, mask, bit);
-                        w.when(is_stale, |w| w.call(function, &[]));
+                        w.when(is_stale, |w| w.call(plans.anywhere, &[]));
                     }
                 }
-                if settles {
-                    w.store_integer(word, 0);
-                }
+                w.store_integer(word, 0);
             });
         }
     }
@@ -248,13 +259,16 @@ impl RaceWriter<'_, '_> {
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
         let may_commit = (0..ids.moves.len())
             .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
-        self.call_for_stale(w, &ids.invariants, false);
-        self.let_one_move(
-            w,
-            (ids, watched),
-            (may_commit.collect(), true),
-            (cell, moving),
-        );
+        let may_commit: Vec<usize> = may_commit.collect();
+        if let [only] = may_commit[..] {
+            // It can move, or the run is given up.
+            let own = Self::cell(w, ids, only);
+            w.copy(cell, own);
+            self.watch(w, watched, None);
+            w.jump(moving);
+            return;
+        }
+        self.let_one_move(w, (ids, watched), (may_commit, true), (cell, moving));
     }
 
     /// Chooses one of those who can move now as the winner, all with the same chance.

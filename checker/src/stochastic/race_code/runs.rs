@@ -4,7 +4,7 @@ use super::asked::{End, Watched};
 use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
-use super::race_writer::{Ids, Plans, RaceWriter};
+use super::race_writer::{Functions, Ids, Plans, RaceWriter};
 use super::rates::rated_clocks;
 use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
@@ -96,17 +96,28 @@ impl WrittenRace {
                 by_location,
             });
         }
+        let mut invariants = Vec::new();
+        for process in processes.clone() {
+            invariants.push(match writer.invariant(process) {
+                Some(function) if has_committed => Some(add(function, SMALL)?),
+                _ => None,
+            });
+        }
         let mut ids = Ids {
             plans,
             moves: Vec::new(),
             abilities: Vec::new(),
-            invariants: Vec::new(),
+            invariants,
         };
         for process in processes {
+            let called = Functions {
+                plans: &ids.plans,
+                invariants: &ids.invariants,
+            };
             let mut moves = Vec::new();
             for (location, spot) in program.spots_of(process).iter().enumerate() {
                 moves.push(if spot.outputs.0 < spot.outputs.1 {
-                    Some(add(writer.movement(process, location, &ids.plans), SMALL)?)
+                    Some(add(writer.movement(process, location, &called), SMALL)?)
                 } else {
                     None
                 });
@@ -115,10 +126,6 @@ impl WrittenRace {
             ids.abilities.push(match layout.attempts[process] {
                 None => None,
                 Some(_) => Some(add(writer.ability(process), SMALL)?),
-            });
-            ids.invariants.push(match writer.invariant(process) {
-                Some(function) if has_committed => Some(add(function, SMALL)?),
-                _ => None,
             });
         }
         let rounds = add(writer.rounds(&ids, watched), LARGE)?;
