@@ -28,7 +28,7 @@ pub const STREAM_WORDS: usize = BUFFER + 2 * BUFFERED;
 /// The random functions have at most this number of parameters.
 pub(crate) const MOST_PARAMETERS: usize = 3;
 
-// Where the parts of a stream lie in its words. All are numbers of 64 bits, with the low word first.
+// Where the parts of a stream lie in its words. All are numbers of 64 bits, the low word first.
 const SEED: usize = 0;
 const RUN: usize = 2;
 /// How many numbers were drawn.

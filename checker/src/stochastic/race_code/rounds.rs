@@ -24,8 +24,8 @@ struct First {
 }
 
 impl First {
-    /// Who wins among some of which everyone is first alone. No branches: they would be mispredicted
-    /// every other time.
+    /// Who wins among some of which everyone is first alone. No branches: they would be
+    /// mispredicted every other time.
     fn of(w: &mut Writer, all: &[First]) -> First {
         if let [only] = *all {
             return only;

@@ -1,7 +1,7 @@
 //! Random numbers in native code.
 //!
-//! The uniform and the exponential ones, which runs draw all the time, are taken from the numbers of
-//! the stream here as long as there are some that were made before; all else is called back.
+//! The uniform and the exponential ones, which runs draw all the time, are taken here from the
+//! numbers of the stream. Where none is left, a call makes the next ones. All else is called back.
 
 use cranelift_codegen::ir::condcodes::FloatCC;
 use cranelift_codegen::ir::types::{F64, I64};
@@ -211,8 +211,8 @@ impl Translator<'_> {
         ins.store(MODEL_MEMORY, whole, stream, word(STREAM_NEXT_WHOLE));
     }
 
-    /// Takes the next number of a stream with the value that was made of it, if the condition holds;
-    /// else the value is drawn elsewhere. Without a condition it always holds.
+    /// Takes the next number of a stream with the value that was made of it, if the condition
+    /// holds; else the value is drawn elsewhere. Without a condition it always holds.
     fn take_if(
         &mut self,
         condition: Option<Value>,
