@@ -3,7 +3,7 @@
 //! The generator is Philox4x64-10: block number `n` of run `k` with seed `s` is a function of these
 //! three numbers alone. So a run is the same whatever ran before it, and on whichever thread. All
 //! that it has to remember lies in [`STREAM_WORDS`] words of the state, which are copied with it.
-//! The generator `Philox` of NumPy gives the same numbers, with key `(s, 0)` and counter `(n, k, 0,
+//! The generator `numpy.random.Philox` gives the same numbers, with key `(s, 0)` and counter `(n, k, 0,
 //! 0)`, of which it takes the successor first.
 //!
 //! The distributions are those of the crate `rand_distr`. A new random function is one row in the
@@ -381,7 +381,7 @@ mod tests {
 
     use super::*;
 
-    /// The vectors that come with Random123; NumPy gives them too.
+    /// The vectors that come with Random123; `numpy` gives them too.
     #[test]
     fn the_generator_gives_the_published_numbers() {
         let pi = [

@@ -241,15 +241,22 @@ impl<'a> Lowering<'a> {
                     double,
                 } => self.simple(*code, *picks, *value, *double),
                 Statement::If(condition, then, otherwise) => {
+                    let is_switch = condition % 3 == 0;
                     let condition = self.integer(*condition);
-                    self.branch(condition, then, otherwise);
+                    self.branch((condition, is_switch), then, otherwise);
                 }
                 Statement::Loop(rounds, body) => self.repeat(i32::from(rounds % 5), body),
             }
         }
     }
 
-    fn branch(&mut self, condition: Register, then: &[Statement], otherwise: &[Statement]) {
+    /// Two ways, decided by a condition or by the place in a list.
+    fn branch(
+        &mut self,
+        (condition, is_switch): (Register, bool),
+        then: &[Statement],
+        otherwise: &[Statement],
+    ) {
         let head = self.current();
         let then_block = self.open();
         self.statements(then);
@@ -258,10 +265,13 @@ impl<'a> Lowering<'a> {
         self.statements(otherwise);
         let otherwise_end = self.current();
         let join = self.open();
-        self.end_at(
-            head,
-            Terminator::Branch(condition, then_block, otherwise_block),
-        );
+        let terminator = if is_switch {
+            let list = [then_block, otherwise_block, then_block, then_block];
+            Terminator::Switch(condition, list.into(), otherwise_block)
+        } else {
+            Terminator::Branch(condition, then_block, otherwise_block)
+        };
+        self.end_at(head, terminator);
         self.end_at(then_end, Terminator::Jump(join));
         self.end_at(otherwise_end, Terminator::Jump(join));
     }
@@ -372,7 +382,17 @@ impl<'a> Lowering<'a> {
             }
             13 => {
                 let (target, source) = (self.integer(a), self.integer(b));
-                self.push(Instruction::Not { target, source });
+                if c % 2 == 0 {
+                    self.push(Instruction::Not { target, source });
+                } else {
+                    let (then, otherwise) = (self.integer(d), self.integer(e));
+                    self.push(Instruction::Select {
+                        target,
+                        condition: source,
+                        then,
+                        otherwise,
+                    });
+                }
             }
             14..17 => {
                 let (target, left, right) = (self.double(b), self.double(c), self.double(d));

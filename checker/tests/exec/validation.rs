@@ -100,6 +100,13 @@ fn wrong_registers_are_found() {
         source: R0,
     };
     check_flaw(&[one(&[Integer, Double], vec![copy])], "another type");
+    let select = Instruction::Select {
+        target: R0,
+        condition: R0,
+        then: R0,
+        otherwise: R1,
+    };
+    check_flaw(&[one(&[Integer, Double], vec![select])], "another type");
     let mut function = one(&[Integer], vec![]);
     function.blocks[0].terminator = Terminator::Return(Some(R0));
     check_flaw(&[function], "returns something else");
@@ -109,6 +116,10 @@ fn wrong_registers_are_found() {
 fn wrong_jumps_and_calls_are_found() {
     let mut function = one(&[], vec![]);
     function.blocks[0].terminator = Terminator::Jump(BlockId(1));
+    check_flaw(&[function], "block that does not exist");
+    let mut function = one(&[Integer], vec![]);
+    let list = [BlockId(0), BlockId(1)];
+    function.blocks[0].terminator = Terminator::Switch(R0, list.into(), BlockId(0));
     check_flaw(&[function], "block that does not exist");
     let call = |function, arguments| Instruction::Call {
         target: None,

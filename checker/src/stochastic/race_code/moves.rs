@@ -25,9 +25,9 @@ pub(super) const PUT_OFF: i32 = 2;
 
 /// A process that may receive what is sent.
 struct Receiver<'p, 'a> {
+    process: u32,
     /// By location: its inputs that may be on the channel.
     inputs: Vec<(i32, Vec<&'p Instance<'a>>)>,
-    process: u32,
     /// Which of all its inputs it takes, counted from 1; 0 if none.
     chosen: Register,
     /// Which branch of it.
