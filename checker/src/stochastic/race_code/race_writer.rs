@@ -31,9 +31,9 @@ pub(super) struct Ids {
 }
 
 impl Ids {
-    /// The most locations of a process.
-    pub(super) fn locations(&self) -> usize {
-        self.moves.iter().map(Vec::len).max().unwrap_or(0)
+    /// The number of the first location of a process, if those of all processes are counted.
+    pub(super) fn first_location(&self, process: usize) -> usize {
+        self.moves[..process].iter().map(Vec::len).sum()
     }
 }
 

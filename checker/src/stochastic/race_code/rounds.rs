@@ -15,7 +15,8 @@ use crate::stochastic::program::Spot;
 /// Who wins, in registers.
 #[derive(Clone, Copy)]
 struct First {
-    /// The cell of the winner and its location in the table of moves.
+    /// The number of the winner's location, if those of all processes are counted: its cell in the
+    /// table of moves.
     cell: Register,
     /// The least attempt.
     attempt: Register,
@@ -193,20 +194,20 @@ impl RaceWriter<'_, '_> {
         take_one_of(w, cells.zip(flags.into_iter().map(Some)), rest, cell);
     }
 
-    /// The cell of a process and the location where it is in the table of moves.
+    /// The cell of a process that is where it is.
     fn cell(w: &mut Writer, ids: &Ids, process: usize) -> Register {
         let location = w.load(process as u32);
-        let row = w.integer((process * ids.locations()) as i32);
-        w.add_integers(location, row)
+        let first = w.integer(ids.first_location(process) as i32);
+        w.add_integers(location, first)
     }
 
     /// Lets the winner move from where it is, as its cell says; goes where what the function of the
     /// move returns leads.
     fn let_move(&self, w: &mut Writer, ids: &Ids, cell: Register, next: [BlockId; 3]) {
         let wrong = w.block();
-        let most = ids.locations();
         let cells = ids.moves.iter().enumerate().flat_map(|(process, moves)| {
-            (0..most).map(move |location| Some((process, location, (*moves.get(location)?)?)))
+            let functions = moves.iter().enumerate();
+            functions.map(move |(location, function)| Some((process, location, (*function)?)))
         });
         let cells: Vec<Option<(usize, usize, FunctionId)>> = cells.collect();
         let blocks = cells.iter().map(|one| one.map_or(wrong, |_| w.block()));
