@@ -58,9 +58,9 @@ impl Conditions<'_, '_> {
                         // What holds without the tolerance holds with it.
                         let (value, bound) = (w.load_double(clock), self.number(w, bound, values));
                         let holds = w.compare_doubles(value, relation, bound);
-                        let otherwise = w.block();
-                        w.branch(holds, next, otherwise);
-                        w.at(otherwise);
+                        let unclear = w.block();
+                        w.branch(holds, next, unclear);
+                        w.at(unclear);
                     }
                     let gap = self.gap(w, (clock, bound), values);
                     let zero = w.double(0.0);
