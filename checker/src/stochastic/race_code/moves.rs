@@ -251,8 +251,8 @@ impl<'a> RaceWriter<'_, 'a> {
         concerned.collect()
     }
 
-    /// Ends a move after which those that have moved do not plan yet: only the invariants are looked
-    /// at that may not hold any more.
+    /// Ends a move after which those that have moved do not plan yet: only those invariants are
+    /// looked at that may not hold any more.
     fn put_plans_off(
         &self,
         w: &mut Writer,
