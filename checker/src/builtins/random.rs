@@ -3,8 +3,8 @@
 //! The generator is Philox4x64-10: block number `n` of run `k` with seed `s` is a function of these
 //! three numbers alone. So a run is the same whatever ran before it, and on whichever thread. All
 //! that it has to remember lies in [`STREAM_WORDS`] words of the state, which are copied with it.
-//! The generator `numpy.random.Philox` gives the same numbers, with key `(s, 0)` and counter `(n, k, 0,
-//! 0)`, of which it takes the successor first.
+//! The generator `numpy.random.Philox` gives the same numbers, with key `(s, 0)` and counter
+//! `(n, k, 0, 0)`, of which it takes the successor first.
 //!
 //! The distributions are those of the crate `rand_distr`. A new random function is one row in the
 //! table of [`Distribution`].
