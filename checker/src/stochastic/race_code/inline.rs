@@ -116,6 +116,11 @@ fn take_in(
                         *then
                     }
                 }
+                (Some(Terminator::Switch(number, list, otherwise)), Some(value))
+                    if Some(*number) == target =>
+                {
+                    *list.get(value as usize).unwrap_or(otherwise)
+                }
                 _ => next,
             });
         }
