@@ -163,12 +163,7 @@ impl Writer {
     }
 
     pub(super) fn load(&mut self, word: u32) -> Register {
-        self.load_at(word, None)
-    }
-
-    /// Reads the word so many words behind a place, if that is given.
-    pub(super) fn load_at(&mut self, word: u32, index: Option<Register>) -> Register {
-        let address = word_of_state(word, index);
+        let address = word_of_state(word, None);
         self.result(RegisterType::Integer, |target| Instruction::LoadInteger {
             target,
             address,
@@ -405,17 +400,12 @@ impl Writer {
 
     /// The place of the double with this number in an array of so many.
     pub(super) fn place_of_double(&mut self, number: Register, length: u32) -> Register {
-        self.place(number, (length, 2))
-    }
-
-    /// The place of what has this number among so many of so many words each.
-    pub(super) fn place(&mut self, number: Register, (length, stride): (u32, u32)) -> Register {
         self.result(RegisterType::Integer, |target| Instruction::ScaleIndex {
             target,
             index: number,
             first: 0,
             length,
-            stride,
+            stride: 2,
             site: NOWHERE,
         })
     }
