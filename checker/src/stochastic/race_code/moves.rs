@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::race_writer::{Functions, RaceWriter};
+use super::race_writer::{Ids, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
     BlockId, Distribution, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register,
@@ -44,12 +44,7 @@ impl<'p, 'a> Receiver<'p, 'a> {
 
 impl<'a> RaceWriter<'_, 'a> {
     /// The function that lets a process move from a location.
-    pub(super) fn movement(
-        &self,
-        process: usize,
-        location: usize,
-        functions: &Functions<'_>,
-    ) -> Function {
+    pub(super) fn movement(&self, process: usize, location: usize, ids: &Ids) -> Function {
         let result = (0, Some(RegisterType::Integer));
         let name = format!("move of process {process} from location {location}");
         let mut writer = self.writer(&name, result);
@@ -61,7 +56,7 @@ impl<'a> RaceWriter<'_, 'a> {
             if !spot.is_plain {
                 self.conditions.require(w, only.guard, &only.values, missed);
             }
-            self.carry_out(w, only, functions);
+            self.carry_out(w, only, ids);
         } else {
             let chosen = self.choose(w, outputs, missed);
             let takes: Vec<(i32, BlockId)> = (0..)
@@ -71,7 +66,7 @@ impl<'a> RaceWriter<'_, 'a> {
             w.select(chosen, &takes);
             for (output, &(_, block)) in outputs.iter().zip(&takes) {
                 w.at(block);
-                self.carry_out(w, output, functions);
+                self.carry_out(w, output, ids);
             }
         }
         w.at(missed);
@@ -122,7 +117,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, functions: &Functions<'_>) {
+    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, ids: &Ids) {
         let channels = match sender.channel {
             Channel::None => None,
             Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
@@ -144,10 +139,10 @@ impl<'a> RaceWriter<'_, 'a> {
                     w.at(block);
                     let known = w.integer(channel);
                     let channel = channel as u32;
-                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), functions);
+                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), ids);
                 }
             }
-            channels => self.carry_out_on(w, sender, channels, functions),
+            channels => self.carry_out_on(w, sender, channels, ids),
         }
     }
 
@@ -165,7 +160,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         sender: &Instance<'a>,
         channels: Option<(Register, Range<u32>)>,
-        functions: &Functions<'_>,
+        ids: &Ids,
     ) {
         let mut receivers = Vec::new();
         if let Some((channel, channels)) = channels {
@@ -194,10 +189,10 @@ impl<'a> RaceWriter<'_, 'a> {
             let (put_off, now) = (w.block(), w.block());
             w.branch(committed, put_off, now);
             w.at(put_off);
-            self.put_plans_off(w, (sender, branch), &receivers, functions);
+            self.put_plans_off(w, (sender, branch), &receivers, ids);
             w.at(now);
         }
-        self.plan_movers(w, (sender, branch), &receivers, functions);
+        self.plan_movers(w, (sender, branch), &receivers, ids);
         let result = w.integer(MOVED);
         w.return_value(Some(result));
     }
@@ -210,15 +205,10 @@ impl<'a> RaceWriter<'_, 'a> {
             branches.map(|branch| (mover.process, branch.target))
         });
         // If the sender is not in such a location, nobody is: it could not move.
-        let mut others = (0..self.network().processes.len() as u32)
-            .filter(|&process| process != sender.process && self.leaves_committed(sender));
+        let mut others = self.committing.iter();
         entered.any(|(process, target)| self.is_committed(process, target))
-            || others.any(|process| {
-                let locations = 0..self.program.spots_of(process as usize).len() as u32;
-                locations
-                    .map(LocationId)
-                    .any(|one| self.is_committed(process, one))
-            })
+            || self.leaves_committed(sender)
+                && others.any(|&process| process != sender.process as usize)
     }
 
     fn is_committed(&self, process: u32, location: LocationId) -> bool {
@@ -258,24 +248,16 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         (sender, branch): (&Instance<'a>, Register),
         receivers: &[Receiver<'_, 'a>],
-        functions: &Functions<'_>,
+        ids: &Ids,
     ) {
-        let (broken, start, done) = (w.block(), w.block(), w.block());
-        w.jump(start);
-        let mut places = Vec::new();
-        for (number, branch) in (0..).zip(&sender.edge.branches) {
-            let block = w.block();
-            places.push((number, block));
-            w.at(block);
-            let spot = self.program.spot(sender.process as usize, branch.target);
+        let broken = w.block();
+        Self::for_branch(w, sender, branch, |w, number| {
+            let target = sender.edge.branches[number].target;
+            let spot = self.program.spot(sender.process as usize, target);
             self.conditions.require(w, spot.invariant, &[], broken);
-            w.jump(done);
-        }
-        w.at(start);
-        w.select(branch, &places);
-        w.at(done);
+        });
         self.mark_processes(w, [sender.process]);
-        let invariant_of = |process: u32| functions.invariants[process as usize];
+        let invariant_of = |process: u32| ids.invariants[process as usize];
         for receiver in receivers {
             w.when(receiver.chosen, |w| {
                 if let Some(invariant) = invariant_of(receiver.process) {
@@ -301,9 +283,8 @@ impl<'a> RaceWriter<'_, 'a> {
         w: &mut Writer,
         (sender, branch): (&Instance<'a>, Register),
         receivers: &[Receiver<'_, 'a>],
-        functions: &Functions<'_>,
+        ids: &Ids,
     ) {
-        let branches = &sender.edge.branches;
         let marked = self.marked_by(sender, receivers);
         if marked.contains(&sender.process) {
             self.unmark(w, sender.process);
@@ -313,30 +294,23 @@ impl<'a> RaceWriter<'_, 'a> {
                 w.when(receiver.chosen, |w| self.unmark(w, receiver.process));
             }
         }
-        let (start, done) = (w.block(), w.block());
-        w.jump(start);
-        let mut places = Vec::new();
-        for (number, branch) in (0..).zip(branches) {
-            let block = w.block();
-            places.push((number, block));
-            w.at(block);
+        Self::for_branch(w, sender, branch, |w, number| {
             let process = sender.process as usize;
-            let spot = self.program.spot(process, branch.target);
+            let target = sender.edge.branches[number].target;
+            let spot = self.program.spot(process, target);
+            let (broken, done) = (w.block(), w.block());
             if spot.urgency == Urgency::Committed {
-                w.give_up();
-                continue;
+                w.jump(broken);
+            } else {
+                self.plan_at(w, (process, spot), (broken, done));
             }
-            let broken = w.block();
-            self.plan_at(w, (process, spot), (broken, done));
             w.at(broken);
             w.give_up();
-        }
-        w.at(start);
-        w.select(branch, &places);
-        w.at(done);
+            w.at(done);
+        });
         for receiver in receivers {
             let done = w.block();
-            let plans = &functions.plans[receiver.process as usize];
+            let plans = &ids.plans[receiver.process as usize];
             Self::for_chosen(w, receiver, done, |w, input| {
                 let plan = match &input.edge.branches[..] {
                     [only] => plans.by_location[only.target.0 as usize],
@@ -548,19 +522,29 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Runs the updates of a mover, and lets it enter the target of its branch.
     fn apply(&self, w: &mut Writer, mover: &Instance<'a>, branch: Register) {
         update(w, &mover.edge.update, &mover.values);
-        let branches = &mover.edge.branches;
-        if branches.len() == 1 {
-            self.enter(w, mover, 0);
+        Self::for_branch(w, mover, branch, |w, number| self.enter(w, mover, number));
+    }
+
+    /// Writes what is done for each branch that a mover may have taken.
+    fn for_branch(
+        w: &mut Writer,
+        mover: &Instance<'a>,
+        branch: Register,
+        write: impl Fn(&mut Writer, usize),
+    ) {
+        let branches = mover.edge.branches.len();
+        if branches == 1 {
+            write(w, 0);
             return;
         }
         let (start, done) = (w.block(), w.block());
         w.jump(start);
         let mut places = Vec::new();
-        for number in 0..branches.len() {
+        for number in 0..branches {
             let block = w.block();
             places.push((number as i32, block));
             w.at(block);
-            self.enter(w, mover, number);
+            write(w, number);
             w.jump(done);
         }
         w.at(start);

@@ -14,19 +14,13 @@ pub(super) struct Plans {
     pub(super) by_location: Vec<Option<FunctionId>>,
 }
 
-/// The functions that moves call, by process.
-pub(super) struct Functions<'f> {
-    pub(super) plans: &'f [Plans],
-    /// What gives up unless its invariant holds, if it has any.
-    pub(super) invariants: &'f [Option<FunctionId>],
-}
-
 /// The functions of a race, by process.
 pub(super) struct Ids {
     pub(super) plans: Vec<Plans>,
     /// By location: what lets it move from there, if it can.
     pub(super) moves: Vec<Vec<Option<FunctionId>>>,
     pub(super) abilities: Vec<Option<FunctionId>>,
+    /// What gives up unless its invariant holds, if it has any.
     pub(super) invariants: Vec<Option<FunctionId>>,
 }
 
@@ -46,8 +40,8 @@ pub(super) struct RaceWriter<'p, 'a> {
     pub(super) in_windows: FunctionId,
     /// Sets the rates of clocks, if some location does.
     pub(super) renewal_of_rates: Option<FunctionId>,
-    /// Whether some location is committed.
-    pub(super) has_committed: bool,
+    /// The processes that can be in committed locations.
+    pub(super) committing: Vec<usize>,
 }
 
 impl<'a> RaceWriter<'_, 'a> {

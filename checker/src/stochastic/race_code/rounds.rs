@@ -10,7 +10,6 @@ use crate::ir::{
     BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Urgency,
 };
 use crate::stochastic::constants::TOLERANCE;
-use crate::stochastic::program::Spot;
 
 /// Who wins, in registers.
 #[derive(Clone, Copy)]
@@ -59,7 +58,7 @@ impl RaceWriter<'_, '_> {
             // At the start of a run.
             w.call(renewal, &[]);
         }
-        if self.has_committed {
+        if !self.committing.is_empty() {
             // Nobody has planned, which looks at invariants too.
             let committed = w.load(layout.committed);
             w.when(committed, |w| {
@@ -75,7 +74,7 @@ impl RaceWriter<'_, '_> {
         let (moving, cell) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
         let (settling, racing) = (w.block(), w.block());
-        if self.has_committed {
+        if !self.committing.is_empty() {
             let committed = w.load(layout.committed);
             w.branch(committed, settling, racing);
             w.at(settling);
@@ -257,11 +256,7 @@ impl RaceWriter<'_, '_> {
         (ids, watched): (&Ids, &Watched),
         (cell, moving): (Register, BlockId),
     ) {
-        let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
-        let may_commit = (0..ids.moves.len())
-            .filter(|&process| self.program.spots_of(process).iter().any(is_committed));
-        let may_commit: Vec<usize> = may_commit.collect();
-        if let [only] = may_commit[..] {
+        if let [only] = self.committing[..] {
             // It can move, or the run is given up.
             let own = Self::cell(w, ids, only);
             w.copy(cell, own);
@@ -269,7 +264,8 @@ impl RaceWriter<'_, '_> {
             w.jump(moving);
             return;
         }
-        self.let_one_move(w, (ids, watched), (may_commit, true), (cell, moving));
+        let who = (self.committing.clone(), true);
+        self.let_one_move(w, (ids, watched), who, (cell, moving));
     }
 
     /// Chooses one of those who can move now as the winner, all with the same chance.

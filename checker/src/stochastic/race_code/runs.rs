@@ -4,7 +4,7 @@ use super::asked::{End, Watched};
 use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
-use super::race_writer::{Functions, Ids, Plans, RaceWriter};
+use super::race_writer::{Ids, Plans, RaceWriter};
 use super::rates::rated_clocks;
 use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
@@ -15,7 +15,7 @@ use crate::ir::{
     Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
 };
 use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
-use crate::stochastic::program::Program;
+use crate::stochastic::program::{Program, Spot};
 
 /// A race of more instructions is not written as code.
 const MOST_INSTRUCTIONS: usize = 100_000;
@@ -52,8 +52,11 @@ impl WrittenRace {
         if !is_known(program, &conditions) {
             return None;
         }
-        let mut spots = (0..network.processes.len()).flat_map(|one| program.spots_of(one));
-        let has_committed = spots.any(|spot| spot.urgency == Urgency::Committed);
+        let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
+        let committing = (0..network.processes.len())
+            .filter(|&process| program.spots_of(process).iter().any(is_committed));
+        let committing: Vec<usize> = committing.collect();
+        let has_committed = !committing.is_empty();
         let mut functions = network.functions.clone();
         let first = functions.len() as u32;
         let writer = RaceWriter {
@@ -62,7 +65,7 @@ impl WrittenRace {
             conditions,
             in_windows: FunctionId(first),
             renewal_of_rates: (!rated.is_empty()).then_some(FunctionId(first + 1)),
-            has_committed,
+            committing,
         };
         functions.push(writer.windows());
         if !rated.is_empty() {
@@ -84,8 +87,7 @@ impl WrittenRace {
         for process in processes.clone() {
             let mut by_location = Vec::new();
             for (location, spot) in program.spots_of(process).iter().enumerate() {
-                let is_committed = spot.urgency == Urgency::Committed;
-                by_location.push(if is_committed {
+                by_location.push(if is_committed(spot) {
                     None
                 } else {
                     Some(add(writer.plan_in(process, location), SMALL)?)
@@ -110,14 +112,10 @@ impl WrittenRace {
             invariants,
         };
         for process in processes {
-            let called = Functions {
-                plans: &ids.plans,
-                invariants: &ids.invariants,
-            };
             let mut moves = Vec::new();
             for (location, spot) in program.spots_of(process).iter().enumerate() {
                 moves.push(if spot.outputs.0 < spot.outputs.1 {
-                    Some(add(writer.movement(process, location, &called), SMALL)?)
+                    Some(add(writer.movement(process, location, &ids), SMALL)?)
                 } else {
                     None
                 });
