@@ -74,13 +74,13 @@ impl RaceWriter<'_, '_> {
         let (moving, cell) = (w.block(), w.integer(0));
         let delay = w.double(0.0);
         let (settling, racing) = (w.block(), w.block());
-        if !self.committing.is_empty() {
+        if self.committing.is_empty() {
+            w.jump(racing);
+        } else {
             let committed = w.load(layout.committed);
             w.branch(committed, settling, racing);
             w.at(settling);
             self.settle_committed(w, (ids, watched), (cell, moving));
-        } else {
-            w.jump(racing);
         }
         w.at(racing);
         self.plan_anew(w, ids);
