@@ -13,14 +13,13 @@ mod support;
 
 use std::error::Error;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use checker::exec::Jit;
 use checker::ir::Statistical;
 use checker::stochastic::Runner;
 
-use statistical::load;
+use statistical::{DEVIATIONS, Measured, load};
 use support::Scratch;
 
 /// The runs that are measured; `RUNS` in the environment sets another number.
@@ -28,8 +27,6 @@ const RUNS: u64 = 2_000;
 /// The fastest of so many repetitions counts; C and the engine take turns, so that both see the
 /// same load.
 const REPETITIONS: usize = 5;
-/// How many standard deviations two estimates may differ by.
-const DEVIATIONS: f64 = 5.0;
 
 /// A model with the name of its program in C, and what is asked of it.
 struct Case {
@@ -133,15 +130,6 @@ const CASES: [Case; 3] = [
     },
 ];
 
-/// What was measured of all runs: how many are satisfied, the moves, and seconds.
-struct Measured {
-    satisfied: u64,
-    moves: u64,
-    /// The squares of the numbers of moves, if they are known.
-    squares: f64,
-    seconds: f64,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let runs = match std::env::var("RUNS") {
         Ok(runs) => runs.parse()?,
@@ -156,23 +144,17 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>> {
-    let mut c = run_c(program, case.name, runs)?;
-    let mut engine = run(case, runs)?;
+    let mut c = Measured::in_c(program, case.name, runs)?;
+    let (mut engine, squares) = run(case, runs)?;
     for _ in 1..REPETITIONS {
-        c.seconds = c.seconds.min(run_c(program, case.name, runs)?.seconds);
-        engine.seconds = engine.seconds.min(run(case, runs)?.seconds);
+        let again = Measured::in_c(program, case.name, runs)?;
+        c.seconds = c.seconds.min(again.seconds);
+        engine.seconds = engine.seconds.min(run(case, runs)?.0.seconds);
     }
+    let (ours, theirs) = engine.shares(&c, case.name, runs);
     let count = runs as f64;
-    let share = |measured: &Measured| measured.satisfied as f64 / count;
-    let (ours, theirs) = (share(&engine), share(&c));
-    let mean = f64::midpoint(ours, theirs);
-    assert!(
-        (ours - theirs).abs() <= DEVIATIONS * (2.0 * mean * (1.0 - mean) / count).sqrt(),
-        "{}: the probability is {ours} here and {theirs} in C",
-        case.name
-    );
-    let (moves, moves_c) = (engine.moves as f64 / count, c.moves as f64 / count);
-    let variance = engine.squares / count - moves * moves;
+    let [moves, moves_c] = [&engine, &c].map(|measured| measured.mean_moves(runs));
+    let variance = squares / count - moves * moves;
     assert!(
         (moves - moves_c).abs() <= DEVIATIONS * (2.0 * variance / count).sqrt(),
         "{}: a run has {moves} moves here and {moves_c} in C",
@@ -196,23 +178,9 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
     Ok(())
 }
 
-fn run_c(program: &Path, model: &str, runs: u64) -> Result<Measured, Box<dyn Error>> {
-    let output = Command::new(program)
-        .args([model, &runs.to_string(), "1"])
-        .output()?;
-    let output = String::from_utf8(output.stdout)?;
-    let mut fields = output.split_whitespace();
-    let mut field = || fields.next().ok_or("the program prints three numbers");
-    Ok(Measured {
-        satisfied: field()?.parse()?,
-        moves: field()?.parse()?,
-        squares: f64::NAN,
-        seconds: field()?.parse::<f64>()? / 1e9,
-    })
-}
-
-/// Makes the runs; compiling the model is not measured.
-fn run(case: &Case, runs: u64) -> Result<Measured, Box<dyn Error>> {
+/// Makes the runs, and gives the sum of the squares of their moves too; compiling the model is not
+/// measured.
+fn run(case: &Case, runs: u64) -> Result<(Measured, f64), Box<dyn Error>> {
     let (network, query) = load(case.model, case.query)?;
     let jit = Jit::new(&network.functions, &network.constants)?;
     let Statistical::Probability(bound, path) = &query.kind else {
@@ -229,10 +197,10 @@ fn run(case: &Case, runs: u64) -> Result<Measured, Box<dyn Error>> {
         moves += outcome.moves;
         squares += (outcome.moves as f64).powi(2);
     }
-    Ok(Measured {
+    let measured = Measured {
         satisfied,
-        moves,
-        squares,
+        moves: Some(moves),
         seconds: begin.elapsed().as_secs_f64(),
-    })
+    };
+    Ok((measured, squares))
 }

@@ -12,14 +12,13 @@ mod support;
 
 use std::error::Error;
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
 
 use checker::exec::{Executor, Jit};
 use checker::ir::{Network, Statistical, StatisticalQuery};
 use checker::stochastic::{Precision, Runner, estimate};
 
-use statistical::load;
+use statistical::{DEVIATIONS, Measured, load};
 use support::Scratch;
 
 /// The runs that are measured: those of a long query, of which the first moves, before there is
@@ -30,8 +29,6 @@ const RUNS: u64 = 1_000_000;
 const REPETITIONS: usize = 5;
 /// The runs whose moves are counted in the engine.
 const COUNTED_RUNS: u64 = 2_000;
-/// How many standard deviations two estimates may differ by.
-const DEVIATIONS: f64 = 5.0;
 
 /// A model with the name of its program in C, and what is asked of it.
 struct Case {
@@ -154,13 +151,6 @@ const CASES: [Case; 3] = [
     },
 ];
 
-/// What was measured: satisfied runs, moves of all runs if they were counted, and seconds.
-struct Measured {
-    satisfied: u64,
-    moves: u64,
-    seconds: f64,
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let runs = match std::env::var("RUNS") {
         Ok(runs) => runs.parse()?,
@@ -179,10 +169,11 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>> {
     let (network, query) = load(case.model, case.query)?;
     let jit = Jit::new(&network.functions, &network.constants)?;
-    let mut c = run_c(program, case.name, runs)?;
+    let mut c = Measured::in_c(program, case.name, runs)?;
     let mut engine = [1, 2].map(|threads| run(&network, &jit, &query, (runs, threads)));
     for _ in 1..REPETITIONS {
-        c.seconds = c.seconds.min(run_c(program, case.name, runs)?.seconds);
+        let again = Measured::in_c(program, case.name, runs)?;
+        c.seconds = c.seconds.min(again.seconds);
         for (threads, best) in [1, 2].into_iter().zip(&mut engine) {
             let again = run(&network, &jit, &query, (runs, threads));
             best.seconds = best.seconds.min(again.seconds);
@@ -190,28 +181,19 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
     }
     let [one, two] = engine;
     assert_eq!(one.satisfied, two.satisfied, "threads change no result");
-    let share = |measured: &Measured| measured.satisfied as f64 / runs as f64;
-    let (ours, theirs) = (share(&one), share(&c));
-    let mean = f64::midpoint(ours, theirs);
-    let variance = mean * (1.0 - mean);
-    assert!(
-        (ours - theirs).abs() <= DEVIATIONS * (2.0 * variance / runs as f64).sqrt(),
-        "{}: the probability is {ours} here and {theirs} in C",
-        case.name
-    );
-    let moves = c.moves as f64;
+    let (ours, theirs) = one.shares(&c, case.name, runs);
+    let moves_c = c.mean_moves(runs);
     let (mean, deviation) = counted_moves(&network, &jit, &query);
     assert!(
-        (mean - moves / runs as f64).abs() <= DEVIATIONS * deviation,
-        "{}: a run has {mean} moves here and {} in C",
-        case.name,
-        moves / runs as f64
+        (mean - moves_c).abs() <= DEVIATIONS * deviation,
+        "{}: a run has {mean} moves here and {moves_c} in C",
+        case.name
     );
+    let moves = moves_c * runs as f64;
     println!(
-        "{:9} {ours:.4} (C {theirs:.4})  {:5.1} moves a run  C {:6.2} M moves/s  \
+        "{:9} {ours:.4} (C {theirs:.4})  {moves_c:5.1} moves a run  C {:6.2} M moves/s  \
          one thread {:6.2} M/s ({:6.2} x C)  two {:6.2} M/s ({:4.2} x one)",
         case.name,
-        moves / runs as f64,
         moves / c.seconds / 1e6,
         moves / one.seconds / 1e6,
         one.seconds / c.seconds,
@@ -219,20 +201,6 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
         one.seconds / two.seconds,
     );
     Ok(())
-}
-
-fn run_c(program: &Path, model: &str, runs: u64) -> Result<Measured, Box<dyn Error>> {
-    let output = Command::new(program)
-        .args([model, &runs.to_string(), "1"])
-        .output()?;
-    let output = String::from_utf8(output.stdout)?;
-    let mut fields = output.split_whitespace();
-    let mut field = || fields.next().ok_or("the program prints three numbers");
-    Ok(Measured {
-        satisfied: field()?.parse()?,
-        moves: field()?.parse()?,
-        seconds: field()?.parse::<f64>()? / 1e9,
-    })
 }
 
 fn run(
@@ -254,7 +222,7 @@ fn run(
             .ok()
             .and_then(|estimate| estimate.satisfied_runs)
             .expect("the runs of the benchmark do not fail"),
-        moves: 0,
+        moves: None,
     }
 }
 

@@ -1,11 +1,70 @@
-//! Models of which statistical queries are measured.
+//! Models of which statistical queries are measured, and the same law in C.
 
 use std::error::Error;
+use std::path::Path;
+use std::process::Command;
 
 use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::ir::{Network, StatisticalQuery};
 use checker::semantics::{self, Reading};
 use checker::syntax;
+
+/// How many standard deviations two estimates may differ by.
+pub(crate) const DEVIATIONS: f64 = 5.0;
+
+/// What was measured of all runs: how many are satisfied, their moves, and seconds.
+pub(crate) struct Measured {
+    pub(crate) satisfied: u64,
+    /// `None` if they were not counted.
+    pub(crate) moves: Option<u64>,
+    pub(crate) seconds: f64,
+}
+
+impl Measured {
+    /// Makes the runs of a model in C.
+    pub(crate) fn in_c(program: &Path, model: &str, runs: u64) -> Result<Self, Box<dyn Error>> {
+        let output = Command::new(program)
+            .args([model, &runs.to_string(), "1"])
+            .output()?;
+        let output = String::from_utf8(output.stdout)?;
+        let mut fields = output.split_whitespace();
+        let mut field = || fields.next().ok_or("the program prints three numbers");
+        Ok(Self {
+            satisfied: field()?.parse()?,
+            moves: Some(field()?.parse()?),
+            seconds: field()?.parse::<f64>()? / 1e9,
+        })
+    }
+
+    fn share(&self, runs: u64) -> f64 {
+        self.satisfied as f64 / runs as f64
+    }
+
+    /// How many moves a run has.
+    ///
+    /// # Panics
+    ///
+    /// Panics if they were not counted.
+    pub(crate) fn mean_moves(&self, runs: u64) -> f64 {
+        self.moves.expect("moves were counted") as f64 / runs as f64
+    }
+
+    /// The probabilities here and in C.
+    ///
+    /// # Panics
+    ///
+    /// Panics if they differ by more than chance.
+    pub(crate) fn shares(&self, c: &Self, model: &str, runs: u64) -> (f64, f64) {
+        let (ours, theirs) = (self.share(runs), c.share(runs));
+        let mean = f64::midpoint(ours, theirs);
+        let variance = 2.0 * mean * (1.0 - mean) / runs as f64;
+        assert!(
+            (ours - theirs).abs() <= DEVIATIONS * variance.sqrt(),
+            "{model}: the probability is {ours} here and {theirs} in C"
+        );
+        (ours, theirs)
+    }
+}
 
 /// A model in the stochastic reading, with a compiled query.
 pub(crate) fn load(
