@@ -9,7 +9,6 @@ import signal
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from ntagen.cluster import runs as cluster_runs
 from ntagen.cluster.identity import identity
 from ntagen.cluster.runs import DaskRuns, Job, make_block, why_here
 from ntagen.errors import InputError, NtagenError
+from tests.clusters import local_cluster
 
 MODEL = """
 clock x; int n;
@@ -54,17 +54,8 @@ system Q;
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
     """A cluster with two worker processes."""
-    distributed = pytest.importorskip("distributed", reason="needs ntagen[cluster]")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        with distributed.LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address=None,
-            worker_dashboard_address=None,
-        ) as found:
-            yield found
+    with local_cluster() as found:
+        yield found
 
 
 def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:

@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 import threading
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from ntagen.experiment.dask_crew import DaskCrew
 from ntagen.experiment.reading import read_experiment
 from ntagen.experiment.scripting import campaign
 from ntagen.experiment.table import timeless
+from tests.clusters import local_cluster
 from tests.unit.experiment.files import written
 
 TEXT = '[[row]]\nscenario = ["large_mid_cr.nsl", "no_cr.nsl"]\nnoise = 0.1\nseeds = 6\n'
@@ -28,17 +28,8 @@ TEXT = '[[row]]\nscenario = ["large_mid_cr.nsl", "no_cr.nsl"]\nnoise = 0.1\nseed
 @pytest.fixture
 def cluster() -> Iterator[Any]:
     """A cluster with two worker processes."""
-    distributed = pytest.importorskip("distributed", reason="needs ntagen[cluster]")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        with distributed.LocalCluster(
-            n_workers=2,
-            threads_per_worker=1,
-            host="127.0.0.1",
-            dashboard_address=None,
-            worker_dashboard_address=None,
-        ) as found:
-            yield found
+    with local_cluster() as found:
+        yield found
 
 
 class Losing(DaskCrew):
