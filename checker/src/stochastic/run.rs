@@ -125,7 +125,7 @@ impl<'a> Runner<'a> {
     /// Makes runs of what a path or a value asks as code of the network from now on, as otherwise
     /// happens once that pays. Returns whether it can.
     pub fn write_runs(&mut self, bound: &RunBound, asked: Asked<'_>) -> bool {
-        let watched = Watched::of(asked, &self.program).filter(|_| RaceCode::knows(bound));
+        let watched = Watched::of(asked).filter(|_| RaceCode::knows(bound));
         let (Some(watched), Some(stages)) = (watched, &mut self.stages) else {
             return false;
         };
@@ -140,7 +140,7 @@ impl<'a> Runner<'a> {
     /// Makes a run as code, if there is any.
     fn written(&mut self, numbers: (u64, u64), bound: &RunBound, asked: Asked<'_>) -> Option<End> {
         let stages = self.stages.as_mut().filter(|_| RaceCode::knows(bound))?;
-        let watched = Watched::of(asked, &self.program)?;
+        let watched = Watched::of(asked)?;
         stages.run(
             (&self.program, self.executor),
             watched,

@@ -25,29 +25,28 @@ pub enum Asked<'q> {
 }
 
 impl Watched {
-    /// What is asked, if the code can watch for it.
-    pub(in crate::stochastic) fn of(asked: Asked<'_>, program: &Program<'_>) -> Option<Watched> {
-        let path = match asked {
-            Asked::Path(path) => path,
-            Asked::Extreme(value, maximum) => {
-                let sign = if maximum { 1.0 } else { -1.0 };
-                let watched = Watched::Extreme(value, sign);
-                return (!program.is_timed(value)).then_some(watched);
+    /// What is asked, unless it is a formula with operators over time.
+    pub(in crate::stochastic) fn of(asked: Asked<'_>) -> Option<Watched> {
+        Some(match asked {
+            Asked::Extreme(value, true) => Watched::Extreme(value, 1.0),
+            Asked::Extreme(value, false) => Watched::Extreme(value, -1.0),
+            Asked::Path(Path::Eventually(goal)) => Watched::Eventually(Condition::of(goal)),
+            Asked::Path(Path::Always(keep)) => Watched::Always(Condition::of(keep)),
+            Asked::Path(Path::Until(keep, goal)) => {
+                Watched::Until(Condition::of(keep), Condition::of(goal))
             }
-        };
-        let watched = match path {
-            Path::Eventually(goal) => Watched::Eventually(Condition::of(goal)),
-            Path::Always(keep) => Watched::Always(Condition::of(keep)),
-            Path::Until(keep, goal) => Watched::Until(Condition::of(keep), Condition::of(goal)),
-            Path::Formula(_) => return None,
-        };
-        let conditions = match watched {
-            Watched::Eventually(one) | Watched::Always(one) => [one, Condition::Always],
-            Watched::Until(keep, goal) => [keep, goal],
-            Watched::Extreme(..) => return None,
-        };
-        let is_curved = |one: &Condition| matches!(one, Condition::Curved(_));
-        (!conditions.iter().any(is_curved)).then_some(watched)
+            Asked::Path(Path::Formula(_)) => return None,
+        })
+    }
+
+    /// Whether the code can watch for it.
+    pub(super) fn is_known(&self, program: &Program<'_>) -> bool {
+        let is_curved = |one: Condition| matches!(one, Condition::Curved(_));
+        match *self {
+            Watched::Eventually(one) | Watched::Always(one) => !is_curved(one),
+            Watched::Until(keep, goal) => !is_curved(keep) && !is_curved(goal),
+            Watched::Extreme(value, _) => !program.is_timed(value),
+        }
     }
 }
 

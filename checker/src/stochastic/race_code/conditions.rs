@@ -69,11 +69,7 @@ impl Conditions<'_, '_> {
                     w.at(next);
                 }
             }
-            Condition::Never | Condition::Timed(_) | Condition::Curved(_) => {
-                w.jump(otherwise);
-                let unreached = w.block();
-                w.at(unreached);
-            }
+            Condition::Never | Condition::Timed(_) | Condition::Curved(_) => w.jump(otherwise),
         }
     }
 
@@ -144,12 +140,7 @@ impl Conditions<'_, '_> {
 }
 
 /// Goes on if the mask of a condition on words is not 0, else elsewhere.
-pub(super) fn require_words(
-    w: &mut Writer,
-    function: FunctionId,
-    values: &[i32],
-    otherwise: BlockId,
-) {
+fn require_words(w: &mut Writer, function: FunctionId, values: &[i32], otherwise: BlockId) {
     let arguments = values.iter().map(|&value| w.integer(value)).collect();
     let mask = w.call_for(function, arguments);
     w.unless(mask, otherwise);

@@ -317,11 +317,7 @@ impl<'a> RaceWriter<'_, 'a> {
                     _ => Some(plans.anywhere),
                 };
                 match plan {
-                    None => {
-                        w.give_up();
-                        let unreached = w.block();
-                        w.at(unreached);
-                    }
+                    None => w.give_up(),
                     Some(plan) => w.call(plan, &[]),
                 }
             });

@@ -53,27 +53,14 @@ impl RaceWriter<'_, '_> {
         let layout = self.layout;
         let mut writer = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
         let w = &mut writer;
-        let (round, over) = (w.block(), w.block());
-        if let Some(renewal) = self.renewal_of_rates {
-            // At the start of a run.
-            w.call(renewal, &[]);
-        }
-        if !self.committing.is_empty() {
-            // Nobody has planned, which looks at invariants too.
-            let committed = w.load(layout.committed);
-            w.when(committed, |w| {
-                for &invariant in ids.invariants.iter().flatten() {
-                    w.call(invariant, &[]);
-                }
-            });
-        }
+        self.begin_run(w, ids);
+        let (round, settling, racing) = (w.block(), w.block(), w.block());
+        let (moving, over) = (w.block(), w.block());
         w.jump(round);
         w.at(round);
         // Where the winner moves, from the location that the cell says; the delay before it has
         // passed.
-        let (moving, cell) = (w.block(), w.integer(0));
-        let delay = w.double(0.0);
-        let (settling, racing) = (w.block(), w.block());
+        let (cell, delay) = (w.integer(0), w.double(0.0));
         if self.committing.is_empty() {
             w.jump(racing);
         } else {
@@ -84,31 +71,87 @@ impl RaceWriter<'_, '_> {
         }
         w.at(racing);
         self.plan_anew(w, ids);
-        let attempts: Vec<(usize, Register)> = (0..)
-            .zip(&layout.attempts)
-            .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
-            .collect();
+        let all = self.attempts(w, ids);
         let infinity = w.double(f64::INFINITY);
-        // Where a process is is read before it is known who wins: the jump that follows then waits
-        // for nothing but the attempts.
-        let alone: Vec<First> = attempts
-            .iter()
-            .map(|&(process, attempt)| First {
-                cell: Self::cell(w, ids, process),
-                attempt,
-                second: None,
-            })
-            .collect();
-        let first = (!alone.is_empty()).then(|| First::of(w, &alone));
+        let first = (!all.is_empty()).then(|| First::of(w, &all));
         w.copy(delay, first.map_or(infinity, |first| first.attempt));
-        let bounded = w.block();
+        let (bounded, free) = (w.block(), w.block());
         let has_stays = w.load(layout.has_stays);
-        let free = w.block();
         w.branch(has_stays, bounded, free);
         // Some process may not stay for ever, and tries to move later than it must.
         w.at(bounded);
         self.settle_stays(w, (ids, watched), delay, (cell, moving), (free, over));
         w.at(free);
+        let passing = self.watch_delay(w, watched, delay, over);
+        if let Some(first) = first {
+            let words = layout.attempts.iter().flatten();
+            let attempts: Vec<(u32, Register)> = words
+                .zip(&all)
+                .map(|(&word, one)| (word, one.attempt))
+                .collect();
+            self.wait(w, passing, &attempts);
+            w.copy(cell, first.cell);
+            if let Some(second) = first.second {
+                let latest = tolerant(w, delay);
+                let are_many = w.compare_doubles(second, Relation::LessEqual, latest);
+                let tied = w.block();
+                w.branch(are_many, tied, moving);
+                w.at(tied);
+                Self::choose_among(w, &all, latest, cell);
+            }
+            w.jump(moving);
+        } else {
+            w.give_up();
+        }
+        w.at(moving);
+        self.let_winner_move(w, ids, cell, [round, racing, settling]);
+        w.at(over);
+        self.end_run(w, watched, delay);
+        writer.finish()
+    }
+
+    /// What comes before the first move of a run, or before the next one of so many.
+    fn begin_run(&self, w: &mut Writer, ids: &Ids) {
+        if let Some(renewal) = self.renewal_of_rates {
+            w.call(renewal, &[]);
+        }
+        if !self.committing.is_empty() {
+            // Nobody has planned, which looks at invariants too.
+            let committed = w.load(self.layout.committed);
+            w.when(committed, |w| {
+                for &invariant in ids.invariants.iter().flatten() {
+                    w.call(invariant, &[]);
+                }
+            });
+        }
+    }
+
+    /// When each process that can move tries to. Where it is is read before it is known who wins:
+    /// the jump that follows then waits for nothing but the attempts.
+    fn attempts(&self, w: &mut Writer, ids: &Ids) -> Vec<First> {
+        let words = self.layout.attempts.iter().enumerate();
+        let attempts: Vec<(usize, Register)> = words
+            .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
+            .collect();
+        let all = attempts.into_iter().map(|(process, attempt)| First {
+            cell: Self::cell(w, ids, process),
+            attempt,
+            second: None,
+        });
+        all.collect()
+    }
+
+    /// Watches all through a delay, and goes elsewhere if the bound of the run comes first: the
+    /// delay is then what is left of it. Returns how much time passes, which is less than the delay
+    /// if that lies beyond the bound by no more than rounding.
+    fn watch_delay(
+        &self,
+        w: &mut Writer,
+        watched: &Watched,
+        delay: Register,
+        over: BlockId,
+    ) -> Register {
+        let layout = self.layout;
         let (inside, beyond, in_time) = (w.block(), w.block(), w.block());
         let passing = w.double(0.0);
         let (bound, time) = (w.load_double(layout.bound), w.load_double(layout.time));
@@ -133,38 +176,36 @@ impl RaceWriter<'_, '_> {
         self.watch(w, watched, Some(passing));
         w.jump(in_time);
         w.at(in_time);
-        match first {
-            None => w.give_up(),
-            Some(first) => {
-                self.wait(w, passing, &attempts);
-                w.copy(cell, first.cell);
-                if let Some(second) = first.second {
-                    let latest = tolerant(w, delay);
-                    let are_many = w.compare_doubles(second, Relation::LessEqual, latest);
-                    let tied = w.block();
-                    w.branch(are_many, tied, moving);
-                    w.at(tied);
-                    Self::choose_among(w, &alone, latest, cell);
-                }
-                w.jump(moving);
-            }
-        }
-        w.at(moving);
+        passing
+    }
+
+    /// Lets the winner move, and goes to the next round: to its begin, or past it where the move
+    /// says whether somebody is in a committed location now.
+    fn let_winner_move(
+        &self,
+        w: &mut Writer,
+        ids: &Ids,
+        cell: Register,
+        [round, racing, settling]: [BlockId; 3],
+    ) {
         w.count_round();
         let (moved, put_off, go_on) = (w.block(), w.block(), w.block());
         self.let_move(w, ids, cell, [round, moved, put_off]);
         for (block, next) in [(moved, racing), (put_off, settling)] {
             w.at(block);
-            let left = w.load(layout.moves_left);
+            let left = w.load(self.layout.moves_left);
             let minus_one = w.integer(-1);
             let left = w.add_integers(left, minus_one);
-            w.store(layout.moves_left, left);
+            w.store(self.layout.moves_left, left);
             w.branch(left, next, go_on);
         }
         w.at(go_on);
         let result = w.integer(GOES_ON);
         w.return_value(Some(result));
-        w.at(over);
+    }
+
+    /// Ends a run at its bound, after so much more time.
+    fn end_run(&self, w: &mut Writer, watched: &Watched, delay: Register) {
         let zero = w.double(0.0);
         let passing = w.greatest(delay, zero);
         self.wait_until_the_end(w, passing);
@@ -173,7 +214,6 @@ impl RaceWriter<'_, '_> {
         }
         let result = w.integer(IS_OVER);
         w.return_value(Some(result));
-        writer.finish()
     }
 
     /// Sets the cell to one of those whose attempts come until then, all with the same chance.
@@ -351,8 +391,6 @@ impl RaceWriter<'_, '_> {
             w.jump(over);
             w.at(stuck);
             w.give_up();
-            let unreached = w.block();
-            w.at(unreached);
         });
         w.store_integer(self.layout.has_stays, 0);
         w.jump(free);
@@ -379,13 +417,12 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Lets time pass, if it is more than none.
-    fn wait(&self, w: &mut Writer, delay: Register, attempts: &[(usize, Register)]) {
+    fn wait(&self, w: &mut Writer, delay: Register, attempts: &[(u32, Register)]) {
         let zero = w.double(0.0);
         let passes = w.compare_doubles(delay, Relation::Greater, zero);
         w.when(passes, |w| {
             self.advance(w, delay);
-            for &(process, attempt) in attempts {
-                let word = self.layout.attempts[process].expect("it has a word");
+            for &(word, attempt) in attempts {
                 let rest = w.subtract(attempt, delay);
                 w.store_double(word, rest);
             }

@@ -49,7 +49,7 @@ impl WrittenRace {
             layout: &layout,
             result: network.chances.result,
         };
-        if !is_known(program, &conditions) {
+        if !watched.is_known(program) || !is_known(program, &conditions) {
             return None;
         }
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;

@@ -2,7 +2,6 @@
 //! and all through the delay behind it.
 
 use super::asked::Watched;
-use super::conditions::require_words;
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{BlockId, IntegerOperator, Register, Relation};
@@ -42,16 +41,10 @@ impl RaceWriter<'_, '_> {
                 let negative = w.negate(value);
                 let size = w.greatest(value, negative);
                 let is_finite = w.compare_doubles(size, Relation::Less, infinity);
-                let wrong = w.block();
-                w.unless(is_finite, wrong);
+                w.insist(is_finite);
                 let best = w.load_double(self.layout.best);
                 let best = w.greatest(value, best);
                 w.store_double(self.layout.best, best);
-                let next = w.block();
-                w.jump(next);
-                w.at(wrong);
-                w.give_up();
-                w.at(next);
             }
         }
     }
@@ -68,8 +61,8 @@ impl RaceWriter<'_, '_> {
             self.watch_through(w, (keep, goal), delay, (reached, missed, next));
         } else {
             // Both stay what they are until somebody moves.
-            require_not(w, goal, reached);
-            require(w, keep, missed);
+            require(w, goal, false, reached);
+            require(w, keep, true, missed);
             w.jump(next);
         }
         for (block, result) in [(reached, REACHED), (missed, MISSED)] {
@@ -154,33 +147,22 @@ impl RaceWriter<'_, '_> {
     }
 }
 
-/// Goes on if a condition on words holds, else elsewhere.
-fn require(w: &mut Writer, condition: Condition, otherwise: BlockId) {
+/// Goes on if it is so that a condition on words holds, or that it does not; else elsewhere.
+fn require(w: &mut Writer, condition: Condition, holds: bool, otherwise: BlockId) {
     match condition {
-        Condition::Always => {}
-        Condition::Words(function) => require_words(w, function, &[], otherwise),
-        _ => {
-            w.jump(otherwise);
-            let unreached = w.block();
-            w.at(unreached);
-        }
-    }
-}
-
-/// Goes on if a condition on words does not hold, else elsewhere.
-fn require_not(w: &mut Writer, condition: Condition, otherwise: BlockId) {
-    match condition {
-        Condition::Never => {}
         Condition::Words(function) => {
             let next = w.block();
             let mask = w.call_for(function, Vec::new());
-            w.branch(mask, otherwise, next);
+            let (then, otherwise) = if holds {
+                (next, otherwise)
+            } else {
+                (otherwise, next)
+            };
+            w.branch(mask, then, otherwise);
             w.at(next);
         }
-        _ => {
-            w.jump(otherwise);
-            let unreached = w.block();
-            w.at(unreached);
-        }
+        Condition::Always if holds => {}
+        Condition::Never if !holds => {}
+        _ => w.jump(otherwise),
     }
 }

@@ -13,10 +13,13 @@ const NOWHERE: SiteId = SiteId(0);
 /// From so many different places on, a table leads to them faster than comparisons.
 const WORTH_A_TABLE: usize = 4;
 
-/// A function that is being written. What is written goes to the end of the current block.
+/// A function that is being written. What is written goes to the end of the current block; behind
+/// its terminator nothing is reached, and nothing is kept.
 pub(super) struct Writer {
     function: Function,
     current: usize,
+    /// Whether the current block has its terminator.
+    is_ended: bool,
     /// The double at which runs draw their random numbers begin.
     stream: u32,
 }
@@ -38,6 +41,7 @@ impl Writer {
                 blocks: vec![empty_block()],
             },
             current: 0,
+            is_ended: false,
             stream,
         }
     }
@@ -52,9 +56,10 @@ impl Writer {
     }
 
     fn push(&mut self, instruction: Instruction) {
-        self.function.blocks[self.current]
-            .instructions
-            .push(instruction);
+        if !self.is_ended {
+            let block = &mut self.function.blocks[self.current];
+            block.instructions.push(instruction);
+        }
     }
 
     /// Writes an instruction that has a result.
@@ -77,10 +82,14 @@ impl Writer {
     /// What is written from here on goes into this block.
     pub(super) fn at(&mut self, BlockId(block): BlockId) {
         self.current = block as usize;
+        self.is_ended = false;
     }
 
     fn end(&mut self, terminator: Terminator) {
-        self.function.blocks[self.current].terminator = terminator;
+        if !self.is_ended {
+            self.function.blocks[self.current].terminator = terminator;
+            self.is_ended = true;
+        }
     }
 
     pub(super) fn jump(&mut self, block: BlockId) {
@@ -110,6 +119,15 @@ impl Writer {
         self.at(then);
         write(self);
         self.jump(next);
+        self.at(next);
+    }
+
+    /// Goes on if the condition holds, else gives the run up.
+    pub(super) fn insist(&mut self, condition: Register) {
+        let (wrong, next) = (self.block(), self.block());
+        self.branch(condition, next, wrong);
+        self.at(wrong);
+        self.give_up();
         self.at(next);
     }
 
@@ -438,9 +456,11 @@ impl Writer {
             self.give_up();
             return;
         }
-        let mut open = vec![(self.current, places)];
+        let mut open = vec![(None, places)];
         while let Some((block, places)) = open.pop() {
-            self.current = block;
+            if let Some(block) = block {
+                self.at(block);
+            }
             match places {
                 [] => self.give_up(),
                 [(_, only)] => self.jump(*only),
@@ -452,8 +472,8 @@ impl Writer {
                     let is_left = self.compare_to(number, Relation::Less, right[0].0);
                     let (then, otherwise) = (self.block(), self.block());
                     self.branch(is_left, then, otherwise);
-                    open.push((then.0 as usize, left));
-                    open.push((otherwise.0 as usize, right));
+                    open.push((Some(then), left));
+                    open.push((Some(otherwise), right));
                 }
             }
         }
