@@ -110,8 +110,9 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         type=_Threads(),
         default="1",
         help="The number of threads, or `all` for one per core. Threads share the breadth-first "
-        "search of E<>, A[], sup, inf and bounds, and the computation with zones in games. "
-        "Liveness, partial observation, --shortest, --fastest and --certificate use one thread.  "
+        "search of E<>, A[], sup, inf and bounds, the computation with zones in games, and the "
+        "random runs of Pr and E. Liveness, partial observation, --shortest, --fastest and "
+        "--certificate use one thread.  "
         "[default: 1]",
     ),
     "seed": click.option(
