@@ -12,7 +12,7 @@
 //! computed from it agree.
 
 use super::machine::Mask;
-use super::restriction::{Entry, Limit, Restriction, UnderChoice};
+use super::restriction::{Case, Entry, Limit, Restriction, UnderChoice};
 use crate::game::strategy::Selection;
 
 /// Numbers that differ by less than this part, and less than this, are equal.
@@ -107,6 +107,8 @@ struct Said {
 #[derive(Debug)]
 pub(super) struct Advice<'a> {
     restriction: &'a Restriction,
+    /// What it says of the discrete state.
+    cases: &'a [Case],
     spans: Vec<Span>,
     /// The values and rates of the clocks, the constant 0 first.
     clocks: Vec<(f64, f64)>,
@@ -119,6 +121,7 @@ impl<'a> Advice<'a> {
     pub(super) fn new(restriction: &'a Restriction) -> Advice<'a> {
         Advice {
             restriction,
+            cases: &[],
             spans: Vec::new(),
             clocks: Vec::new(),
             demand: f64::INFINITY,
@@ -128,14 +131,19 @@ impl<'a> Advice<'a> {
 
     /// Looks at a state; `clock` gives the value and the rate of the clock at these words.
     pub(super) fn look(&mut self, words: &[i32], clock: impl Fn(u32) -> (f64, f64), time: f64) {
+        self.cases = self.restriction.cases(words);
+        self.look_again(clock, time);
+    }
+
+    /// Looks at a state behind which time alone has passed.
+    pub(super) fn look_again(&mut self, clock: impl Fn(u32) -> (f64, f64), time: f64) {
         self.spans.clear();
         self.demand = f64::INFINITY;
         self.is_hurried = false;
-        let restriction = self.restriction;
-        let cases = restriction.cases(words);
-        if cases.is_empty() {
+        if self.cases.is_empty() {
             return;
         }
+        let restriction = self.restriction;
         self.clocks.clear();
         self.clocks.push((0.0, 0.0));
         let clocks = restriction.correspondence.clocks.iter();
@@ -143,7 +151,7 @@ impl<'a> Advice<'a> {
         if restriction.has_time {
             self.clocks.push((time, 1.0));
         }
-        for case in cases {
+        for case in self.cases {
             if let Some((first, last)) = span(restriction.limits(case), &self.clocks) {
                 let action = case.action;
                 self.spans.push(Span {

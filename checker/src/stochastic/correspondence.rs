@@ -113,6 +113,16 @@ impl Correspondence {
         runs.map(|&(_, first, count)| &words[first as usize..(first + count) as usize])
     }
 
+    /// The same words of a key, which has nothing but them.
+    pub(super) fn of_key<'w>(&'w self, key: &'w [i32]) -> impl Iterator<Item = &'w [i32]> {
+        let mut rest = key;
+        self.runs.iter().map(move |&(_, _, count)| {
+            let (run, others) = rest.split_at(count as usize);
+            rest = others;
+            run
+        })
+    }
+
     /// How many words both have.
     pub(super) fn count(&self) -> usize {
         self.runs.iter().map(|&(_, _, count)| count as usize).sum()

@@ -6,7 +6,7 @@
 //!
 //! Cost: a look-up hashes the words that both readings share, and compares them once.
 
-use std::hash::{BuildHasher as _, Hasher as _};
+use std::hash::{BuildHasher as _, Hash as _, Hasher as _};
 use std::ops::Range;
 
 use hashbrown::HashTable;
@@ -127,7 +127,7 @@ impl Restriction {
         let words = self.correspondence.of_symbolic(joined.words);
         self.keys.extend(words.flatten());
         let (keys, count) = (&self.keys, self.correspondence.count());
-        let hash_of = |state: u32| hash(std::iter::once(key(keys, count, state)));
+        let hash_of = |state: u32| hash(self.correspondence.of_key(key(keys, count, state)));
         let add = |&other: &u32| hash_of(other);
         self.table.insert_unique(hash_of(state), state, add);
     }
@@ -154,12 +154,8 @@ impl Restriction {
     pub(super) fn cases(&self, words: &[i32]) -> &[Case] {
         let count = self.correspondence.count();
         let is_it = |&state: &u32| {
-            let mut rest = key(&self.keys, count, state);
-            self.correspondence.of_stochastic(words).all(|run| {
-                let (part, others) = rest.split_at(run.len());
-                rest = others;
-                part == run
-            })
+            let key = self.correspondence.of_key(key(&self.keys, count, state));
+            key.eq(self.correspondence.of_stochastic(words))
         };
         let hash = hash(self.correspondence.of_stochastic(words));
         match self.table.find(hash, is_it) {
@@ -229,8 +225,9 @@ fn key(keys: &[i32], count: usize, state: u32) -> &[i32] {
 
 fn hash<'w>(runs: impl Iterator<Item = &'w [i32]>) -> u64 {
     let mut hasher = FxBuildHasher.build_hasher();
-    for &word in runs.flatten() {
-        hasher.write_i32(word);
+    for run in runs {
+        // All words of a run at once, which is several times faster than one after the other.
+        i32::hash_slice(run, &mut hasher);
     }
     hasher.finish()
 }

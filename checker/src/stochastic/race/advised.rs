@@ -24,10 +24,11 @@ const SOON: f64 = 5.0 * TOLERANCE;
 impl<'a> Race<'a> {
     /// Lets the strategy look at the state before anybody plans.
     pub(super) fn take_advice(&mut self, program: &Program<'a>) -> Result<(), Failure> {
-        if self.advice.is_none() {
+        let Some(advice) = &mut self.advice else {
             return Ok(());
-        }
-        self.look();
+        };
+        let machine = &self.machine;
+        advice.look(machine.words(), |clock| machine.clock(clock), self.time);
         self.standstill = None;
         self.longest_stay = f64::INFINITY;
         self.until = self.rest;
@@ -50,11 +51,11 @@ impl<'a> Race<'a> {
         Ok(())
     }
 
-    /// Lets the strategy look at the state.
-    pub(super) fn look(&mut self) {
+    /// Lets the strategy look at the state after the delay for which it has looked at it.
+    pub(super) fn take_advice_again(&mut self) {
         if let Some(advice) = &mut self.advice {
             let machine = &self.machine;
-            advice.look(machine.words(), |clock| machine.clock(clock), self.time);
+            advice.look_again(|clock| machine.clock(clock), self.time);
         }
     }
 

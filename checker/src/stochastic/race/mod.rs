@@ -379,7 +379,7 @@ impl<'a> Race<'a> {
                 self.make_stale(process as u32);
             }
         }
-        self.look();
+        self.take_advice_again();
         let is_able = self.find_outputs(program, process)?
             || self.hurry() && self.find_outputs(program, process)?;
         if !is_able {
