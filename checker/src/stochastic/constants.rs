@@ -5,6 +5,10 @@ pub const ZENO_MOVES: u64 = 100_000;
 /// The time that so many moves must take, in units of the model.
 pub const ZENO_TIME: f64 = 1e-6;
 
+/// So many moves in which the clock that bounds a run rises to no new height are taken for a run
+/// that never ends.
+pub const MOVES_WITHOUT_RISE: u64 = 10_000_000;
+
 /// Times and values of clocks that differ by less than this part, and less than this, are the same.
 pub(super) const TOLERANCE: f64 = 1e-12;
 

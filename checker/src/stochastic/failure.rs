@@ -37,6 +37,9 @@ pub enum Failure {
     Zeno(Stand),
     /// The clock that bounds the run stands still or runs backwards, and nothing can happen.
     BoundNeverReached,
+    /// In more than [`super::MOVES_WITHOUT_RISE`] moves the clock that bounds the run has not risen
+    /// above this value.
+    BoundNotApproached(f64),
     /// The value of an expression is no finite number.
     NoNumber,
     /// A value whose mean is asked for lies outside the bounds that the user gave.

@@ -42,7 +42,7 @@ pub use behaviour::Behaviour;
 pub use blocks::{RunSource, Runs, block};
 pub use collector::{estimate, estimate_watched};
 pub use comparison::compare;
-pub use constants::{ZENO_MOVES, ZENO_TIME};
+pub use constants::{MOVES_WITHOUT_RISE, ZENO_MOVES, ZENO_TIME};
 pub use estimate::{Simulated, simulate};
 pub use failure::{Failure, Stand};
 pub use joint::{bound_of, estimate_jointly};

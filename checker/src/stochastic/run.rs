@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::condition::Condition;
-use super::constants::{TOLERANCE, UNITS_FOR_MOVE};
+use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
 use super::extreme::Extreme;
 use super::failure::Failure;
 use super::machine::{Machine, Mask};
@@ -322,6 +322,7 @@ impl<'a> Runner<'a> {
         watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
         let Runner { program, race, .. } = self;
+        let mut rise = Rise::new();
         loop {
             if bound.limit == RunLimit::Moves {
                 race.forget_moves();
@@ -367,9 +368,44 @@ impl<'a> Runner<'a> {
                 };
             };
             race.wait(delay)?;
+            if let RunLimit::Clock(clock) = bound.limit {
+                rise.note(race.machine.clock(clock).0)?;
+            }
             race.take(program, winner)?;
             cancellation::work(UNITS_FOR_MOVE);
         }
+    }
+}
+
+/// How high the clock has risen that bounds a run.
+struct Rise {
+    highest: f64,
+    /// The moves since then.
+    moves: u64,
+}
+
+impl Rise {
+    fn new() -> Rise {
+        Rise {
+            highest: f64::NEG_INFINITY,
+            moves: 0,
+        }
+    }
+
+    /// Looks at its value before a move; fails if it has not risen for too long.
+    fn note(&mut self, value: f64) -> Result<(), Failure> {
+        if value > self.highest {
+            *self = Rise {
+                highest: value,
+                moves: 0,
+            };
+            return Ok(());
+        }
+        self.moves += 1;
+        if self.moves > MOVES_WITHOUT_RISE {
+            return Err(Failure::BoundNotApproached(self.highest));
+        }
+        Ok(())
     }
 }
 

@@ -106,6 +106,22 @@ fn a_bound_that_is_never_reached_is_a_failure() {
 }
 
 #[test]
+fn a_bound_that_moves_do_not_approach_is_a_failure() {
+    let model = "
+        clock x;
+        process P() {
+            state a { x <= 2 };
+            init a;
+            trans a -> a { guard x >= 2; assign x = 0; };
+        }
+        system P;";
+    assert_eq!(
+        failure(model, "Pr[x<=3](<> false)"),
+        Failure::BoundNotApproached(2.0)
+    );
+}
+
+#[test]
 fn an_invariant_that_a_move_breaks_is_a_failure() {
     let model = "
         clock x;

@@ -17,8 +17,8 @@ use crate::ir::{EdgeId, Network, RunTimeErrorKind, Statistical, StatisticalQuery
 use crate::search::limits::Counters;
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Estimate, Failure, Rare, RunWatch as _, Runs, Simulated, Stand, ValuesOfRuns, ZENO_MOVES,
-    ZENO_TIME, block, compare, estimate_rare, estimate_watched, simulate,
+    Estimate, Failure, MOVES_WITHOUT_RISE, Rare, RunWatch as _, Runs, Simulated, Stand,
+    ValuesOfRuns, ZENO_MOVES, ZENO_TIME, block, compare, estimate_rare, estimate_watched, simulate,
 };
 use crate::syntax;
 use crate::syntax::ast;
@@ -322,6 +322,14 @@ impl LoadedModel {
                 "the clock that bounds the run stands still, and nothing happens any more"
                     .to_owned(),
                 "bound the run by time: [<=100]",
+            ),
+            Failure::BoundNotApproached(highest) => (
+                query.span,
+                format!(
+                    "in {MOVES_WITHOUT_RISE} moves of a random run, the clock that bounds it does not \
+                     rise above {highest}"
+                ),
+                "bound the run by time, [<=100], or by its moves, [#<=1000]",
             ),
             Failure::NoNumber => (
                 query.span,
