@@ -6,6 +6,9 @@
 //! The generator `numpy.random.Philox` gives the same numbers, with key `(s, 0)` and counter
 //! `(n, k, 0, 0)`, of which it takes the successor first.
 //!
+//! Invariant: unless the buffer must be filled, what was read beforehand of the next number is what
+//! the buffer says of it. Interpreted and compiled code read different parts.
+//!
 //! The distributions are those of the crate `rand_distr`. A new random function is one row in the
 //! table of [`Distribution`].
 //!

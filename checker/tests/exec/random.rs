@@ -3,8 +3,10 @@
 //! A program is a few functions, of which each calls only earlier ones and the last is called from
 //! outside. Functions work on small pools of registers that are written over and over, on 64 words
 //! each of state, constants and frame, cut into blocks of four, and through addresses of blocks.
-//! Loops have few rounds. Numbers are mostly small, so that many programs run to their end, and
-//! sometimes extreme, so that results wrap round and every error comes up.
+//! Random numbers come from a stream behind these words of the state. Nothing else writes it: its
+//! parts depend on each other. Loops have few rounds. Numbers are mostly small, so that many
+//! programs run to their end, and sometimes extreme, so that results wrap round and every error
+//! comes up.
 
 use std::fmt::Write;
 
@@ -12,7 +14,7 @@ use checker::exec::{Interpreter, RunTimeError};
 use checker::ir::{
     Address, Base, Block, BlockId, ClockId, ClockOperand, Distribution, DoubleOperator, Function,
     FunctionId, Instruction, IntegerOperator, MathFunction, Register, RegisterType, Relation,
-    RunTimeErrorKind, STREAM_WORDS, SiteId, Terminator,
+    RunTimeErrorKind, STREAM_WORDS, SiteId, Stream, Terminator,
 };
 use proptest::prelude::*;
 
@@ -513,13 +515,12 @@ impl<'a> Lowering<'a> {
                     _ => Distribution::Uniform,
                 };
                 let arguments = [b, c, d].map(|pick| self.double(pick));
-                let (target, base) = (self.double(e), self.base(f, false, false));
-                let offset = u32::from(e) % (WORDS - STREAM_WORDS) as u32;
+                let target = self.double(e);
                 self.push(Instruction::Random {
                     distribution,
                     target,
                     arguments: arguments[..distribution.arity()].to_vec(),
-                    stream: word(base, offset),
+                    stream: word(Base::State, WORDS as u32),
                     site,
                 });
             }
@@ -807,6 +808,14 @@ const RELATIONS: [Relation; 6] = [
     Relation::NotEqual,
 ];
 
+/// A state of these words, and the start of a run behind them.
+fn state(word: impl Fn(i32) -> i32, seed: u64) -> Vec<i32> {
+    let mut words: Vec<i32> = (0..WORDS as i32).map(word).collect();
+    words.resize(WORDS + STREAM_WORDS, 0);
+    Stream::start(&mut words[WORDS..], seed, 1);
+    words
+}
+
 /// Compares the engines on a program, for several arguments and states.
 fn check_agreement(program: &[Body], seeds: &[i32]) -> Result<(), TestCaseError> {
     let functions = lower(program);
@@ -819,9 +828,7 @@ fn check_agreement(program: &[Body], seeds: &[i32]) -> Result<(), TestCaseError>
     {
         let (_, reference) = &engines[0];
         let arguments = vec![seed; functions[last.0 as usize].parameters as usize];
-        let state: Vec<i32> = (0..WORDS as i32)
-            .map(|word| seed.wrapping_mul(word) % 5)
-            .collect();
+        let state = state(|word| seed.wrapping_mul(word) % 5, u64::from(seed as u32));
         let expected = run(&**reference, last, &arguments, &state);
         for (name, engine) in &engines[1..] {
             let actual = run(&**engine, last, &arguments, &state);
@@ -892,7 +899,7 @@ fn random_programs_end_in_every_way() {
         let arguments = vec![seed % 7; functions[last.0 as usize].parameters as usize];
         for overflow in OVERFLOWS {
             let interpreter = Interpreter::new(&functions, &[1; WORDS]).with_overflow(overflow);
-            let outcome = run(&interpreter, last, &arguments, &[2; WORDS]);
+            let outcome = run(&interpreter, last, &arguments, &state(|_| 2, 0));
             let end = match outcome.result {
                 Ok(_) => "end".to_owned(),
                 Err(RunTimeError {
