@@ -171,6 +171,8 @@ KINDS: Final = _kinds(
         "An adversarial tissue has bounds, a static one none.",
     ),
     ("N094", "tip-error-too-large", "error", "Targets are larger than the error of the tip."),
+    # Files of another kind.
+    ("N095", "json-file", "error", "The file is JSON, and not an environment."),
     # Regions from files.
     ("N100", "package-missing", "error", "A package that reads such files is not installed."),
     ("N101", "image-malformed", "error", "The file is not what its name says."),

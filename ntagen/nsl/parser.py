@@ -72,13 +72,9 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
     Returns:
         The tree of all that could be read.
     """
-    if _is_uppaal_model(source):
-        reporter.report_file(
-            "uppaal-model",
-            source.path,
-            "this is a UPPAAL model, and not an environment",
-            hint="`ntagen check` answers its queries, and `ntagen info` shows what is in it",
-        )
+    if foreign := _foreign(source):
+        name, message, hint = foreign
+        reporter.report_file(name, source.path, message, hint=hint)
         return tree.File(source, ())
     tokens = [t for t in tokenise(source, _known(source)) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
@@ -92,9 +88,20 @@ def _known(source: Source) -> Iterator[tuple[int, int, Token]]:
         yield from ((one.start, one.end, one) for one in plain_regions(source))
 
 
-def _is_uppaal_model(source: Source) -> bool:
-    """Whether a text is XML, or the name of its file says that it is a UPPAAL model."""
-    return source.text.lstrip().startswith("<") or source.path.lower().endswith((".xta", ".ta"))
+def _foreign(source: Source) -> tuple[str, str, str] | None:
+    """What is wrong with a text of another kind: the defect, the message, and a hint.
+
+    XML is a UPPAAL model, and so is a file whose name says it. What begins with a brace or a
+    bracket and a quote, as JSON does, is no statement of the language.
+    """
+    text = source.text.lstrip()
+    if text.startswith("<") or source.path.lower().endswith((".xta", ".ta")):
+        hint = "`ntagen check` answers its queries, and `ntagen info` shows what is in it"
+        return "uppaal-model", "this is a UPPAAL model, and not an environment", hint
+    if text[:1] in ("{", "[") and text[1:].lstrip().startswith(('"', "{", "[")):
+        hint = "give the environment or the model that the file comes from"
+        return "json-file", "this is JSON, and not an environment", hint
+    return None
 
 
 class _Parser:
