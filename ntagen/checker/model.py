@@ -366,12 +366,54 @@ class Model:
             RejectedError: The file is not a strategy, or does not fit the model.
             OSError: The file cannot be read.
         """
+        data = read_file(os.fspath(path), EVIDENCE_BYTES)
+        return self.read_strategy(data, os.fspath(path), forced, priorities)
+
+    def read_strategy(
+        self,
+        data: bytes,
+        path: str = "",
+        forced: ForcedRule = "tiga",
+        priorities: PriorityRule = "ignore",
+    ) -> Strategy:
+        """Reads a strategy from the bytes of a file; all else is as in `load_strategy`.
+
+        Args:
+            data: What `Strategy.json` gives, in UTF-8.
+            path: The name of the file, for messages.
+            forced: The rule for forced moves with which the strategy was made.
+            priorities: Whether priorities counted when it was made.
+
+        Raises:
+            RejectedError: The file is not a strategy, or does not fit the model.
+        """
         from ntagen.checker.strategy import Strategy
 
-        data = read_file(os.fspath(path), EVIDENCE_BYTES)
         with rejecting():
-            raw = _checker.Strategy.read(self._raw, os.fspath(path), data)
+            raw = _checker.Strategy.read(self._raw, path, data)
         return Strategy(raw, forced, priorities)
+
+    def strategy_under(self, query: str, options: Options) -> Strategy | None:
+        """The strategy that a query is asked under, made now if only its winner is known so far.
+
+        Args:
+            query: The query, as ``Pr[<=100](<> Gate.Open) under S``.
+            options: How the query is answered; its limits hold for making the strategy.
+
+        Returns:
+            The strategy; ``None`` if the query names none, or one that no query has defined.
+
+        Raises:
+            RejectedError: The query that defined the strategy gave none.
+        """
+        from ntagen.checker.strategy import Strategy
+
+        form = form_of(query)
+        if form is None or form.uses is None:
+            return None
+        with rejecting():
+            raw = _checker.Strategy.named(self._raw, form.uses, query, options)
+        return None if raw is None else Strategy(raw, options.forced, options.priorities)
 
     def verify(
         self,

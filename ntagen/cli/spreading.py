@@ -20,7 +20,8 @@ dask_option: Final[Decorator] = click.option(
     "--dask",
     metavar="ADDRESS",
     help="For Pr and E: use the workers of the Dask scheduler at this address, as "
-    "tcp://host:8786. They must have the same ntagen. Answers are the same as without them.",
+    "tcp://host:8786. They must have the same ntagen. Answers are the same as without them. "
+    "The runs of --joint, --levels and simulate are made by this machine.",
 )
 
 

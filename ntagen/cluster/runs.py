@@ -59,6 +59,7 @@ class Job:
         text: The model.
         overflow: What happens where results of integer arithmetic do not fit.
         query: The query.
+        strategy: The name and the file of the strategy under which it is asked; None without one.
         options: How it is answered; without what belongs to a process.
     """
 
@@ -66,6 +67,7 @@ class Job:
     text: str
     overflow: OverflowRule
     query: str
+    strategy: tuple[str, bytes] | None
     options: Options
 
 
@@ -103,14 +105,18 @@ def make_block(job: Job, first: int, count: int) -> tuple[bytes, float]:
 
 
 def _loaded(job: Job) -> Model:
-    """The model of a job."""
-    models: dict[tuple[str, str], Model] = _KEPT.__dict__.setdefault("models", {})
-    key = (job.text, job.overflow)
+    """The model of a job, with its strategy."""
+    models: dict[object, Model] = _KEPT.__dict__.setdefault("models", {})
+    key = (job.text, job.overflow, job.strategy)
     if key not in models:
         while len(models) >= _MODELS_KEPT:
             del models[next(iter(models))]
-        models[key] = load(job.text)
-        models[key].overflow = job.overflow
+        model = load(job.text)
+        model.overflow = job.overflow
+        if job.strategy is not None:
+            name, data = job.strategy
+            model.read_strategy(data).keep(name)
+        models[key] = model
     return models[key]
 
 
@@ -189,7 +195,12 @@ class DaskRuns:
         own = replace(options, progress=None, run_progress=None, run_source=None, timeout_s=None)
         # Paths and limits of this process count for nothing there.
         own = replace(own, folder=None, allow_write=(), memory_bytes=None, states=None, threads=1)
-        job = Job(identity(), model.text, model.overflow, query, own)
+        followed = None
+        form = form_of(query)
+        if form is not None and form.uses is not None:
+            strategy = model.strategy_under(query, options)
+            followed = None if strategy is None else (form.uses, strategy.json().encode())
+        job = Job(identity(), model.text, model.overflow, query, followed, own)
         blocks = _Blocks(self._workers, job, next(self._numbers))
         try:
             yield blocks
@@ -202,8 +213,6 @@ def why_here(query: str, options: Options) -> str | None:
     form = form_of(query)
     if form is None or form.kind not in ("Pr", "E"):
         return "only the runs of Pr and E are made by a cluster"
-    if form.uses is not None:
-        return "runs under a strategy are made where the strategy is"
     if options.levels is not None:
         return "importance splitting is not done by a cluster"
     return None

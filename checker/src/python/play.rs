@@ -9,6 +9,7 @@ use pyo3::types::PyBytes;
 use super::answer::Answer;
 use super::convert::{FailedError, priority_rule, rejected, rules};
 use super::model::Model;
+use super::options;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
@@ -16,7 +17,7 @@ use crate::engine::query_form::unnamed;
 use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };
-use crate::engine::{LoadedModel, NamedStrategy};
+use crate::engine::{LoadedModel, NamedStrategy, Options};
 use crate::game::strategy::Selection;
 use crate::verify::{self, Effort};
 
@@ -62,6 +63,42 @@ impl Strategy {
             model: answer.model.clone_ref(py),
             inner: Arc::new(follower),
         })
+    }
+
+    /// The strategy that a query of the model defined by this name, made now if only its winner is
+    /// known so far; `None` if none did. `query` is the one that needs it.
+    #[staticmethod]
+    fn named(
+        model: &Bound<'_, Model>,
+        name: &str,
+        query: &str,
+        options: &Bound<'_, PyAny>,
+    ) -> PyResult<Option<Strategy>> {
+        let (options, raised) = options::read(options)?;
+        let inner = model.get();
+        let follower = model.py().detach(|| {
+            inner.with(|model| {
+                let Some(definition) = model.strategy(name).map(|one| one.query.clone()) else {
+                    return Ok(None);
+                };
+                let options = Options {
+                    overflow: model.network().overflow,
+                    ..options
+                };
+                let span = model.add_query(query).span;
+                let strategy = model.existing_strategy(name, span, &options)?;
+                let follower = Follower::new(model.network(), definition, strategy);
+                Ok(Some(Arc::new(follower)))
+            })
+        });
+        if let Some(failure) = raised.failure(model.py()) {
+            return Err(failure);
+        }
+        let follower = follower.map_err(rejected)?;
+        Ok(follower.map(|inner| Strategy {
+            model: model.clone().unbind(),
+            inner,
+        }))
     }
 
     /// Reads a strategy from the bytes of a file; `path` names it.

@@ -17,6 +17,7 @@ import pytest
 
 from ntagen import checker
 from ntagen.checker import Options
+from ntagen.checker.options import UnderChoice
 from ntagen.cli import main
 from ntagen.cluster import runs as cluster_runs
 from ntagen.cluster.identity import identity
@@ -31,6 +32,20 @@ process R() { state A { ; 5 }; init A; trans A -> A { guard n < 9; assign n++; }
 system Q, R;
 """
 REACHED = "Pr[<=3](<> Q.B)"
+
+GAME = """
+clock x, t; int n;
+process P() {
+    state A { x <= 4 }, B, C;
+    init A;
+    trans A -> B { guard x >= 1; }, A -u-> C { guard x > 2; };
+}
+process R() { state A { ; 5 }; init A; trans A -u-> A { guard n < 9; assign n++; }; }
+system P, R;
+"""
+KEPT_SAFE = "strategy Safe = control: A[] not P.C"
+EARLY = "Pr[<=10](<> P.B && t <= 1.5) under Safe"
+"""The strategy leaves open when P moves between 1 and 2."""
 
 SLOW = """
 clock x; int n;
@@ -58,9 +73,9 @@ def cluster() -> Iterator[Any]:
         yield found
 
 
-def lines(capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+def lines(printed: str) -> list[dict[str, Any]]:
     """The JSON of answers without their times."""
-    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    found = [json.loads(line) for line in printed.splitlines()]
     for line in found:
         del line["seconds"], line["load_seconds"]
     return found
@@ -85,12 +100,35 @@ def test_json_is_that_of_one_machine(
     ]:
         words += ["--query", query]
     code = main(words)
-    here = lines(capsys)
+    here = lines(capsys.readouterr().out)
     assert main([*words, "--dask", cluster.scheduler_address]) == code
-    assert lines(capsys) == here
+    assert lines(capsys.readouterr().out) == here
     assert len(here) == 5
     assert here[0]["runs"] > 20_000
     assert here[1]["distribution"]["runs"] == 20_000
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("choice", ["race", "lazy"])
+def test_runs_under_a_strategy_are_those_of_one_machine(
+    tmp_path: Path,
+    cluster: Any,  # noqa: ANN401
+    capsys: pytest.CaptureFixture[str],
+    choice: str,
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME, "utf-8")
+    words = ["check", str(path), "--json", "--epsilon", "0.01", "--under-choice", choice]
+    for query in [KEPT_SAFE, EARLY, "E[<=3; 5000](max: n) under Safe"]:
+        words += ["--query", query]
+    assert main(words) == 0
+    here = lines(capsys.readouterr().out)
+    assert main([*words, "--dask", cluster.scheduler_address]) == 0
+    said = capsys.readouterr()
+    assert "by this machine" not in said.err
+    assert lines(said.out) == here
+    assert here[1]["value"] == 0 if choice == "lazy" else 0.1 < here[1]["value"] < 0.3
 
 
 @pytest.mark.slow
@@ -200,7 +238,7 @@ def test_without_dask_there_is_a_hint(
         (REACHED, Options(), None),
         ("E[<=3; 9](max: n)", Options(), None),
         (REACHED + " >= 0.5", Options(), None),
-        (REACHED + " under S", Options(), "where the strategy is"),
+        (REACHED + " under S", Options(), None),
         (REACHED, Options(levels="n"), "importance splitting"),
         ("simulate[<=3]{n}", Options(), "only the runs of Pr and E"),
         ("E<> Q.B", Options(), "only the runs of Pr and E"),
@@ -288,11 +326,32 @@ def test_no_runs_are_made_that_nobody_needs(here: DaskRuns) -> None:
     assert client.blocks[-1][1] < 1700, "the last runs are shared by all workers"
 
 
+@pytest.mark.parametrize("choice", ["race", "eager", "lazy"])
+def test_the_strategy_goes_to_the_workers(here: DaskRuns, choice: UnderChoice) -> None:
+    model = checker.load(GAME)
+    assert model.check(KEPT_SAFE).verdict == "satisfied"
+    answer = here.check(model, EARLY, epsilon=0.02, under_choice=choice)
+    assert answer.estimate == model.check(EARLY, epsilon=0.02, under_choice=choice).estimate
+    # A later strategy of the same name is another one.
+    assert model.check("strategy Safe = control: A<> P.B").verdict == "satisfied"
+    answer = here.check(model, EARLY, epsilon=0.02, under_choice=choice)
+    assert answer.estimate == model.check(EARLY, epsilon=0.02, under_choice=choice).estimate
+
+
+def test_a_strategy_that_is_missing_is_refused_as_without_a_cluster(here: DaskRuns) -> None:
+    model = checker.load(GAME)
+    with pytest.raises(checker.RejectedError, match="there is no strategy 'Safe'"):
+        here.check(model, EARLY)
+    assert model.check("strategy Safe = control: A[] P.A").verdict == "not satisfied"
+    with pytest.raises(checker.RejectedError, match="there is no strategy 'Safe': "):
+        here.check(model, EARLY)
+
+
 def test_another_version_is_refused() -> None:
-    job = Job("another", MODEL, "wrap", REACHED, Options())
+    job = Job("another", MODEL, "wrap", REACHED, None, Options())
     with pytest.raises(InputError, match=r"has another version of ntagen(.|\n)*hint: "):
         make_block(job, 0, 1)
-    right = Job(identity(), MODEL, "wrap", REACHED, Options())
+    right = Job(identity(), MODEL, "wrap", REACHED, None, Options())
     block, seconds = make_block(right, 0, 5)
     assert block == checker.load(MODEL).block_of_runs(REACHED, 0, 5, Options())
     assert seconds > 0
