@@ -60,11 +60,7 @@ fn answered(
     model.py().detach(|| {
         inner.with(|model| {
             let text = model.add_query(query);
-            let overflow = model.network().overflow;
-            let options = Options {
-                overflow,
-                ..options
-            };
+            let options = options::by_rule_of(model, options);
             model.check(&text, &options)
         })
     })
@@ -134,11 +130,7 @@ pub(super) fn check_jointly(
         inner.with(|model| {
             let texts = queries.iter().map(|query| model.add_query(query));
             let texts: Vec<_> = texts.zip(precisions).collect();
-            let overflow = model.network().overflow;
-            let options = Options {
-                overflow,
-                ..options
-            };
+            let options = options::by_rule_of(model, options);
             model.check_each_jointly(&texts, &options)
         })
     });

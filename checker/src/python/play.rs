@@ -17,7 +17,7 @@ use crate::engine::query_form::unnamed;
 use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };
-use crate::engine::{LoadedModel, NamedStrategy, Options};
+use crate::engine::{LoadedModel, NamedStrategy};
 use crate::game::strategy::Selection;
 use crate::verify::{self, Effort};
 
@@ -81,10 +81,7 @@ impl Strategy {
                 let Some(definition) = model.strategy(name).map(|one| one.query.clone()) else {
                     return Ok(None);
                 };
-                let options = Options {
-                    overflow: model.network().overflow,
-                    ..options
-                };
+                let options = options::by_rule_of(model, options);
                 let span = model.add_query(query).span;
                 let strategy = model.existing_strategy(name, span, &options)?;
                 let follower = Follower::new(model.network(), definition, strategy);
