@@ -109,16 +109,21 @@ impl<'a> Runner<'a> {
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
-        Runner::with(Arc::new(program), behaviour)
+        let is_free = behaviour.restriction.is_none();
+        let stages = is_free.then(|| Stages::new(behaviour.executor));
+        Runner::with(Arc::new(program), behaviour, stages)
     }
 
-    fn with(program: Arc<Program<'a>>, behaviour: Behaviour<'a>) -> Runner<'a> {
-        let is_free = behaviour.restriction.is_none();
+    fn with(
+        program: Arc<Program<'a>>,
+        behaviour: Behaviour<'a>,
+        stages: Option<Stages>,
+    ) -> Runner<'a> {
         Runner {
             program,
             race: Race::new(behaviour),
             executor: behaviour.executor,
-            stages: is_free.then(|| Stages::new(behaviour.executor)),
+            stages,
         }
     }
 
@@ -159,13 +164,10 @@ impl<'a> Runner<'a> {
     /// One for each thread, at least one: what does not change from run to run is shared.
     pub(super) fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
         let first = Runner::of(behaviour);
-        let program = Arc::clone(&first.program);
         let others = (1..threads).map(|_| {
             let stages = first.stages.as_ref();
-            Runner {
-                stages: stages.map(|stages| stages.of_another(behaviour.executor)),
-                ..Runner::with(Arc::clone(&program), behaviour)
-            }
+            let stages = stages.map(|stages| stages.of_another(behaviour.executor));
+            Runner::with(Arc::clone(&first.program), behaviour, stages)
         });
         let others: Vec<Runner<'a>> = others.collect();
         iter::once(first).chain(others).collect()

@@ -298,12 +298,12 @@ impl<'a> RaceWriter<'_, 'a> {
             let process = sender.process as usize;
             let target = sender.edge.branches[number].target;
             let spot = self.program.spot(process, target);
-            let (broken, done) = (w.block(), w.block());
             if spot.urgency == Urgency::Committed {
-                w.jump(broken);
-            } else {
-                self.plan_at(w, (process, spot), (broken, done));
+                w.give_up();
+                return;
             }
+            let (broken, done) = (w.block(), w.block());
+            self.plan_at(w, (process, spot), (broken, done));
             w.at(broken);
             w.give_up();
             w.at(done);
@@ -551,7 +551,6 @@ impl<'a> RaceWriter<'_, 'a> {
     fn enter(&self, w: &mut Writer, mover: &Instance<'a>, number: usize) {
         let branch = &mover.edge.branches[number];
         update(w, &branch.update, &mover.values);
-        let process = mover.process as usize;
         // Who has moved plans anyway, but who sets rates is looked at before.
         let sets_rates = self.program.rated.contains(&mover.process);
         let mut stale: Vec<u32> = sets_rates.then_some(mover.process).into_iter().collect();
@@ -561,10 +560,7 @@ impl<'a> RaceWriter<'_, 'a> {
         if source != target {
             let place = w.integer(target.0 as i32);
             w.store(mover.process, place);
-            let commits = |location| {
-                let spot = self.program.spot(process, location);
-                i32::from(spot.urgency == Urgency::Committed)
-            };
+            let commits = |location| i32::from(self.is_committed(mover.process, location));
             let change = commits(target) - commits(source);
             if change != 0 {
                 let (committed, change) = (w.load(self.layout.committed), w.integer(change));

@@ -341,12 +341,9 @@ impl RaceWriter<'_, '_> {
                 w.at(next);
             });
         }
-        let nobody = w.block();
-        w.unless(ties, nobody);
+        w.insist(ties);
         self.watch(w, watched, None);
         w.jump(moving);
-        w.at(nobody);
-        w.give_up();
     }
 
     /// If some process must leave before anybody tries to move, who can move then does, or the run
