@@ -128,8 +128,9 @@ def command(
 
     Finds the pushes, the rolls and the start of the environment's needle whose path is nearest to
     each trace, and prints the least, mean and greatest distance of the trace from it, in mm. Where
-    the regions lie does not matter. A trace is a table (CSV, or columns with blanks) or the log of
-    a run (MCAP); a jump backwards of more than 5 mm ends it. See docs/matching.md.
+    the regions lie does not matter. A trace is a table (CSV, columns with blanks or semicolons, or
+    a table of an NDI tracker) or the log of a run (MCAP); a jump backwards of more than 5 mm ends
+    it. See docs/matching.md.
 
     \b
     Examples:
@@ -156,6 +157,7 @@ def command(
             # The other traces are matched all the same.
             echo(f"error: {error}", err=True)
             continue
+        show_warnings([f"warning: {text}" for text in one.match.trace.samples.warnings])
         if as_json:
             echo(json.dumps(_document(one)))
         found.append(one)

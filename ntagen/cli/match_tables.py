@@ -48,9 +48,11 @@ def show(scene: Scene, options: Options, found: Sequence[Matched]) -> None:
     _print("trace", heads, _match_rows(found), "rolls")
     left_out = sum(one.match.trace.outliers for one in found)
     missing = sum(one.match.trace.samples.missing for one in found)
+    later = sum(one.match.trace.after_pull_out for one in found)
     notes = [
         *([f"{left_out} outliers left out"] if left_out else []),
         *([f"{missing} samples are missing"] if missing else []),
+        *([f"{later} samples after a jump back left out"] if later else []),
     ]
     if notes:
         echo("; ".join(notes))

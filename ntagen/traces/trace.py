@@ -59,6 +59,7 @@ class Samples:
         lines: The line of each in the file; without lines, its number in the order of time.
         missing: How many samples without a position were left out.
         word: What a line is called in messages: ``line`` or ``sample``.
+        warnings: What the user should know about the file.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Samples:
     lines: tuple[int, ...]
     missing: int = 0
     word: str = "line"
+    warnings: tuple[str, ...] = ()
 
     def upto(self, count: int) -> Samples:
         """The first samples."""
@@ -100,6 +102,12 @@ class Trace:
     depths_mm: Array
     outliers: int
     pulled_out_at: int | None
+
+    @property
+    def after_pull_out(self) -> int:
+        """How many samples were left out since they come after the insertion."""
+        last = self.pulled_out_at
+        return 0 if last is None else len(self.samples.points_mm) - last
 
     @property
     def length_mm(self) -> float:
@@ -318,9 +326,12 @@ def _require_forward(trace: Trace) -> None:
             foremost = index
         elif progress_mm < -_BACK_MM:
             depth_mm = trace.depths_mm[foremost]
+            until = ""
+            if depth_mm >= SHORTEST_MM:
+                until = f"--until {math.floor(depth_mm):d}mm matches what comes before it, and "
             raise InputError(
                 f"{trace.samples.place(trace.indices[foremost])}: the trace turns back at a depth "
                 f"of {depth_mm:.1f} mm\n"
-                f"hint: --until {math.floor(depth_mm):d}mm matches what comes before it, and a "
-                "greater --from LENGTH what comes after it; or delete what is no insertion"
+                f"hint: {until}a greater --from LENGTH matches what comes after it; or delete what "
+                "is no insertion"
             )

@@ -21,7 +21,8 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import dot, unit
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
-from ntagen.tracking.points import axis_columns, rows_of, text_of
+from ntagen.tracking.points import axis_columns
+from ntagen.tracking.tables import Row, Table, read_table
 
 HOLD_S: Final = 5.0
 """Within the recording, a sample counts for so long; the samples of a run are as far apart as its
@@ -132,19 +133,19 @@ def samples_of_table(path: Path, transform: Transform) -> tuple[list[Measurement
     Raises:
         InputError: The file has a mistake, or its frame is not that of the transform.
     """
-    rows = rows_of(path, text_of(path))
-    table = _Table(path, rows[0][1], transform)
-    samples = [table.measurement(number, row) for number, row in rows[1:]]
-    return samples, "force_n" in rows[0][1]
+    table = read_table(path)
+    measurements = _Measurements(table, transform)
+    return [measurements.of(row) for row in table.rows], "force_n" in table.names
 
 
-class _Table:
+class _Measurements:
     """The columns of a table of measurements."""
 
-    def __init__(self, path: Path, head: list[str], transform: Transform) -> None:
-        self._path = path
-        self._head = head
+    def __init__(self, table: Table, transform: Transform) -> None:
+        self._table = table
         self._transform = transform
+        path, head = table.path, table.names
+        self._columns = {name: index for index, name in enumerate(head)}
         frames = axis_columns(path, head)
         if len(frames) != 1:
             raise InputError(f"{path}:1: there are positions in {len(frames)} frames, not in one")
@@ -155,34 +156,40 @@ class _Table:
         if frame.lower() != expected.lower():
             raise InputError(_other_frame(path, frame, expected))
 
-    def measurement(self, number: int, row: list[str]) -> Measurement:
+    def of(self, row: Row) -> Measurement:
         """The measurement in a row."""
-        place = f"{self._path}:{number}"
-        if len(row) != len(self._head):
-            raise InputError(f"{place}: {len(row)} cells, but the first line has {len(self._head)}")
-        cells = dict(zip(self._head, row, strict=True))
-        x, y, z = (_number(row[column], place) * factor for column, factor in self._axes)
-        heading, bevel = (self._direction(cells, name, place) for name in _DIRECTIONS)
+        x, y, z = (self._number(row, column) * factor for column, factor in self._axes)
+        heading, bevel = (self._direction(row, name) for name in _DIRECTIONS)
         if heading and bevel and abs(dot(heading, bevel)) > _RIGHT_ANGLE:
-            raise InputError(f"{place}: heading and bevel are not at a right angle")
+            raise InputError(f"{row.place}: heading and bevel are not at a right angle")
+        force = self._columns.get("force_n")
         return Measurement(
-            time_s=_number(cells["time_s"], place),
+            time_s=self._number(row, self._columns["time_s"]),
             position_mm=self._transform.point((x, y, z)),
-            force_n=_number(cells.get("force_n", "0"), place),
+            force_n=0.0 if force is None else self._number(row, force),
             heading=heading,
             bevel=bevel,
         )
 
-    def _direction(self, cells: dict[str, str], name: str, place: str) -> Vector | None:
+    def _direction(self, row: Row, name: str) -> Vector | None:
         """A direction of length 1; none without columns, or with empty cells."""
-        texts = [cells.get(f"{name}_{axis}", "") for axis in "xyz"]
-        if not any(texts):
+        columns = [self._columns.get(f"{name}_{axis}") for axis in "xyz"]
+        known = [column for column in columns if column is not None]
+        if not any(row.cells[column] for column in known):
             return None
-        x, y, z = (_number(text, place) for text in texts)
+        if len(known) != len(columns):
+            raise InputError(f"{self._table.path}:1: there are not all of {name}_x, …, {name}_z")
+        x, y, z = (self._number(row, column) for column in known)
         try:
             return self._transform.direction(unit((x, y, z)))
         except ValueError:
-            raise InputError(f"{place}: the {name} has no direction") from None
+            raise InputError(f"{row.place}: the {name} has no direction") from None
+
+    def _number(self, row: Row, column: int) -> float:
+        number = self._table.number(row, column)
+        if not math.isfinite(number):
+            raise InputError(f"{row.place}: '{row.cells[column]}' is not a number")
+        return number
 
 
 def _other_frame(path: Path, frame: str, expected: str) -> str:
@@ -200,16 +207,6 @@ def _other_frame(path: Path, frame: str, expected: str) -> str:
     return (
         f"{path}: the positions are in the frame {frame}, but the registration is from {expected}"
     )
-
-
-def _number(text: str, place: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(f"{place}: '{text}' is not a number")
-    return number
 
 
 def _optional(numbers: tuple[float, ...]) -> Vector | None:

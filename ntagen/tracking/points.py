@@ -7,7 +7,6 @@ not say it is refused. Positions are returned in mm; units that a file names are
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import re
@@ -17,13 +16,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.errors import InputError
-from ntagen.files import read_file
 from ntagen.scene import Vector
 from ntagen.tracking.frames import LPS, RAS, flipped, frame_named
 from ntagen.tracking.registration import Pairs
+from ntagen.tracking.tables import csv_rows, read_table, text_of
 from ntagen.units import MM_PER
-
-LARGEST_BYTES: Final = 16 * 2**20
 
 _FCSV_FRAMES: Final = {"0": RAS, "1": LPS, "RAS": RAS, "LPS": LPS}
 _FCSV_COLUMNS: Final = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
@@ -71,13 +68,12 @@ def read_points(path: Path, frames: Iterator[str]) -> list[Points]:
         InputError: The file cannot be read, has a mistake, or nobody says its frame.
     """
     name = path.name.lower()
-    text = text_of(path)
     if name.endswith(".fcsv"):
-        return [_fcsv(path, text, frames)]
+        return [_fcsv(path, text_of(path), frames)]
     if name.endswith(".json"):
-        return [_markups(path, text, frames)]
+        return [_markups(path, text_of(path), frames)]
     if name.endswith(".csv"):
-        return _csv(path, text, frames)
+        return _csv(path, frames)
     raise InputError(
         f"{path}: this is no file of points\n"
         "hint: give a file of Slicer (.fcsv, .mrk.json) or a .csv file"
@@ -128,48 +124,19 @@ def axis_columns(path: Path, head: Sequence[str]) -> dict[str, list[tuple[int, f
         match = _AXIS.fullmatch(cell)
         if match:
             of_frame = axes.setdefault(match["frame"] or "", {})
+            if match["axis"].lower() in of_frame:
+                raise InputError(
+                    f"{path}:1: there is a column {cell} before\nhint: names must differ"
+                )
             of_frame[match["axis"].lower()] = (index, MM_PER[match["unit"].lower()])
     if not axes or any(set(one) != set("xyz") for one in axes.values()):
+        told = f"the columns are {', '.join(head)}" if head else "the columns have no names"
         raise InputError(
-            f"{path}:1: the columns are {', '.join(head)}\n"
+            f"{path}:1: {told}\n"
             "hint: name them x_mm, y_mm, z_mm, or with frames: tracker_x_mm, …, scene_x_mm, …; "
             "units are mm, cm, m, um; names of points are in the column name"
         )
     return {frame: [one[axis] for axis in "xyz"] for frame, one in axes.items()}
-
-
-def rows_of(path: Path, text: str) -> list[tuple[int, list[str]]]:
-    """The lines of a CSV table with their numbers; empty lines and comments (#) are left out.
-
-    Raises:
-        InputError: It is no such table, or it is empty.
-    """
-    reader = csv.reader(text.splitlines())
-    try:
-        rows = [
-            (reader.line_num, [cell.strip() for cell in row])
-            for row in reader
-            if row and not row[0].startswith("#")
-        ]
-    except csv.Error as error:
-        raise InputError(f"{path}:{reader.line_num}: this is no CSV: {error}") from None
-    if not rows:
-        raise InputError(f"{path}: this file is empty")
-    return rows
-
-
-def text_of(path: Path) -> str:
-    """The text of a file.
-
-    Raises:
-        InputError: It cannot be read, or is no text.
-    """
-    try:
-        return read_file(path, LARGEST_BYTES).decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: this is not text in UTF-8") from None
 
 
 # Slicer.
@@ -192,11 +159,11 @@ def _fcsv(path: Path, text: str, frames: Iterator[str]) -> Points:
                 )
     names = [column.strip() for column in columns.split(",")]
     positions: dict[str, Vector] = {}
-    for number, cells in rows_of(path, text):
-        row = dict(zip(names, cells, strict=False))
-        place = f"{path}:{number}"
-        numbers = [_number(row.get(axis, ""), place, axis) for axis in "xyz"]
-        _add(positions, row.get("label") or row.get("id") or "", _scaled(numbers, 1.0), place)
+    for row in csv_rows(path, ["" if line.startswith("#") else line for line in lines], ","):
+        cells = dict(zip(names, row.cells, strict=False))
+        numbers = [_number(cells.get(axis, ""), row.place, axis) for axis in "xyz"]
+        name = cells.get("label") or cells.get("id") or ""
+        _add(positions, name, _scaled(numbers, 1.0), row.place)
     return Points(_frame(path, told, frames), positions)
 
 
@@ -244,22 +211,22 @@ def _unit_of(path: Path, units: object) -> float:
 # CSV.
 
 
-def _csv(path: Path, text: str, frames: Iterator[str]) -> list[Points]:
-    rows = rows_of(path, text)
-    head = rows[0][1]
+def _csv(path: Path, frames: Iterator[str]) -> list[Points]:
+    table = read_table(path)
+    head = table.names
     sets = axis_columns(path, head)
     named = next((head.index(word) for word in _NAMES if word in head), None)
     found: dict[str, dict[str, Vector]] = {prefix: {} for prefix in sets}
-    for count, (number, row) in enumerate(rows[1:], start=1):
-        place = f"{path}:{number}"
-        if len(row) != len(head):
-            raise InputError(f"{place}: {len(row)} cells, but the first line has {len(head)}")
-        name = row[named] if named is not None else str(count)
+    for count, row in enumerate(table.rows, start=1):
+        name = row.cells[named] if named is not None else str(count)
         for prefix, axes in sets.items():
-            numbers = [
-                _number(row[column], place, head[column]) * factor for column, factor in axes
-            ]
-            _add(found[prefix], name, _scaled(numbers, 1.0), place)
+            numbers = []
+            for column, factor in axes:
+                number = table.number(row, column) * factor
+                if not math.isfinite(number):
+                    raise _no_number(row.place, head[column], row.cells[column])
+                numbers.append(number)
+            _add(found[prefix], name, _scaled(numbers, 1.0), row.place)
     return [Points(_frame(path, prefix or None, frames), found[prefix]) for prefix in sets]
 
 
@@ -287,8 +254,12 @@ def _number(value: Any, place: str, what: str) -> float:  # noqa: ANN401  from J
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{place}: {what} is '{value}', which is not a number")
+        raise _no_number(place, what, value)
     return number
+
+
+def _no_number(place: str, what: str, value: object) -> InputError:
+    return InputError(f"{place}: {what} is '{value}', which is not a number")
 
 
 def _scaled(numbers: Sequence[float], factor: float) -> Vector:

@@ -113,7 +113,7 @@ def test_a_table_in_another_frame_and_unit(tmp_path: Path) -> None:
         ("", IDENTITY, "this file is empty"),
         ("x_mm,y_mm,z_mm\n1,2,3\n", IDENTITY, "no column time_s"),
         ("time_s,x_mm,y_mm\n1,2,3\n", IDENTITY, "the columns are"),
-        ("time_s,x_mm,y_mm,z_mm\n1,2,3\n", IDENTITY, "run.csv:2: 3 cells"),
+        ("time_s,x_mm,y_mm,z_mm\n1,2,3\n", IDENTITY, "run.csv:2: there are 3 columns, but 4"),
         ("time_s,x_mm,y_mm,z_mm\n0,1,2,x\n", IDENTITY, "run.csv:2: 'x' is not a number"),
         ("time_s,x_mm,y_mm,z_mm\n0,1,2,nan\n", IDENTITY, "run.csv:2: 'nan' is not a number"),
         ("time_s,x_mm,y_mm,z_mm,force_n\n0,1,2,3,\n", IDENTITY, "'' is not a number"),

@@ -1,0 +1,279 @@
+"""Reads tables of numbers as trackers, spreadsheets and scripts write them.
+
+Cells have semicolons, tabs, commas or blanks between them, and may stand in quotes. Numbers have a
+decimal point, or all of them a decimal comma. A second line may name the units of the columns. What
+could be read in two ways is refused: nothing here is guessed.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from ntagen.errors import InputError
+from ntagen.files import read_file
+from ntagen.units import MM_PER, N_PER, RAD_PER, S_PER
+
+LARGEST_BYTES: Final = 16 * 2**20
+
+_POINT: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+_COMMA: Final = re.compile(r"[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
+_THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
+"""With a comma between cells, such a number in quotes may have a comma after its thousands."""
+
+_GAPS: Final = frozenset({"", "-", "nan", "+nan", "-nan", "na", "n/a", "null", "none", "missing"})
+_BAD_FLOAT: Final = 1e28
+"""Trackers of NDI write -3.697314e28 for a number that they do not have."""
+
+_OTHER_UNITS: Final = frozenset({"us", "ns", "µs", "°", "degree", "degrees", "sec", "-", "1"})
+_UNITS: Final = frozenset({*MM_PER, *RAD_PER, *S_PER, *N_PER, "µm", "μm"} | _OTHER_UNITS)
+_FOLDED: Final = frozenset({*MM_PER, *RAD_PER, *S_PER, *N_PER})
+_BRACKETS: Final = re.compile(r"[(\[<](.*)[)\]>]")
+_UNIT_AT_END: Final = re.compile(r".*?(?:[ _,]+|[ _,]*[(\[])(?P<unit>[^\s_,()\[\]]+)[)\]]?")
+_SEPARATOR_TOLD: Final = re.compile(r"sep=(.)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A line of a table: where it is, for messages, and its cells."""
+
+    place: str
+    line: int
+    cells: list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table.
+
+    Attributes:
+        path: The file.
+        head: The first row, if its cells are no numbers: the names of the columns.
+        units: The unit of each column, from the row of units; empty where it tells none.
+        rows: The other rows; each has as many cells as the first one.
+        mixed: Why a comma in a number cannot be read; empty if it is a decimal comma.
+    """
+
+    path: Path
+    head: Row | None
+    units: list[str]
+    rows: list[Row]
+    mixed: str
+
+    @property
+    def names(self) -> list[str]:
+        """The names of the columns, each with its unit if the row of units has one: ``x_mm``."""
+        if self.head is None:
+            return []
+        pairs = zip(self.head.cells, self.units, strict=True)
+        return [
+            f"{cell}_{unit}" if unit in _FOLDED and not unit_of(cell) else cell
+            for cell, unit in pairs
+        ]
+
+    def number(self, row: Row, index: int) -> float:
+        """The number in a cell; not finite (nan) if there is none, as in a gap.
+
+        Raises:
+            InputError: It has a comma that can be read in two ways.
+        """
+        cell = row.cells[index]
+        if _POINT.fullmatch(cell):
+            return _finite(float(cell))
+        if not _COMMA.fullmatch(cell):
+            return math.nan
+        if self.mixed:
+            raise InputError(
+                f"{row.place}: the comma in '{cell}' can be read in two ways: {self.mixed}"
+            )
+        return _finite(float(cell.replace(",", ".")))
+
+    def is_gap(self, row: Row, index: int) -> bool:
+        """Whether a cell says that a number is missing."""
+        cell = row.cells[index]
+        return cell.lower() in _GAPS or abs(self.number(row, index)) >= _BAD_FLOAT
+
+
+def read_table(path: Path, comments: str = "#") -> Table:
+    """The table in a file. Empty lines are left out, and those that begin with a comment's sign.
+
+    Raises:
+        InputError: The file cannot be read, is no such table, or is empty.
+    """
+    lines = [
+        "" if line.lstrip()[:1] in comments and line.strip() else line
+        for line in text_of(path).splitlines()
+    ]
+    first = next((index for index, line in enumerate(lines) if line.strip()), None)
+    if first is None:
+        raise InputError(f"{path}: this file is empty")
+    told = _SEPARATOR_TOLD.fullmatch(lines[first].strip())
+    if told:
+        # A spreadsheet begins a file so.
+        lines[first] = ""
+    separator = told[1] if told else _separator(lines[first])
+    rows = list(_rows(path, lines, separator))
+    if not rows:
+        raise InputError(f"{path}: this file is empty")
+    head = None if any(map(_is_number, rows[0].cells)) else rows.pop(0)
+    units = _units(head, rows)
+    _require_widths(len(head.cells if head else rows[0].cells), rows, separator)
+    return Table(path, head, units, rows, _mixed(rows, separator))
+
+
+def unit_of(name: str) -> str:
+    """The unit at the end of the name of a column, such as ``mm`` in ``x [mm]``; empty if none."""
+    found = _UNIT_AT_END.fullmatch(name)
+    unit = found["unit"] if found else ""
+    return unit if _plain(unit) in _UNITS else ""
+
+
+def csv_rows(path: Path, lines: Iterable[str], separator: str) -> list[Row]:
+    """The lines of a table with separators between its cells; empty ones are left out.
+
+    Raises:
+        InputError: It is no such table.
+    """
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+    rows = []
+    try:
+        for cells in reader:
+            line = reader.line_num
+            if len(cells) > 1 or any(map(str.strip, cells)):
+                rows.append(Row(f"{path}:{line}", line, [cell.strip() for cell in cells]))
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}: this is no CSV: {error}") from None
+    return rows
+
+
+def text_of(path: Path) -> str:
+    """The text of a file.
+
+    Raises:
+        InputError: It cannot be read, or is no text.
+    """
+    try:
+        return read_file(path, LARGEST_BYTES).decode("utf-8-sig")
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: this is not text in UTF-8") from None
+
+
+def _separator(line: str) -> str | None:
+    """What stands between the cells of a line; None for blanks."""
+    outside = re.sub(r'"[^"]*"', '""', line)
+    for sign in (";", "\t"):
+        if sign in outside:
+            return sign
+    parts = outside.split()
+    if len(parts) > 1 and all(map(_is_number, parts)):
+        # Blanks between numbers, perhaps with decimal commas.
+        return None
+    return "," if "," in outside else None
+
+
+def _rows(path: Path, lines: list[str], separator: str | None) -> Iterable[Row]:
+    if separator is not None:
+        return csv_rows(path, lines, separator)
+    return [
+        Row(f"{path}:{line}", line, [cell.strip('"') for cell in text.split()])
+        for line, text in enumerate(lines, start=1)
+        if text.strip()
+    ]
+
+
+def _require_widths(width: int, rows: list[Row], separator: str | None) -> None:
+    """Refuses rows that are longer or shorter than the first one.
+
+    Empty cells at the end of a row do not count.
+
+    Raises:
+        InputError: There is such a row.
+    """
+    for row in rows:
+        while len(row.cells) > width and not row.cells[-1]:
+            row.cells.pop()
+    wrong = [row for row in rows if len(row.cells) != width]
+    if not wrong:
+        return
+    count = len(wrong[0].cells)
+    found = f"{wrong[0].place}: there are {count} columns, but {width} in the line at the top"
+    if len(wrong) <= len(rows) / 2.0:
+        raise InputError(f"{found}\nhint: was the file cut off? delete lines that are not whole")
+    hint = "give each column a name, and no other line before the names"
+    if separator == "," and count > width:
+        hint = (
+            "numbers with decimal commas need semicolons between the columns, or stand in quotes; "
+            "else give each column a name"
+        )
+    raise InputError(f"{found}; {len(wrong)} of {len(rows)} lines are so\nhint: {hint}")
+
+
+def _is_number(cell: str) -> bool:
+    return bool(_POINT.fullmatch(cell) or _COMMA.fullmatch(cell))
+
+
+def _finite(number: float) -> float:
+    return number if math.isfinite(number) else math.nan
+
+
+def _units(head: Row | None, rows: list[Row]) -> list[str]:
+    """The unit of each column; the row of units is taken from the rows.
+
+    Raises:
+        InputError: It tells another unit than the name of a column.
+    """
+    if head is None:
+        return []
+    none = [""] * len(head.cells)
+    if not rows or len(rows[0].cells) != len(none):
+        return none
+    units = [_plain(cell) for cell in rows[0].cells]
+    if not any(units) or not all(unit in _UNITS for unit in units if unit):
+        return none
+    if all(unit in _GAPS | {"1"} for unit in units):
+        # A first sample that is missing.
+        return none
+    row = rows.pop(0)
+    for name, unit in zip(head.cells, units, strict=True):
+        told = _plain(unit_of(name))
+        if told and unit and told != unit:
+            raise InputError(
+                f"{row.place}: the unit of `{name}` is '{unit}' here\n"
+                "hint: let the name of the column and the line of units tell the same unit"
+            )
+    return units
+
+
+def _plain(unit: str) -> str:
+    """A unit without brackets, in the letters of `ntagen.units`."""
+    found = _BRACKETS.fullmatch(unit)
+    text = (found[1] if found else unit).strip()
+    text = text if text in _UNITS else text.lower()
+    return "um" if text in ("µm", "μm") else text
+
+
+def _mixed(rows: list[Row], separator: str | None) -> str:
+    """Why a comma in a number cannot be read (`Table.mixed`)."""
+    commas = [cell for row in rows for cell in row.cells if "," in cell and _COMMA.fullmatch(cell)]
+    if not commas:
+        return ""
+    for row in rows:
+        for cell in row.cells:
+            if "." in cell and _POINT.fullmatch(cell):
+                return (
+                    f"'{cell}' in line {row.line} has a decimal point\n"
+                    "hint: write all numbers with the same decimal mark, and none between thousands"
+                )
+    if separator == "," and all(map(_THOUSANDS.fullmatch, commas)):
+        return (
+            "it may stand after thousands\n"
+            "hint: write decimal points, or semicolons between the columns"
+        )
+    return ""
