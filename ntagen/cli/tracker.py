@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ntagen.hardware import OpenIGTLinkTracker
     from ntagen.scene import Pose
     from ntagen.tracking.frames import Transform
-    from ntagen.tracking.look import Look
+    from ntagen.tracking.look import Found, Look
     from ntagen.tracking.spec import Tracker
 
 SIMULATED: Final = "openigtlink+sim"
@@ -248,16 +248,23 @@ def look_at(text: str, seconds: float, *, as_json: bool) -> int:
 def _tell(text: str, seconds: float, found: Look) -> None:
     echo(f"{text}: {len(found.devices)} device(s) in {seconds:g} s")
     for one in found.devices:
-        place = ", ".join(f"{number:.2f}" for number in one.position_mm)
         stamp = "" if one.has_stamp else ", without time stamps"
-        echo(f"  {one.name}: {one.kind}, {one.rate_hz:.1f} per s{stamp}; at ({place}) mm")
+        echo(f"  {one.name}: {one.kind}, {_rate(one)}{stamp}; {_where(one)}")
     for name, words in found.sensors:
         echo(f"  sensor {name}: {words}")
     for name, words in found.statuses:
-        echo(f"  status of {name}: {words}")
-    counts = found.counts
-    if counts.skipped:
-        echo(
-            f"  skipped: {counts.unknown} messages of other types, {counts.wrong_crc} with a wrong "
-            f"checksum, {counts.malformed} that were malformed"
-        )
+        echo(f"  status of {name or 'the server'}: {words}")
+    if found.counts.skipped:
+        echo(f"  skipped: {found.counts}")
+
+
+def _rate(one: Found) -> str:
+    if one.repeats and one.rate_hz == 0.0:
+        return f"the same sample {one.repeats + 1} times"
+    return f"{one.rate_hz:.1f} per s"
+
+
+def _where(one: Found) -> str:
+    if one.position_mm is None:
+        return "not seen"
+    return f"at ({', '.join(f'{number:.2f}' for number in one.position_mm)}) mm"

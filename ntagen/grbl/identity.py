@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -49,7 +51,10 @@ def identify(link: Link) -> Identity:
     Raises:
         DeviceError: It is not ready, gives no answer, or its firmware is another one.
     """
-    status = require_ready(link, link.start())
+    status = link.start()
+    if status.is_old:
+        raise _too_old(link, "0.9 or older")
+    require_ready(link, status)
     # An empty line ends what grblHAL has left of an error.
     link.command("")
     facts = {reply.key: reply.text for reply in link.command("$I") if isinstance(reply, Feedback)}
@@ -60,17 +65,14 @@ def identify(link: Link) -> Identity:
             "hint: GRBL 1.1, grblHAL and FluidNC are known to work in the same way"
         )
     if version.startswith(("0.", "1.0")):
-        raise link.fail(
-            f"{link.name}: the firmware is GRBL {version}, which has no real-time jog cancel\n"
-            "hint: install GRBL 1.1 or grblHAL"
-        )
+        raise _too_old(link, version)
     settings = {}
     for reply in link.command("$$"):
         if isinstance(reply, Setting):
-            try:
-                settings[reply.number] = float(reply.value)
-            except ValueError:
-                continue
+            with contextlib.suppress(ValueError):
+                value = float(reply.value)
+                if math.isfinite(value):
+                    settings[reply.number] = value
     if settings.get(_REPORTS_INCHES):
         raise link.fail(f"{link.name}: the controller reports inches\nhint: set $13=0")
     count = len(position_of(status))
@@ -103,6 +105,14 @@ def require_ready(link: Link, status: Status) -> Status:
                 f"{link.name}: the controller is in the state {status}, not idle\n"
                 "hint: end that by a reset of the controller, with the needle at rest"
             )
+
+
+def _too_old(link: Link, version: str) -> DeviceError:
+    """The error that the firmware cannot stop a jog at once."""
+    return link.fail(
+        f"{link.name}: the firmware is GRBL {version}, which has no real-time jog cancel\n"
+        "hint: install GRBL 1.1 or grblHAL"
+    )
 
 
 def no_axis(link: Link, letter: str, axes: str) -> DeviceError:

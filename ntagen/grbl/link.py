@@ -8,6 +8,8 @@ Rules that are kept here and nowhere else:
   without a lock.
 * After anything that is not as it should be, the link moves nothing any more: a broken connection,
   silence, noise, an alarm, or a reset that nobody asked for. It never unlocks an alarm by itself.
+* All status reports of a controller have the same form. One that has another position, or positions
+  of fewer axes, has lost a part of itself on the wire: it is noise.
 * grblHAL goes on refusing G-code after an error until it gets an empty line; so every refused line
   is followed by one.
 """
@@ -32,6 +34,7 @@ from ntagen.grbl.protocol import (
     Refusal,
     Reply,
     Status,
+    nonsense,
     parse,
 )
 
@@ -77,6 +80,7 @@ class Link:
         self._turn = threading.RLock()
         self._expects_banner = False
         self._noise: ProtocolError | None = None
+        self._form: tuple[bool, int, bool] | None = None
 
     @property
     def name(self) -> str:
@@ -211,7 +215,12 @@ class Link:
                 while (left_s := pause_s - self.now_s()) > 0.0:
                     for reply in self._starting(left_s):
                         if isinstance(reply, Status):
-                            return self._settled(reply)
+                            status = self._settled(reply)
+                            self._form = status.form
+                            return status
+        if self._buffer and self._noise is None:
+            # A wrong baud rate gives bytes without an end of a line.
+            self._noise = nonsense(bytes(self._buffer))
         if self._noise is not None:
             raise self.fail(f"{self.name}: {self._noise}")
         raise self.fail(
@@ -251,11 +260,9 @@ class Link:
 
         Noise is no fault yet: a line may have begun before the port was opened.
         """
-        try:
-            return self._pump(timeout_s)
-        except ProtocolError as error:
-            self._noise = error
-            return []
+        replies, noise = self._pump(timeout_s)
+        self._noise = noise or self._noise
+        return replies
 
     def _ask(self, watch: Watch | None, *, forgiving: bool = False) -> Status:
         # A report that was late must not be taken for the answer.
@@ -297,15 +304,12 @@ class Link:
     def _next(self, timeout_s: float, *, forgiving: bool = False) -> list[Reply]:
         """The next replies; alarms, resets and noise are failures."""
         kept, self._replies = self._replies, []
-        try:
-            replies = kept or self._pump(timeout_s)
-        except ProtocolError as error:
-            if forgiving:
-                return []
-            raise self.fail(f"{self.name}: {error}") from None
+        replies, noise = (kept, None) if kept else self._pump(timeout_s)
         if not forgiving:
             for reply in replies:
                 self._require_peace(reply)
+            if noise is not None:
+                raise self.fail(f"{self.name}: {noise}")
         return replies
 
     def _require_peace(self, reply: Reply) -> None:
@@ -327,20 +331,41 @@ class Link:
         while replies := self._next(0.0):
             del replies
 
-    def _pump(self, timeout_s: float) -> list[Reply]:
-        """Reads once; the replies that are complete now."""
+    def _pump(self, timeout_s: float) -> tuple[list[Reply], ProtocolError | None]:
+        """Reads once; the replies that are complete now, and the first noise among them."""
         try:
             data = self._port.read(timeout_s)
         except DeviceError as error:
             raise self.fail(str(error)) from None
         self._buffer += data
-        *lines, rest = self._buffer.split(b"\n")
+        # Some firmwares end a line by a carriage return alone.
+        *lines, rest = self._buffer.replace(b"\r", b"\n").split(b"\n")
         self._buffer = rest
         if len(rest) > MAX_REPLY_BYTES:
             lines.append(bytearray(rest))
             self._buffer = bytearray()
-        replies = [parse(bytes(line)) for line in lines]
-        return [reply for reply in replies if reply is not None]
+        replies: list[Reply] = []
+        noise: ProtocolError | None = None
+        for line in lines:
+            try:
+                reply = self._reply(bytes(line))
+            except ProtocolError as error:
+                noise = noise or error
+                continue
+            if reply is not None:
+                replies.append(reply)
+        return replies, noise
+
+    def _reply(self, line: bytes) -> Reply | None:
+        """The reply in a line.
+
+        Raises:
+            ProtocolError: It is none, or a report of another form than those before it.
+        """
+        reply = parse(line)
+        if isinstance(reply, Status) and self._form not in (None, reply.form):
+            raise nonsense(line)
+        return reply
 
     def _write(self, data: bytes) -> None:
         try:

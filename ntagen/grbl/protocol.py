@@ -4,6 +4,10 @@ The grammar is that of the interface documents of GRBL 1.1 and grblHAL: `ok`, `e
 status reports ``<State|Key:values|…>``, feedback ``[KEY:values]``, settings ``$n=v`` and the banner
 after a reset. Keys of status reports that are not known here are ignored, since firmwares add
 their own. Positions are in the controller's unit of each axis: mm, and degrees on a rotary axis.
+
+All of that is ASCII, but a message for people, ``[MSG:…]``, which may have the name of a network.
+The status reports of GRBL 0.9, with commas between their parts, are read to tell which firmware it
+is: nothing can be moved by it.
 """
 
 from __future__ import annotations
@@ -49,6 +53,10 @@ class Activity(Enum):
     HOME = "Home"
     SLEEP = "Sleep"
     TOOL = "Tool"
+    CRITICAL = "Critical"
+    """FluidNC has met an error that needs a restart."""
+    CONFIG_ALARM = "ConfigAlarm"
+    """FluidNC cannot read its configuration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +125,7 @@ class Status:
         offset: The work offset: machine position minus work position. Few reports have it.
         feed: The speed, in units per minute.
         pins: The input pins that are active, for example ``XZ``.
+        is_old: Whether it is a report of GRBL 0.9 or older.
     """
 
     activity: Activity
@@ -126,6 +135,13 @@ class Status:
     offset: tuple[float, ...] | None = None
     feed: float | None = None
     pins: str = ""
+    is_old: bool = False
+
+    @property
+    def form(self) -> tuple[bool, int, bool]:
+        """What all reports of a controller have in common: which position, and of how many axes."""
+        position = self.machine or self.work or ()
+        return self.machine is not None, len(position), self.is_old
 
     @property
     def stands(self) -> bool:
@@ -144,8 +160,12 @@ Reply = Ok | Refusal | Alarm | Banner | Setting | Feedback | Status
 _BANNER: Final = re.compile(r"(Grbl\w*) ([0-9][\w.]*) \[.*\]", re.IGNORECASE)
 _NUMBERED: Final = re.compile(r"(error|ALARM):([0-9]{1,4})")
 _SETTING: Final = re.compile(r"\$([0-9]{1,4})=([^()]*?)\s*(\(.*\))?")
-_FEEDBACK: Final = re.compile(r"\[([A-Za-z0-9. ]+):?(.*)\]")
+_FEEDBACK: Final = re.compile(r"\[([A-Za-z0-9. ]+):?(.*)\]", re.DOTALL)
 _STATUS: Final = re.compile(r"<([A-Za-z]+)(?::([0-9]{1,3}))?((?:\|[^|<>]*)*)>")
+_OLD_STATUS: Final = re.compile(r"<([A-Za-z]+),MPos:([-+.,0-9]+),WPos:[-+.,0-9]+[^<>]*>")
+"""A report of GRBL 0.9."""
+
+_MESSAGE: Final = re.compile(r"\[MSG:.*\]", re.DOTALL)
 _NUMBER: Final = re.compile(r"[+-]?[0-9]{1,12}(\.[0-9]{0,9})?")
 _MAX_AXES: Final = 9
 
@@ -160,18 +180,18 @@ def parse(line: bytes) -> Reply | None:
         ProtocolError: The bytes are no line of the protocol.
     """
     if len(line) > MAX_REPLY_BYTES:
-        raise _nonsense(line)
+        raise nonsense(line)
     try:
-        text = line.decode("ascii").strip()
+        text = line.decode().strip()
     except UnicodeDecodeError:
-        raise _nonsense(line) from None
+        raise nonsense(line) from None
     if not text:
         return None
-    if not text.isprintable():
-        raise _nonsense(line)
+    if not (text.isascii() and text.isprintable()) and not _MESSAGE.fullmatch(text):
+        raise nonsense(line)
     reply = _reply(text)
     if reply is None:
-        raise _nonsense(line)
+        raise nonsense(line)
     return reply
 
 
@@ -184,6 +204,8 @@ def _reply(text: str) -> Reply | None:
         return Refusal(code) if found[1] == "error" else Alarm(code)
     if found := _STATUS.fullmatch(text):
         return _status(found[1], found[2], found[3])
+    if found := _OLD_STATUS.fullmatch(text):
+        return _status(found[1], None, f"|MPos:{found[2]}", is_old=True)
     if found := _SETTING.fullmatch(text):
         return Setting(int(found[1]), found[2])
     if found := _FEEDBACK.fullmatch(text):
@@ -193,7 +215,7 @@ def _reply(text: str) -> Reply | None:
     return None
 
 
-def _status(state: str, sub: str | None, rest: str) -> Status | None:
+def _status(state: str, sub: str | None, rest: str, *, is_old: bool = False) -> Status | None:
     """A status report; nothing if its state or the position is wrong."""
     try:
         activity = Activity(state)
@@ -212,6 +234,7 @@ def _status(state: str, sub: str | None, rest: str) -> Status | None:
         offset=_numbers(fields.get("WCO")),
         feed=None if feed is None else feed[0],
         pins=fields.get("Pn", ""),
+        is_old=is_old,
     )
 
 
@@ -226,7 +249,8 @@ def _numbers(text: str | None) -> tuple[float, ...] | None:
     return numbers if all(map(math.isfinite, numbers)) else None
 
 
-def _nonsense(line: bytes) -> ProtocolError:
+def nonsense(line: bytes) -> ProtocolError:
+    """The error about bytes that are no line of the protocol."""
     shown = repr(line[:40])[1:]
     return ProtocolError(
         f"the controller sent {shown}{'…' if len(line) > 40 else ''}, which is no reply of GRBL\n"

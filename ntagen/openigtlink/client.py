@@ -28,6 +28,7 @@ from ntagen.errors import DeviceError
 from ntagen.openigtlink.closing import Closing
 from ntagen.openigtlink.messages import (
     Position,
+    QuaternionTrackingData,
     Sensor,
     StartTracking,
     Status,
@@ -71,11 +72,12 @@ class Client(Closing):
         self._statuses: dict[str, Sample[Status]] = {}
         self._receipts: dict[str, deque[float]] = {}
         self._gaps = 0
-        self._repeats = 0
+        self._repeats: dict[str, int] = {}
         self._connections = 0
         self._before = Counts()
         self._counts = Counts()
         self._trouble = ""
+        self._earlier_trouble = ""
         self._ended = False
         self._refused = False
         self._closing = threading.Event()
@@ -147,7 +149,7 @@ class Client(Closing):
         with self._changed:
             rates = {name: _rate_hz(times) for name, times in self._receipts.items()}
             counts = self._before + self._counts
-            return Statistics(counts, self._connections, self._gaps, self._repeats, rates)
+            return Statistics(counts, self._connections, self._gaps, dict(self._repeats), rates)
 
     def close(self) -> None:
         """Closes the connection and ends the thread. It may be called twice."""
@@ -193,6 +195,8 @@ class Client(Closing):
         """Why there is no sample; the lock is held."""
         if self._trouble:
             return self._trouble
+        if self._earlier_trouble and not self._counts.read:
+            return self._earlier_trouble
         named = f"the {what} of '{device}'" if device else f"a {what}"
         if self._refused:
             return f"{self._place} refuses to send TDATA (its answer to STT_TDATA)"
@@ -200,6 +204,12 @@ class Client(Closing):
         if sample is not None:
             status = self._statuses.get(sample.device)
             told = f"; its last STATUS is: {status.content}" if status else ""
+            damaged = self._counts.wrong_crc
+            if damaged:
+                told += f"; {damaged} messages had a wrong checksum"
+            repeats = self._repeats.get(sample.device, 0)
+            if repeats:
+                told += f"; since then the same sample came {repeats} times: the tracker hangs"
             return (
                 f"{named} is stale: the last one from {self._place} came "
                 f"{now_s - sample.received_s:.2f} s ago, and {self._policy.stale_s:g} s is "
@@ -213,12 +223,15 @@ class Client(Closing):
                 f"{self._place} does not send {named}, and no other {what}\n"
                 "hint: does the server wait for a request? Then ask for TDATA"
             )
-        skipped = self._counts.skipped
-        but = f"; {skipped} messages could not be used" if skipped else ""
+        but = f": {self._counts}" if self._counts.skipped else ""
+        hint = "is the tracker on? Some servers wait for a request: then ask for TDATA"
+        if self._counts.wrong_crc:
+            hint = "the messages are damaged on the way, or the server computes another checksum"
+        if self._counts.zero_crc:
+            hint = "if the server leaves the checksum out, add checksum=optional"
         return (
             f"{self._place} accepts connections, but has sent nothing of use for "
-            f"{self._policy.stale_s:g} s{but}\n"
-            "hint: is the tracker on? Some servers wait for a request: then ask for TDATA"
+            f"{self._policy.stale_s:g} s{but}\nhint: {hint}"
         )
 
     # The thread.
@@ -274,7 +287,7 @@ class Client(Closing):
     def _read(self, connection: socket.socket) -> None:
         """Reads until the connection ends."""
         connection.settimeout(None)
-        decoder = Decoder()
+        decoder = Decoder(needs_checksum=self._policy.needs_checksum)
         try:
             while data := connection.recv(_PIECE_BYTES):
                 packets = decoder.feed(data)
@@ -292,7 +305,7 @@ class Client(Closing):
         except OSError as error:
             trouble = f"the connection to {self._place} is lost: {_reason(error)}"
         with self._changed:
-            self._trouble = trouble
+            self._trouble = self._earlier_trouble = trouble
             self._changed.notify_all()
         self._forget()
 
@@ -305,7 +318,7 @@ class Client(Closing):
         match packet.content:
             case Transform() | Position() as content:
                 self._keep_pose(sample(packet.device, content))
-            case TrackingData(tools):
+            case TrackingData(tools) | QuaternionTrackingData(tools):
                 for tool in tools:
                     self._keep_pose(sample(tool.name, tool))
             case Sensor() as content:
@@ -319,9 +332,10 @@ class Client(Closing):
         before = self._poses.get(sample.device)
         if before and sample.stamp_s is not None and _same(before, sample):
             # A tracker that hangs, behind a server that does not.
-            self._repeats += 1
+            self._repeats[sample.device] = self._repeats.get(sample.device, 0) + 1
             return
         _keep(self._poses, sample)
+        self._repeats.pop(sample.device, None)
         times = self._receipts.get(sample.device)
         if times is None:
             if len(self._receipts) < _NAMES:

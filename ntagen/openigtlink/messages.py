@@ -12,8 +12,9 @@ from __future__ import annotations
 import enum
 import math
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Final, Protocol, Self
+from typing import Any, ClassVar, Final, Protocol, Self
 
 Vector = tuple[float, float, float]
 """Three numbers along the axes x, y, z."""
@@ -34,6 +35,7 @@ _ASCII: Final = 3
 _UTF_8: Final = 106
 _MATRIX: Final = struct.Struct(">12f")
 _TOOL: Final = struct.Struct(">20sBx12f")
+_QUATERNION_TOOL: Final = struct.Struct(">20sBx7f")
 _START: Final = struct.Struct(">i32s")
 _STATUS: Final = struct.Struct(">Hq20s")
 _SENSOR: Final = struct.Struct(">BBQ")
@@ -135,11 +137,19 @@ class Freedom(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """One tool of TDATA: its name, what is known of it, and its matrix."""
+    """One tool of TDATA or QTDATA.
+
+    Attributes:
+        name: Its name.
+        freedom: What is known of it; a number of another type says nothing that can be used.
+        columns: Its matrix.
+        message: The type of the message that it came in.
+    """
 
     name: str
-    freedom: Freedom
+    freedom: Freedom | int
     columns: Columns
+    message: str = "TDATA"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,16 +170,45 @@ class TrackingData:
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
         """See `Content.from_bytes`."""
-        if len(data) % _TOOL.size:
-            raise MalformedError(
-                f"TDATA has {len(data)} bytes, which is no multiple of {_TOOL.size}"
+        return cls(
+            tuple(
+                Tool(until_zero(name), _freedom(kind), _columns(tuple(numbers)))
+                for name, kind, *numbers in _tools(cls.TYPE, _TOOL, data)
             )
-        tools = []
-        for name, kind, *numbers in _TOOL.iter_unpack(data):
-            if kind not in Freedom.__members__.values():
-                raise MalformedError(f"TDATA has a tool of type {kind}")
-            tools.append(Tool(until_zero(name), Freedom(kind), _columns(tuple(numbers))))
-        return cls(tuple(tools))
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class QuaternionTrackingData:
+    """QTDATA: the same with positions and quaternions instead of matrices. It is only read."""
+
+    TYPE: ClassVar[str] = "QTDATA"
+
+    tools: tuple[Tool, ...]
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        raise ValueError("QTDATA is not sent: TDATA says the same")
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        found = []
+        for name, kind, x_mm, y_mm, z_mm, *turn in _tools(cls.TYPE, _QUATERNION_TOOL, data):
+            columns = turned((turn[0], turn[1], turn[2], turn[3]), (x_mm, y_mm, z_mm))
+            found.append(Tool(until_zero(name), _freedom(kind), columns, cls.TYPE))
+        return cls(tuple(found))
+
+
+def turned(quaternion: tuple[float, float, float, float], position_mm: Vector) -> Columns:
+    """The matrix of a quaternion x, y, z, w; a length other than 1 scales it by its square."""
+    x, y, z, w = quaternion
+    return (
+        (w * w + x * x - y * y - z * z, 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)),
+        (2.0 * (x * y - z * w), w * w - x * x + y * y - z * z, 2.0 * (y * z + x * w)),
+        (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), w * w - x * x - y * y + z * z),
+        position_mm,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -362,8 +401,8 @@ class Text:
 TYPES: Final[dict[str, type[Content]]] = {
     kind.TYPE: kind
     for kind in (
-        *(Transform, Position, TrackingData, StartTracking, StopTracking, TrackingReply),
-        *(Status, Sensor, Text),
+        *(Transform, Position, TrackingData, QuaternionTrackingData),
+        *(StartTracking, StopTracking, TrackingReply, Status, Sensor, Text),
     )
 }
 """The contents that are understood, by the names of their types."""
@@ -405,6 +444,21 @@ def _flat(columns: Columns) -> tuple[float, ...]:
 def _columns(numbers: tuple[float, ...]) -> Columns:
     a, b, c, d, e, f, g, h, i, x, y, z = numbers
     return ((a, b, c), (d, e, f), (g, h, i), (x, y, z))
+
+
+def _tools(name: str, form: struct.Struct, data: bytes) -> Iterator[tuple[Any, ...]]:
+    """The fields of each tool.
+
+    Raises:
+        MalformedError: The bytes are not those of whole tools.
+    """
+    if len(data) % form.size:
+        raise MalformedError(f"{name} has {len(data)} bytes, which is no multiple of {form.size}")
+    return form.iter_unpack(data)
+
+
+def _freedom(kind: int) -> Freedom | int:
+    return Freedom(kind) if kind in Freedom.__members__.values() else kind
 
 
 def _require_size(name: str, data: bytes, size: int) -> None:

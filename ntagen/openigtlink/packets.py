@@ -35,6 +35,9 @@ LARGEST_SKIPPED_BYTES: Final = 2**32
 """The largest body of another type, such as an image; it is skipped without being stored."""
 
 _VERSIONS: Final = range(1, 4)
+_LATER: Final = 32
+"""A version that may come; two letters of a text in another language make greater numbers."""
+
 _EXTENDED: Final = struct.Struct(">HHII")
 _COUNT: Final = struct.Struct(">H")
 _ENTRY: Final = struct.Struct(">HHI")
@@ -95,12 +98,14 @@ class Counts:
     Attributes:
         read: Messages that were understood.
         wrong_crc: Messages whose checksum was wrong.
+        zero_crc: Those of them whose checksum was 0: some senders leave it out.
         malformed: Messages of a known type whose content was not of this type.
         unknown: Messages of types that are not understood.
     """
 
     read: int = 0
     wrong_crc: int = 0
+    zero_crc: int = 0
     malformed: int = 0
     unknown: int = 0
 
@@ -108,6 +113,14 @@ class Counts:
     def skipped(self) -> int:
         """All messages that were not understood."""
         return self.wrong_crc + self.malformed + self.unknown
+
+    def __str__(self) -> str:
+        """What was skipped, in words."""
+        zero = f" ({self.zero_crc} of them 0)" if self.zero_crc else ""
+        return (
+            f"{self.unknown} messages of other types, {self.wrong_crc} with a wrong checksum"
+            f"{zero}, {self.malformed} that were malformed"
+        )
 
     def __add__(self, other: Counts) -> Counts:
         names = [one.name for one in dataclasses.fields(Counts)]
@@ -130,12 +143,16 @@ class Decoder:
     It stores at most one message of at most `LARGEST_BODY_BYTES`, and takes memory only for bytes
     that have come.
 
+    Args:
+        needs_checksum: Whether a checksum of 0 counts as a wrong one; if not, as none.
+
     Attributes:
         counts: What was read and skipped until now.
         error: Why the stream cannot be read further; `None` if it can.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, needs_checksum: bool = True) -> None:
+        self._needs_checksum = needs_checksum
         self.counts = Counts()
         self.error: ProtocolError | None = None
         self._waiting = bytearray()
@@ -184,6 +201,9 @@ class Decoder:
         return True
 
     def _read_header(self) -> bool:
+        if len(self._waiting) >= _COUNT.size:
+            # A peer that speaks another language may never send as much as a header.
+            _require_version(bytes(self._waiting[: HEADER.size]))
         if len(self._waiting) < HEADER.size:
             return False
         header = _header(bytes(self._waiting[: HEADER.size]))
@@ -197,8 +217,10 @@ class Decoder:
 
     def _packet(self, header: _Header, body: bytes) -> Packet | None:
         """The message, or nothing if it must be skipped."""
-        if crc64(body) != header.crc:
+        is_told = header.crc != 0 or self._needs_checksum
+        if is_told and crc64(body) != header.crc:
             self.counts.wrong_crc += 1
+            self.counts.zero_crc += header.crc == 0
             return None
         try:
             number, metadata, data = _parts(body) if header.version > 1 else (0, {}, body)
@@ -219,11 +241,8 @@ def _header(data: bytes) -> _Header:
     """
     version, name, device, stamp, size, crc = HEADER.unpack(data)
     kind = name.rstrip(b"\0")
-    if version not in _VERSIONS or not kind or not set(kind) <= _NAME_CHARACTERS:
-        raise ProtocolError(
-            "this is not OpenIGTLink: a message begins with the bytes "
-            f"{data[:14].hex(' ')}\nhint: check the port; OpenIGTLink servers often use 18944"
-        )
+    if not kind or not set(kind) <= _NAME_CHARACTERS:
+        raise _other_language(data)
     text = kind.decode("ascii").rstrip()
     limit = LARGEST_BODY_BYTES if text in TYPES else LARGEST_SKIPPED_BYTES
     if size > limit:
@@ -232,6 +251,30 @@ def _header(data: bytes) -> _Header:
             f"more than {limit:,}\nhint: check that the server speaks OpenIGTLink"
         )
     return _Header(version, text, until_zero(device), stamp, size, crc)
+
+
+def _require_version(data: bytes) -> None:
+    """Refuses the beginning of a header that is none, or of a later version.
+
+    Raises:
+        ProtocolError: It is so.
+    """
+    (version,) = _COUNT.unpack_from(data)
+    if _VERSIONS.stop <= version < _LATER:
+        raise ProtocolError(
+            f"the server sends version {version} of the header of OpenIGTLink, and ntagen reads "
+            f"the versions {_VERSIONS.start} to {_VERSIONS.stop - 1}\n"
+            "hint: let the server use version 3 of the protocol or an earlier one"
+        )
+    if version not in _VERSIONS:
+        raise _other_language(data)
+
+
+def _other_language(data: bytes) -> ProtocolError:
+    return ProtocolError(
+        f"this is not OpenIGTLink: a message begins with the bytes {data[:14].hex(' ')}\n"
+        "hint: check the port; OpenIGTLink servers often use 18944"
+    )
 
 
 def _parts(body: bytes) -> tuple[int, dict[str, str], bytes]:

@@ -22,6 +22,7 @@ class Policy:
         longest_delay_s: The longest time between two attempts.
         interval_ms: If given, TDATA is asked for with this interval (STT_TDATA).
         frame: The frame in which TDATA is asked for; empty for the server's own.
+        needs_checksum: Whether messages with a checksum of 0 are skipped as damaged ones.
     """
 
     stale_s: float = 0.5
@@ -31,6 +32,7 @@ class Policy:
     longest_delay_s: float = 1.0
     interval_ms: int | None = None
     frame: str = ""
+    needs_checksum: bool = True
 
 
 Pose = Transform | Position | Tool
@@ -75,12 +77,13 @@ class Statistics:
         counts: The messages that were read and skipped, over all connections.
         connections: How often it was connected.
         gaps: How often a device was silent for longer than `Policy.stale_s`.
-        repeats: Samples that were those before them, with the same time stamp: not new.
+        repeats: Samples of each device that were those before them, with the same time stamp: not
+            new.
         rates_hz: The rate of the last samples of each device that says where it is.
     """
 
     counts: Counts
     connections: int
     gaps: int
-    repeats: int
+    repeats: Mapping[str, int]
     rates_hz: Mapping[str, float]

@@ -135,13 +135,11 @@ class LiveTracker:
             sample = self.client.pose(
                 source.device, after_s=after_s, any_age=not source.repeats, waits=waits
             )
-            hidden = _hidden(sample)
-            if hidden is None:
+            hidden = hidden_status(sample)
+            if not hidden:
                 return sample
             if self.client.now_s() >= end_s or not source.repeats or not waits:
-                raise DeviceError(
-                    f"the tracker does not see '{sample.device}': its status is {hidden}"
-                )
+                raise not_seen(sample.device, hidden)
             after_s = sample.received_s
 
     def _require_in_time(self, sample: Sample[Pose]) -> None:
@@ -193,13 +191,21 @@ def require_frame(source: Source, transform: Transform) -> None:
         )
 
 
-def _hidden(sample: Sample[Pose]) -> str | None:
-    """The status of a tool that the tracker does not see, as PLUS tells it; else `None`."""
+def hidden_status(sample: Sample[Pose]) -> str:
+    """The status of a tool that the tracker does not see, as PLUS tells it; empty if it sees it."""
     status = sample.metadata.get("TransformStatus", "OK")
+    if status.upper() != "OK":
+        return status or "not told"
     is_valid = sample.metadata.get("TransformValid", "True").lower() not in ("false", "0")
-    if is_valid and status == "OK":
-        return None
-    return status if status != "OK" else "not valid"
+    return "" if is_valid else "not valid"
+
+
+def not_seen(device: str, status: str) -> DeviceError:
+    """The error about a tool that the tracker does not see."""
+    return DeviceError(
+        f"the tracker does not see '{device}': its status is {status}\n"
+        "hint: is the tool in view, and is it plugged in?"
+    )
 
 
 def _newtons(sample: Sample[Readings], source: Source) -> float:

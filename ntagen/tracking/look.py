@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Final
 
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.client import Client
 from ntagen.openigtlink.messages import Freedom, Position, Sensor, Tool
 from ntagen.openigtlink.packets import Counts
-from ntagen.openigtlink.samples import Pose, Sample
+from ntagen.openigtlink.samples import Pose, Sample, Statistics
 from ntagen.scene import Vector
-from ntagen.tracking.live import Source
+from ntagen.tracking.live import Source, hidden_status, not_seen
 from ntagen.tracking.mount import tip_of
 
-_FREEDOM = {
-    Freedom.TRACKER: "TDATA, the tracker itself",
-    Freedom.POSE: "TDATA, a whole pose",
-    Freedom.POSITION: "TDATA, a position only",
-    Freedom.HEADING: "TDATA, without the roll",
+_FREEDOM: Final[dict[int, str]] = {
+    Freedom.TRACKER: "the tracker itself",
+    Freedom.POSE: "a whole pose",
+    Freedom.POSITION: "a position only",
+    Freedom.HEADING: "without the roll",
 }
 
 
@@ -29,7 +31,9 @@ class Found:
         name: Its name.
         kind: What it sends, in words.
         rate_hz: How often; 0 if it sent only once.
-        position_mm: Where it was at last, in the tracker's frame.
+        repeats: How often its last sample came again, with the same time stamp.
+        position_mm: Where it was at last, in the tracker's frame; None if the tracker did not see
+            it, or sent no numbers.
         has_stamp: Whether its messages have a time stamp.
         problem: Why its last message could not steer a needle; empty if it could.
     """
@@ -37,7 +41,8 @@ class Found:
     name: str
     kind: str
     rate_hz: float
-    position_mm: Vector
+    repeats: int
+    position_mm: Vector | None
     has_stamp: bool
     problem: str
 
@@ -76,10 +81,7 @@ def look(source: Source, seconds: float) -> Look:
         if source.device is not None or not held.poses:
             client.pose(source.device, any_age=True, waits=False)
         statistics = client.statistics()
-    devices = tuple(
-        _found(held.poses[name], source, statistics.rates_hz.get(name, 0.0))
-        for name in sorted(held.poses)
-    )
+    devices = tuple(_found(held.poses[name], source, statistics) for name in sorted(held.poses))
     return Look(
         devices=devices,
         sensors=tuple((name, _words(held.sensors[name].content)) for name in sorted(held.sensors)),
@@ -88,22 +90,56 @@ def look(source: Source, seconds: float) -> Look:
     )
 
 
-def _found(sample: Sample[Pose], source: Source, rate_hz: float) -> Found:
+def _found(sample: Sample[Pose], source: Source, statistics: Statistics) -> Found:
+    rate_hz = statistics.rates_hz.get(sample.device, 0.0)
+    repeats = statistics.repeats.get(sample.device, 0)
     problem = ""
     if source.device in (None, sample.device):
         try:
-            tip_of(sample.content, source.mount, sample.device)
+            _require_use(sample, source, repeats if rate_hz == 0.0 else 0)
         except DeviceError as error:
             problem = str(error)
     match sample.content:
         case Position(position_mm, quaternion):
             kind = "POSITION, a position only" if quaternion is None else "POSITION"
-        case Tool():
-            kind, position_mm = _FREEDOM[sample.content.freedom], sample.content.columns[3]
+        case Tool(freedom=freedom, message=message):
+            kind = f"{message}, {_FREEDOM.get(freedom, f'a tool of the unknown type {freedom}')}"
+            position_mm = sample.content.columns[3]
         case _:
             kind, position_mm = "TRANSFORM", sample.content.columns[3]
-    has_stamp = sample.stamp_s is not None
-    return Found(sample.device, kind, rate_hz, position_mm, has_stamp, problem)
+    is_known = not hidden_status(sample) and all(map(math.isfinite, position_mm))
+    return Found(
+        name=sample.device,
+        kind=kind,
+        rate_hz=rate_hz,
+        repeats=repeats,
+        position_mm=position_mm if is_known else None,
+        has_stamp=sample.stamp_s is not None,
+        problem=problem,
+    )
+
+
+def _require_use(sample: Sample[Pose], source: Source, repeats: int) -> None:
+    """Refuses what could not steer a needle.
+
+    Args:
+        sample: The last sample of a device.
+        source: How the needle lies in its frame, and what the server sends.
+        repeats: How often it came again, if it is the only one.
+
+    Raises:
+        DeviceError: The tracker does not see the tool, its pose is impossible, or it never changes.
+    """
+    status = hidden_status(sample)
+    if status:
+        raise not_seen(sample.device, status)
+    tip_of(sample.content, source.mount, sample.device)
+    if repeats and source.repeats:
+        raise DeviceError(
+            f"the samples of '{sample.device}' never change: the same one, with the same time "
+            f"stamp, came {repeats + 1} times\n"
+            "hint: does the tracker measure, or does its server repeat an old sample?"
+        )
 
 
 def _words(sensor: Sensor) -> str:

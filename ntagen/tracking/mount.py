@@ -14,7 +14,7 @@ from typing import Final
 
 from ntagen.errors import DeviceError
 from ntagen.needle.vectors import add, combine, cross, dot, norm, scale, unit
-from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, Transform
+from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, Transform, turned
 from ntagen.openigtlink.samples import Pose
 from ntagen.scene import Vector
 
@@ -87,6 +87,12 @@ def _known(pose: Pose, device: str) -> tuple[Freedom, Columns]:
                 _require_finite(quaternion, device)
                 freedom, columns = Freedom.POSE, _from_quaternion(quaternion, position_mm, device)
         case Tool():
+            if not isinstance(pose.freedom, Freedom):
+                raise DeviceError(
+                    f"the tracker sends '{device}' as a tool of the type {pose.freedom}, which "
+                    f"{pose.message} does not have\n"
+                    "hint: let the server send a position or a pose of it, or name another device"
+                )
             freedom, columns = pose.freedom, pose.columns
         case Transform():
             freedom, columns = Freedom.POSE, pose.columns
@@ -104,18 +110,12 @@ def _from_quaternion(
     quaternion: tuple[float, float, float, float], position_mm: Vector, device: str
 ) -> Columns:
     """The matrix of a unit quaternion x, y, z, w."""
-    x, y, z, w = quaternion
-    length = math.hypot(x, y, z, w)
+    length = math.hypot(*quaternion)
     if abs(length - 1.0) > _TOLERANCE:
         raise DeviceError(
             f"the orientation of '{device}' is a quaternion of length {length:.4g}, not 1"
         )
-    return (
-        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)),
-        (2.0 * (x * y - z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + x * w)),
-        (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y)),
-        position_mm,
-    )
+    return turned(quaternion, position_mm)
 
 
 def _require_finite(numbers: Sequence[float], device: str) -> None:

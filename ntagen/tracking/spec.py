@@ -41,6 +41,7 @@ OPTIONS: Final = {
     "latency": "how long a sample is under way, for example 40ms",
     "tdata": "ask for TDATA with this interval, for example 50ms",
     "frame": "the frame in which TDATA is asked for",
+    "checksum": "always, or optional if the server leaves it out, so that it is 0",
     "sends": "always, or changes if the server is silent while the tool rests, as Slicer is",
 }
 """The options of ``openigtlink:``, with what they mean."""
@@ -199,6 +200,10 @@ def _changed(source: Source, name: str, value: str) -> Source | None:
         case "sends":
             repeats = value == "always"
             return replace(source, repeats=repeats) if repeats or value == "changes" else None
+        case "checksum":
+            needed = value == "always"
+            policy = replace(source.policy, needs_checksum=needed)
+            return replace(source, policy=policy) if needed or value == "optional" else None
         case "frame":
             return replace(source, policy=replace(source.policy, frame=value))
         case _:

@@ -163,6 +163,12 @@ def check_nothing_moves(port: Port, says: str) -> None:
             lambda sent: b"<Idle|MPos:0,0,0>\n" if b"?" in sent else b"[VER:0.9j.2016:]\nok\n",
             "the firmware is GRBL 0.9j",
         ),
+        (
+            lambda sent: b"<Idle,MPos:0.000,0.000,0.000,WPos:0.000,0.000,0.000>\r\n",
+            "the firmware is GRBL 0.9 or older",
+        ),
+        (lambda _: b"\xf8\x80\x00\xfe", "check the baud rate"),
+        (lambda _: b"<Critical|MPos:0.000,0.000>\r\n", "the state Critical"),
     ],
 )
 def test_what_is_no_grbl_is_refused(answer: Callable[[bytes], bytes], says: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -361,3 +362,55 @@ def test_a_refused_line_leaves_the_link_whole() -> None:
         actuator.push(1.0)
     actuator.pull(1.0)
     assert bench.plant.sums["X"] == pytest.approx(-1.0)
+
+
+class Cutting(SimulatedPort):
+    """A port at which a report in motion loses its first positions on the wire, once or always."""
+
+    def __init__(self, emulator: Emulator, *, once: bool) -> None:
+        super().__init__(emulator)
+        self._once = once
+        self.is_cut = False
+
+    def read(self, timeout_s: float) -> bytes:
+        data = super().read(timeout_s)
+        if b"<Jog|" not in data or (self._once and self.is_cut):
+            return data
+        self.is_cut = True
+        return re.sub(rb"MPos:[-\d.]+,[-\d.]+,", b"MPos:", data)
+
+
+@BOTH
+@pytest.mark.parametrize("once", [True, False])
+def test_a_report_that_lost_positions_is_noise_and_stops_the_needle(
+    dialect: Dialect, once: bool
+) -> None:
+    bench = Bench(dialect)
+    port = Cutting(bench.emulator, once=once)
+    actuator = GrblActuator(port, bench.axes)
+    with pytest.raises(DeviceError, match="no reply of GRBL"):
+        actuator.push(5.0)
+    assert port.is_cut
+    stopped_mm = bench.plant.sums.get("X", 0.0)
+    bench.emulator.advance(bench.emulator.now_s + 10.0)
+    assert bench.plant.sums.get("X", 0.0) == stopped_mm < 4.0
+    with pytest.raises(DeviceError):
+        actuator.push(1.0)
+
+
+def test_a_message_with_other_letters_is_no_noise() -> None:
+    bench = Bench(GRBLHAL)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.emulator.send("[MSG:Büro]\r\n".encode()))
+    actuator.push(2.0)
+    assert bench.plant.sums["X"] == pytest.approx(2.0, abs=0.005)
+
+
+def test_lines_may_end_by_a_carriage_return_alone() -> None:
+    class Returning(SimulatedPort):
+        def read(self, timeout_s: float) -> bytes:
+            return super().read(timeout_s).replace(b"\n", b"")
+
+    bench = Bench(GRBL_11H)
+    GrblActuator(Returning(bench.emulator), bench.axes).push(2.0)
+    assert bench.plant.sums["X"] == pytest.approx(2.0, abs=0.005)

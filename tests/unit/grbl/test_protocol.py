@@ -38,6 +38,12 @@ DATA = Path(__file__).parents[2] / "data" / "grbl"
         ("$0=10 (step pulse, usec)", Setting(0, "10")),
         ("[MSG:Caution: Unlocked]", Feedback("MSG", "Caution: Unlocked")),
         ("[NVS STORAGE:*EEPROM]", Feedback("NVS STORAGE", "*EEPROM")),
+        ("[MSG:INFO: Connected to Büro\t😀]", Feedback("MSG", "INFO: Connected to Büro\t😀")),
+        (
+            "<Idle,MPos:1.000,0.000,2.000,WPos:0.000,0.000,0.000>",
+            Status(Activity.IDLE, machine=(1.0, 0.0, 2.0), is_old=True),
+        ),
+        ("<Critical|MPos:0.000,0.000>", Status(Activity.CRITICAL, machine=(0.0, 0.0))),
         ("", None),
         (
             "<Hold:1|MPos:5.000,-0.250,0.000|Bf:15,128|FS:208,0|Pn:XZ|New:1,2|Ov:100,100,100>",
@@ -50,7 +56,7 @@ DATA = Path(__file__).parents[2] / "data" / "grbl"
     ],
 )
 def test_each_kind_of_line_is_read(line: str, expected: Reply | None) -> None:
-    assert parse(line.encode("ascii")) == expected
+    assert parse(line.encode()) == expected
 
 
 @pytest.mark.parametrize(
@@ -66,12 +72,17 @@ def test_each_kind_of_line_is_read(line: str, expected: Reply | None) -> None:
             "<Idle|MPos:1,,2>",
         ),
         *("<Idle|MPos:nan,0.000>", "<Idle|MPos:1e9,0.000>", "<Idle|MPos:0.000", "$=1", "G1 X1"),
-        *("\x00\x7fok", "\u00e9", "x" * 600),
+        *("\x00\x7fok", "\u00e9", "x" * 600, "[VER:\u00e9]", "<Idle,MPos:,WPos:>"),
     ],
 )
 def test_other_lines_are_refused(line: str) -> None:
     with pytest.raises(ProtocolError, match="no reply of GRBL"):
         parse(line.encode())
+
+
+def test_a_message_in_another_encoding_is_noise() -> None:
+    with pytest.raises(ProtocolError, match="no reply of GRBL"):
+        parse("[MSG:Büro]".encode("latin-1"))
 
 
 def test_all_recorded_lines_are_read() -> None:

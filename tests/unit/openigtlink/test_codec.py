@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from ntagen.openigtlink.crc import POLYNOMIAL, crc64
 from ntagen.openigtlink.messages import (
@@ -15,6 +18,7 @@ from ntagen.openigtlink.messages import (
     Content,
     Freedom,
     Position,
+    QuaternionTrackingData,
     Sensor,
     StartTracking,
     Status,
@@ -35,6 +39,8 @@ from ntagen.openigtlink.packets import (
 )
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+
+KINDS = [b"TRANSFORM", b"POSITION", b"TDATA", b"QTDATA", b"STATUS", b"SENSOR", b"STRING"]
 
 singles = st.floats(width=32, allow_nan=False)
 vectors = st.tuples(singles, singles, singles)
@@ -189,7 +195,67 @@ def test_a_message_with_a_wrong_checksum_is_skipped_whole(
     stream[place] ^= 1 << data.draw(st.integers(0, 7))
     found, counts = read(bytes(stream) + good.to_bytes())
     assert found == [good]
-    assert counts == Counts(read=1, wrong_crc=1)
+    assert (counts.read, counts.wrong_crc, counts.skipped) == (1, 1, 1)
+
+
+def test_a_checksum_of_zero_is_counted_and_may_stand_for_none() -> None:
+    body = Transform(IDENTITY).to_bytes()
+    without = HEADER.pack(1, b"TRANSFORM", b"D", 0, len(body), 0) + body
+    wrong = HEADER.pack(1, b"TRANSFORM", b"D", 0, len(body), 1) + body
+    assert read(without + wrong)[1] == Counts(wrong_crc=2, zero_crc=1)
+    assert "2 with a wrong checksum (1 of them 0)" in str(Counts(wrong_crc=2, zero_crc=1))
+    decoder = Decoder(needs_checksum=False)
+    assert [one.content for one in decoder.feed(without + wrong)] == [Transform(IDENTITY)]
+    assert decoder.counts == Counts(read=1, wrong_crc=1)
+
+
+def test_a_tool_of_an_unknown_type_does_not_drop_the_others() -> None:
+    tools = [
+        struct.pack(">20sBx12f", name, kind, *range(12)) for name, kind in ((b"A", 0), (b"B", 2))
+    ]
+    (packet,), _ = read(with_crc(b"TDATA", b"".join(tools)))
+    assert isinstance(packet.content, TrackingData)
+    assert [(one.name, one.freedom) for one in packet.content.tools] == [
+        ("A", 0),
+        ("B", Freedom.POSE),
+    ]
+    assert isinstance(packet.content.tools[1].freedom, Freedom)
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0, width=32)] * 4).filter(lambda q: math.hypot(*q) > 0.1))
+def test_quaternions_of_tools_turn_as_those_of_another_library(
+    quaternion: tuple[float, float, float, float],
+) -> None:
+    length = math.hypot(*quaternion)
+    numbers = [number / length for number in quaternion]
+    body = struct.pack(">20sBx7f", b"Tip", 2, 1.0, 2.0, 3.0, *numbers)
+    (packet,), _ = read(with_crc(b"QTDATA", body))
+    assert isinstance(packet.content, QuaternionTrackingData)
+    (tool,) = packet.content.tools
+    matrix = Rotation.from_quat(numbers).as_matrix()
+    assert tool.columns[3] == (1.0, 2.0, 3.0)
+    assert (tool.name, tool.freedom, tool.message) == ("Tip", Freedom.POSE, "QTDATA")
+    assert np.allclose(np.array(tool.columns[:3]).T, matrix, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("data", "says"),
+    [
+        (b"SSH-2.0-OpenSSH_9.6\r\n", "this is not OpenIGTLink"),
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "this is not OpenIGTLink"),
+        (b"{", ""),
+        (b"\x01\x00TRANSFORM", "this is not OpenIGTLink"),
+        (b"\x00\x04TRANSFORM", "version 4 of the header"),
+    ],
+)
+def test_another_language_is_told_from_its_first_bytes(data: bytes, says: str) -> None:
+    decoder = Decoder()
+    if not says:
+        assert decoder.feed(data) == []
+        return
+    with pytest.raises(ProtocolError, match=says) as caught:
+        decoder.feed(data)
+    assert "hint:" in str(caught.value)
 
 
 @given(st.binary(max_size=400), st.integers(0, 3))
@@ -202,7 +268,7 @@ def test_messages_of_unknown_types_are_skipped(body: bytes, cut: int) -> None:
     assert counts == Counts(read=1, unknown=1)
 
 
-@given(st.sampled_from([b"TRANSFORM", b"POSITION", b"TDATA", b"STATUS", b"SENSOR", b"STRING"]))
+@given(st.sampled_from(KINDS))
 def test_a_content_of_a_wrong_size_is_skipped(kind: bytes) -> None:
     good = Packet("D", Text("after"))
     found, counts = read(with_crc(kind, b"\xff") + good.to_bytes())
@@ -257,7 +323,7 @@ def test_changed_messages_never_crash(packet: Packet, data: st.DataObject) -> No
 
 
 @given(
-    st.sampled_from([b"TRANSFORM", b"POSITION", b"TDATA", b"STATUS", b"SENSOR", b"STRING"]),
+    st.sampled_from(KINDS),
     st.sampled_from([1, 2]),
     st.binary(max_size=200),
 )

@@ -101,7 +101,7 @@ def test_any_words_give_a_tracker_or_a_message(text: str) -> None:
 def test_each_option_is_known() -> None:
     examples = {"axis": "+x", "bevel": "+x", "tip": "1/2/3", "force": "F", "force-index": "2"}
     examples |= {"force-unit": "N", "stale": "1s", "latency": "1ms", "tdata": "20ms"}
-    examples |= {"frame": "F", "sends": "changes"}
+    examples |= {"frame": "F", "checksum": "optional", "sends": "changes"}
     assert list(examples) == list(OPTIONS)
     for name, value in examples.items():
         found = parse_tracker(f"openigtlink:h:1,{name}={value}")
