@@ -9,7 +9,8 @@ from ntagen.nsl.tokens import SOLIDS, Token
 from ntagen.parameters import BY_WORDS
 
 STRAY_HINTS: Final = {
-    ";": "statements need no separator",
+    ";": "statements need no separator; between the components of a vector write commas",
+    ":": "leave it out: a value stands right behind its word, for example `radius 30 mm`",
     "#": "comments begin with `//`",
     ".": "write a digit on both sides of a decimal point",
     "°": "write `deg`",

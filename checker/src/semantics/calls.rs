@@ -43,11 +43,23 @@ impl Checker<'_> {
             }
             Some(entity) => {
                 self.check_all(arguments);
+                let is_array = matches!(
+                    &entity,
+                    Entity::Variable {
+                        ty: Type::Array(_),
+                        ..
+                    }
+                );
+                let help = if is_array {
+                    format!("write the index of an array in brackets: {name}[0]")
+                } else {
+                    String::from("only functions can be called")
+                };
                 self.error(
                     codes::CALL_OF_NO_FUNCTION,
                     callee.span,
                     format!("'{name}' is {}, not a function", entity.kind()),
-                    "only functions can be called",
+                    &help,
                 );
                 Expr::error(span)
             }

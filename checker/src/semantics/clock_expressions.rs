@@ -67,7 +67,8 @@ impl Checker<'_> {
         self.unknown(diagnostic, expr, Type::Double)
     }
 
-    fn too_many_clocks(&mut self, span: Span) {
+    /// Reports a comparison of what clocks are not compared as.
+    pub(super) fn too_many_clocks(&mut self, span: Span) {
         self.error(
             codes::CLOCKS_BEYOND_DIFFERENCE,
             span,

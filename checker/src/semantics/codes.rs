@@ -200,6 +200,8 @@ codes! {
     CHART_IGNORED = "W0216" "chart-ignored";
     /// A model that only statistical queries can be asked of.
     STATISTICAL_ONLY = "W0217" "statistical-only";
+    /// `a <= b <= c`, which compares a truth value.
+    COMPARISON_CHAINED = "W0218" "comparison-chained";
     /// A function that UPPAAL calls after all that a query sees.
     HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

@@ -104,11 +104,12 @@ impl Checker<'_> {
             Some(Entity::Variable { place, ty }) => self.variable(place, ty, span),
             Some(Entity::Broken) => Expr::error(span),
             Some(entity) => {
+                let help = self.instead_of_value(name, &entity);
                 self.error(
                     codes::NAME_WITHOUT_VALUE,
                     span,
                     format!("'{name}' is {}, not a value", entity.kind()),
-                    "use a variable, a constant or a call",
+                    &help,
                 );
                 Expr::error(span)
             }
@@ -126,30 +127,6 @@ impl Checker<'_> {
         }
         let expr = self.folded(Expr::new(Kind::Variable(place), ty, span));
         self.unless_left_out(expr)
-    }
-
-    /// Reports an unknown name, with the nearest known one.
-    pub(super) fn unknown_name(&mut self, name: &str, span: Span) {
-        if name == "cost" {
-            // Priced models use the name without a declaration.
-            self.error(
-                codes::CONSTRUCT_UNSUPPORTED,
-                span,
-                "not supported: the variable `cost` of priced models (CORA)",
-                "declare an integer or a clock of this name, or remove what uses it",
-            );
-            return;
-        }
-        let help = match self.similar_name(name) {
-            Some(similar) => format!("did you mean '{similar}'?"),
-            None => String::from("declare it first"),
-        };
-        self.error(
-            codes::NAME_UNKNOWN,
-            span,
-            format!("'{name}' is not declared"),
-            &help,
-        );
     }
 
     fn field(&mut self, record: &ast::Expr, name: &Name, span: Span) -> Expr {
@@ -310,8 +287,23 @@ impl Checker<'_> {
                 }
             }
         }
+        let is_chain = is_chain(operator, left, span);
         let left = self.expression(left);
         let right = self.expression(right);
+        if is_chain && !left.is_error() && !right.is_error() && right.ty != Type::Bool {
+            let is_timed = matches!(left.ty, Type::Constraint(_)) || is_clock_term(&right);
+            if is_timed {
+                self.error(
+                    codes::OPERANDS_MISMATCHED,
+                    span,
+                    "a comparison is no number that can be compared again",
+                    CHAIN_HINT,
+                );
+                return Expr::error(span);
+            }
+            let message = "the result of a comparison, 0 or 1, is compared with a number";
+            self.report(Diagnostic::new(codes::COMPARISON_CHAINED, span, message).help(CHAIN_HINT));
+        }
         self.binary(operator, left, right, span)
     }
 
@@ -366,8 +358,9 @@ impl Checker<'_> {
     }
 
     /// Checks that an expression changes nothing.
-    pub(super) fn expect_pure(&mut self, expr: &Expr, what: &str) {
-        if expr.has_effect() {
+    pub(super) fn expect_pure(&mut self, expr: &Expr, what: &str) -> bool {
+        let is_pure = !expr.has_effect();
+        if !is_pure {
             // What a user means by `x = 1` where a condition is wanted.
             let assigns =
                 expr.any(&|e| matches!(e.kind, Kind::Assign(..) | Kind::AssignClock { .. }));
@@ -379,7 +372,28 @@ impl Checker<'_> {
             let message = format!("{what} must not change anything");
             self.report(Diagnostic::new(codes::SIDE_EFFECT, expr.span, message).help(help));
         }
+        is_pure
     }
+}
+
+/// What a user means by a chain of comparisons.
+const CHAIN_HINT: &str = "write `a <= b && b <= c` for a <= b <= c";
+
+/// Whether an operator of comparison follows another one without parentheses, as in `a <= b <= c`
+/// or `a == b == c`. An operand in parentheses begins behind them.
+fn is_chain(operator: BinaryOp, left: &ast::Expr, span: Span) -> bool {
+    let is_order = |operator: BinaryOp| {
+        matches!(
+            operator,
+            BinaryOp::Less | BinaryOp::LessEqual | BinaryOp::Greater | BinaryOp::GreaterEqual
+        )
+    };
+    let ExprKind::Binary(inner, ..) = left.kind else {
+        return false;
+    };
+    let is_same_kind = is_order(operator) && is_order(inner)
+        || operator == BinaryOp::Equal && inner == BinaryOp::Equal;
+    is_same_kind && left.span.start == span.start
 }
 
 /// The value of a real clock where one is given; anything else as it is.

@@ -29,8 +29,7 @@ impl Checker<'_> {
     pub(super) fn guard(&mut self, guard: &ast::Expr, locals: &[LocalId], place: &str) -> Guard {
         let before = self.unknowns.len();
         let guard = self.expression(guard);
-        self.expect_pure(&guard, "a guard");
-        if !self.expect_condition(&guard) {
+        if !self.expect_pure(&guard, "a guard") || !self.expect_condition(&guard) {
             self.unknowns.truncate(before);
             return Guard::default();
         }

@@ -7,6 +7,7 @@
 use super::checker::Checker;
 use super::codes;
 use super::groups::{Group, Member};
+use super::hints::first_member;
 use super::operators::compare_integers;
 use super::scope::Entity;
 use super::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
@@ -56,11 +57,16 @@ impl Checker<'_> {
                 return self.call_function(function, &signature, arguments, span);
             }
         }
+        let help = if matches!(callee.kind, ExprKind::Deadlock) {
+            "write `deadlock` without parentheses"
+        } else {
+            "only functions can be called"
+        };
         self.error(
             codes::CALL_OF_NO_FUNCTION,
             callee.span,
             "this is no function",
-            "only functions can be called",
+            help,
         );
         Expr::error(span)
     }
@@ -88,7 +94,12 @@ impl Checker<'_> {
                     codes::PROCESS_NOT_IN_SYSTEM,
                     record.span,
                     format!("'{callee}' is not in the system line"),
-                    "only processes of the system have a state",
+                    &match self.process_of_template(callee) {
+                        Some(process) => {
+                            format!("{callee} is the template of the process: write `{process}`")
+                        }
+                        None => String::from("only processes of the system have a state"),
+                    },
                 );
                 return Some(Err(()));
             }
@@ -99,6 +110,7 @@ impl Checker<'_> {
             .map(|argument| self.expression(argument))
             .collect();
         if arguments.len() != group.parameters.len() {
+            let member = first_member(callee, &group);
             self.error(
                 codes::ARGUMENT_COUNT,
                 record.span,
@@ -107,7 +119,11 @@ impl Checker<'_> {
                     group.parameters.len(),
                     arguments.len()
                 ),
-                "name one process of the set: P(0)",
+                &if group.parameters.is_empty() {
+                    format!("it is one process, not a set: write `{member}`")
+                } else {
+                    format!("name one process of the set: {member}")
+                },
             );
             return Some(Err(()));
         }
@@ -197,11 +213,7 @@ impl Checker<'_> {
             Some(Entity::Constant { .. }) => self.unroll_members(span),
             Some(Entity::Broken) => Expr::error(span),
             Some(_) | None => {
-                let scope = &self.world.processes.scopes[first as usize];
-                let help = match scope.similar(&name.text) {
-                    Some((_, similar)) => format!("did you mean '{similar}'?"),
-                    None => String::from("name a location or a variable of the process"),
-                };
+                let help = self.instead_of_member(first, &name.text);
                 self.error(
                     codes::MEMBER_UNKNOWN,
                     name.span,

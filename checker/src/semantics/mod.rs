@@ -31,6 +31,7 @@ mod typed;
 mod scope;
 
 mod groups;
+mod hints;
 
 mod pools;
 

@@ -64,10 +64,17 @@ impl Checker<'_> {
 
     /// Reports that an operator does not apply to its operands.
     pub(super) fn operands_refused(&mut self, left: &Expr, right: &Expr, span: Span) -> Expr {
-        let help = if left.ty.is_clock() || right.ty.is_clock() {
+        let operands = [&left.ty, &right.ty];
+        let help = if operands.iter().any(|ty| ty.is_clock()) {
             "clocks can only be compared, subtracted from each other, and set"
-        } else {
+        } else if operands.iter().any(|ty| matches!(ty, Type::Constraint(_))) {
+            "join conditions on clocks by `&&`"
+        } else if operands.iter().any(|ty| matches!(ty, Type::Array(_))) {
+            "name a part of the array by an index: a[0]"
+        } else if operands.contains(&&Type::Double) {
             "convert with fint(…), or use other operands"
+        } else {
+            "use numbers"
         };
         self.error(
             codes::OPERANDS_MISMATCHED,
@@ -117,7 +124,15 @@ impl Checker<'_> {
                 codes::CONDITION_EXPECTED,
                 expr.span,
                 format!("a condition is needed, but this is {}", expr.ty.described()),
-                "compare it with something",
+                match expr.ty {
+                    Type::Channel { .. } => {
+                        "a channel has no value: set a variable where it synchronises"
+                    }
+                    Type::String => {
+                        "write names of locations and variables without quotation marks"
+                    }
+                    _ => "compare it with something",
+                },
             );
         }
         expr.ty.is_condition()

@@ -6,6 +6,7 @@
 use super::checker::Checker;
 use super::codes;
 use super::labels::collapse;
+use super::operators::is_clock_term;
 use super::typed::{ClockRelation, Expr, Kind, LOCATION_WORDS, Place, Root};
 use super::types::{Memory, Type};
 use crate::diagnostics::Span;
@@ -340,8 +341,14 @@ impl Checker<'_> {
                 _ => e.ty == Type::Double,
             });
         if is_refused {
-            // That says it all.
+            // What is reported here says it all.
             self.unknowns.clear();
+            let computes_with_clocks =
+                expr.any(&|e| matches!(&e.kind, Kind::Unknown(from) if is_clock_term(from)));
+            if computes_with_clocks {
+                self.too_many_clocks(expr.span);
+                return true;
+            }
             self.error(
                 codes::DOUBLE_IN_QUERY,
                 expr.span,

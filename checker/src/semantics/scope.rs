@@ -86,18 +86,38 @@ impl Scope {
         self.names.insert(name.to_owned(), (entity, span));
     }
 
-    /// The declared name that is most like the given one, for a hint.
+    /// The declared name that is most like the given one, for a hint. Of two letters or fewer,
+    /// only the case may differ.
     pub(super) fn similar(&self, name: &str) -> Option<(usize, &str)> {
-        let limit = name.len().div_ceil(3);
+        let limit = match name.len() {
+            0..=2 => 0,
+            length => length.div_ceil(3),
+        };
         self.names
             .keys()
+            .filter(|known| *known != name)
             .map(|known| (distance(known, name), known.as_str()))
             .filter(|&(distance, _)| distance <= limit)
             .min()
     }
+
+    /// The names of locations, in their order.
+    pub(super) fn locations(&self) -> Vec<&str> {
+        let mut found: Vec<(u32, &str)> = self
+            .names
+            .iter()
+            .filter_map(|(name, (entity, _))| match entity {
+                Entity::Location(place) => Some((*place, name.as_str())),
+                _ => None,
+            })
+            .collect();
+        found.sort_unstable();
+        found.into_iter().map(|(_, name)| name).collect()
+    }
 }
 
-/// The edit distance of two names.
+/// The edit distance of two names; letters that differ in their case, and characters that look
+/// alike, count as the same.
 fn distance(left: &str, right: &str) -> usize {
     let right: Vec<char> = right.chars().collect();
     let mut row: Vec<usize> = (0..=right.len()).collect();
@@ -105,10 +125,19 @@ fn distance(left: &str, right: &str) -> usize {
         let mut diagonal = row[0];
         row[0] = i + 1;
         for (j, &b) in right.iter().enumerate() {
-            let replaced = diagonal + usize::from(!a.eq_ignore_ascii_case(&b));
+            let replaced = diagonal + usize::from(looks_like(a) != looks_like(b));
             diagonal = row[j + 1];
             row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
         }
     }
     row[right.len()]
+}
+
+/// One of the characters that look like this one.
+pub(super) fn looks_like(character: char) -> char {
+    match character.to_ascii_lowercase() {
+        '1' | 'i' => 'l',
+        '0' => 'o',
+        other => other,
+    }
 }

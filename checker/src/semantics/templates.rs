@@ -8,6 +8,7 @@ use super::codes;
 use super::dynamic::exits;
 use super::labels::Select;
 use super::legs::{SYNCHRONISES, leads_on};
+use super::operators::is_clock_term;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
 use super::types::{Class, Size, Type};
@@ -186,7 +187,7 @@ impl Checker<'_> {
             return;
         }
         self.expect_pure(expr, what);
-        if !(expr.ty.is_number() || expr.ty.is_clock()) {
+        if !(expr.ty.is_number() || is_clock_term(expr)) {
             self.error(
                 codes::NUMBER_EXPECTED,
                 expr.span,
@@ -204,8 +205,7 @@ impl Checker<'_> {
         self.locals.clear();
         let before = self.unknowns.len();
         let invariant = self.expression(expr);
-        self.expect_pure(&invariant, "an invariant");
-        if !self.expect_condition(&invariant) {
+        if !self.expect_pure(&invariant, "an invariant") || !self.expect_condition(&invariant) {
             self.unknowns.truncate(before);
             return (Guard::default(), Rates::default());
         }
@@ -244,9 +244,8 @@ impl Checker<'_> {
                 crate::diagnostics::Diagnostic::new(
                     codes::INVARIANT_STRICT,
                     span,
-                    "this invariant has a strict upper bound",
+                    "this invariant has a strict upper bound, so game queries will be refused",
                 )
-                .note("game queries are refused on models with strict invariants")
                 .help("use <= instead of <"),
             );
         }

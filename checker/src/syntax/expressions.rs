@@ -98,6 +98,16 @@ impl Parser<'_> {
                     self.node(start, kind, height)
                 }
                 Infix::Ternary => self.ternary(start, left),
+                Infix::Assign(None) if self.dialect == Dialect::Query => {
+                    let message = format!("expected `==` to compare, found {}", self.found());
+                    let diagnostic = Diagnostic::new(codes::UNEXPECTED_TOKEN, self.here(), message)
+                        .help("write `==`: a query compares, it changes nothing");
+                    self.report(diagnostic);
+                    self.bump();
+                    let right = self.expression_at(level_of(BinaryOp::Equal) + 1);
+                    let kind = ExprKind::Binary(BinaryOp::Equal, Box::new(left), Box::new(right));
+                    self.node(start, kind, height)
+                }
                 Infix::Assign(operator) => {
                     self.bump();
                     let value = self.expression_at(level::ASSIGNMENT);

@@ -13,6 +13,7 @@
 use crate::cancellation;
 
 use super::codes;
+use super::foreign::ascii_for;
 use super::tables::Finder;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
@@ -302,10 +303,16 @@ impl Lexer<'_> {
         self.push(TokenKind::Unknown, start);
         let message = format!("unknown symbol `{}`", shown.escape_debug());
         let diagnostic = Diagnostic::new(codes::UNKNOWN_SYMBOL, span, message);
-        self.report(if shown.is_ascii() {
-            diagnostic
-        } else {
-            diagnostic.help("only comments and strings may hold characters outside ASCII")
+        self.report(match shown.chars().find(|symbol| !symbol.is_ascii()) {
+            None => diagnostic,
+            Some(symbol) => diagnostic.help(match ascii_for(symbol) {
+                Some(meant) => format!("write {meant}"),
+                None if symbol.is_alphabetic() => {
+                    "names have the letters a to z only; some letters look like these: type it again"
+                        .to_owned()
+                }
+                None => "only comments and strings may hold characters outside ASCII".to_owned(),
+            }),
         });
     }
 }

@@ -26,6 +26,7 @@ mod parser;
 mod tables;
 
 mod expressions;
+mod foreign;
 
 mod types;
 

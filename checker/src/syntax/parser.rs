@@ -118,6 +118,22 @@ impl<'a> Parser<'a> {
         self.at(TokenKind::End)
     }
 
+    /// The kind of the token before the current one.
+    pub(super) fn previous_kind(&self) -> Option<TokenKind> {
+        let previous = self.position.checked_sub(1)?;
+        Some(self.tokens[previous].kind)
+    }
+
+    /// The text of the token before the current one if it is a word, else nothing.
+    pub(super) fn previous_word(&self) -> &'a str {
+        match self.position.checked_sub(1) {
+            Some(previous) if self.tokens[previous].kind == TokenKind::Word => {
+                self.text_of(self.tokens[previous])
+            }
+            _ => "",
+        }
+    }
+
     /// Steps over the current token and returns it; the end is never left.
     pub(super) fn bump(&mut self) -> Token {
         let token = self.token();
@@ -258,7 +274,12 @@ impl<'a> Parser<'a> {
 
     /// Reports that `what` was expected here.
     pub(super) fn expected(&mut self, what: &str) {
-        self.expected_at(self.here(), what);
+        self.expected_at(self.here(), what, None);
+    }
+
+    /// Reports that `what` was expected here, and says what to write.
+    pub(super) fn expected_with_hint(&mut self, what: &str, hint: &str) {
+        self.expected_at(self.here(), what, Some(hint));
     }
 
     /// Reports that a closing symbol was left out: behind the previous token if the next one is on
@@ -268,7 +289,7 @@ impl<'a> Parser<'a> {
         let behind = self.behind_previous();
         let between = &self.text[behind.start as usize..here.start as usize];
         let is_behind = between.contains('\n') || self.at_end();
-        self.expected_at(if is_behind { behind } else { here }, what);
+        self.expected_at(if is_behind { behind } else { here }, what, None);
     }
 
     /// The empty span behind the previous token.
@@ -285,7 +306,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    fn expected_at(&mut self, span: Span, what: &str) {
+    fn expected_at(&mut self, span: Span, what: &str, hint: Option<&str>) {
         if self.at(TokenKind::Unknown) {
             // The lexer reported the symbol itself.
             self.suppress_reports();
@@ -295,6 +316,8 @@ impl<'a> Parser<'a> {
         let mut diagnostic = Diagnostic::new(codes::UNEXPECTED_TOKEN, span, message);
         if matches!(self.kind(), TokenKind::EqualLess | TokenKind::EqualGreater) {
             diagnostic = self.old_comparison();
+        } else if let Some(hint) = hint.map(str::to_owned).or_else(|| self.foreign_hint()) {
+            diagnostic = diagnostic.help(hint);
         }
         self.report(diagnostic);
     }
@@ -306,8 +329,13 @@ impl<'a> Parser<'a> {
             ("=>", ">=")
         };
         let message = format!("`{old}` is not an operator");
-        Diagnostic::new(codes::OLD_COMPARISON, self.here(), message)
-            .help(format!("write `{new}`; only the old syntax knows `{old}`"))
+        let help = if self.at(TokenKind::EqualGreater) {
+            "write `imply` between a condition and what follows from it, or `>=` to compare numbers"
+                .to_owned()
+        } else {
+            format!("write `{new}`; only the old syntax knows `{old}`")
+        };
+        Diagnostic::new(codes::OLD_COMPARISON, self.here(), message).help(help)
     }
 
     /// Consumes a token of this kind or reports; `context` says where it was expected ("after the

@@ -532,7 +532,15 @@ impl Parser<'_> {
                 self.bump();
                 edge.probability = Some(self.expression());
             }
-            _ => self.expected("`select`, `guard`, `sync`, `assign` or `probability`"),
+            _ => {
+                let what = "`select`, `guard`, `sync`, `assign` or `probability`";
+                if self.is_name_at(0) && self.peek(1).kind != TokenKind::Word {
+                    let hint = "write a comma between updates: `assign a = 0, b = 1;`";
+                    self.expected_with_hint(what, hint);
+                } else {
+                    self.expected(what);
+                }
+            }
         }
     }
 

@@ -27,8 +27,12 @@ pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagn
         // Operators of temporal logics that are not read at all are no tokens here.
         diagnostics.retain(|diagnostic| diagnostic.code != codes::UNKNOWN_SYMBOL);
     }
-    let rejected = diagnostics.iter().any(Diagnostic::is_error);
-    ((!rejected).then_some(query), diagnostics)
+    let first = diagnostics.iter().position(Diagnostic::is_error);
+    if let Some(first) = first {
+        // A query is one line: what follows the first mistake is most often caused by it.
+        diagnostics.truncate(first + 1);
+    }
+    (first.is_none().then_some(query), diagnostics)
 }
 
 /// Adds a query given as bare text as a source of its own and returns its span.
@@ -154,6 +158,17 @@ impl Parser<'_> {
             }
             "sat" => self.unsupported_query("live sequence chart scenario"),
             "E" if next == TokenKind::LeftBracket && self.at_expected_value() => self.statistical(),
+            "P" if next == TokenKind::LeftBracket && self.at_run_bound() => {
+                self.report(
+                    Diagnostic::new(
+                        codes::UNEXPECTED_TOKEN,
+                        self.here(),
+                        "expected a query, found `P`",
+                    )
+                    .help("write `Pr[<=10](<> p)` for a probability"),
+                );
+                self.statistical()
+            }
             "A" if next == TokenKind::LeftBracket => self.until_or_leads_to(),
             _ => self.leads_to(),
         }
@@ -176,9 +191,17 @@ impl Parser<'_> {
         })
     }
 
+    /// `P[<=10` and not an array named `P`.
+    fn at_run_bound(&self) -> bool {
+        matches!(self.peek(2).kind, TokenKind::LessEqual | TokenKind::Hash)
+    }
+
     /// `E[<=10](max: x)`, and not an array named `E`: a bound stands in the brackets, and `(name:`
     /// follows them.
     fn at_expected_value(&self) -> bool {
+        if self.at_run_bound() {
+            return true;
+        }
         let mut depth = 0_u32;
         for distance in 1.. {
             match self.peek(distance).kind {

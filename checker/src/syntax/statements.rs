@@ -133,6 +133,13 @@ impl Parser<'_> {
     fn for_statement(&mut self) -> Statement {
         self.bump();
         self.expect(TokenKind::LeftParenthesis, "after `for`");
+        if self.at_word("int") {
+            self.expected_with_hint(
+                "the name of a variable",
+                "write `for (i : int[0,2])`, or declare the variable before the loop",
+            );
+            self.bump();
+        }
         if self.is_name_at(0) && self.peek(1).kind == TokenKind::Colon {
             let name = self.declared_name("the name of the loop variable");
             self.bump();

@@ -83,7 +83,13 @@ impl Parser<'_> {
 
     fn estimated(&mut self) -> Estimated {
         let bound = self.at(TokenKind::LeftBracket).then(|| self.run_bound());
-        let is_open = self.expect(TokenKind::LeftParenthesis, "before what is asked of a run");
+        let is_open = self.eat(TokenKind::LeftParenthesis);
+        if !is_open {
+            self.expected_with_hint(
+                "`(` before what is asked of a run",
+                "write `Pr[<=10](<> p)`",
+            );
+        }
         let path = self.path();
         if is_open {
             self.closing(TokenKind::RightParenthesis, "after what is asked of a run");
@@ -101,8 +107,11 @@ impl Parser<'_> {
         if maximum || self.at_word("min") {
             self.bump();
         } else {
-            self.expected("`max:` or `min:`");
-            self.skip_to(&[TokenKind::Colon, TokenKind::RightParenthesis]);
+            self.expected_with_hint(
+                "`max:` or `min:`",
+                "write `E[<=10; 100](max: e)` or `E[<=10; 100](min: e)`",
+            );
+            self.skip_rest();
         }
         self.expect(TokenKind::Colon, "before what is measured");
         let value = self.expression();

@@ -1,5 +1,6 @@
 //! The language: reading, names and types, and the pages that explain diagnostics.
 
+mod beginners;
 #[path = "../common/checks.rs"]
 #[allow(dead_code, reason = "this program asks in some of the ways only")]
 mod checks;
