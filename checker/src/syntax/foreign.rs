@@ -5,28 +5,6 @@ use super::keywords::Dialect;
 use super::lexer::TokenKind;
 use super::parser::Parser;
 
-/// What stands for a symbol outside ASCII.
-pub(super) fn ascii_for(symbol: char) -> Option<&'static str> {
-    Some(match symbol {
-        '≤' | '⩽' => "`<=`",
-        '≥' | '⩾' => "`>=`",
-        '≠' => "`!=`",
-        '¬' => "`!` or `not`",
-        '∧' => "`&&` or `and`",
-        '∨' => "`||` or `or`",
-        '→' | '⇒' | '⟹' => "`imply`",
-        '↔' | '⇔' => "`==`",
-        '∀' => "`forall (i : int[0,3])`",
-        '∃' => "`exists (i : int[0,3])`",
-        '□' | '◻' => "`A[]`",
-        '◇' | '◊' => "`A<>` or `E<>`",
-        '·' | '×' => "`*`",
-        '−' | '–' => "`-`",
-        '‘' | '’' | '“' | '”' => "the name without quotation marks",
-        _ => return None,
-    })
-}
-
 /// Temporal operators and words of other notations that begin a query, with UPPAAL's.
 const FOREIGN_BEGINNINGS: [(&str, &str); 7] = [
     ("G", "A[] p"),

@@ -13,7 +13,6 @@
 use crate::cancellation;
 
 use super::codes;
-use super::foreign::ascii_for;
 use super::tables::Finder;
 use crate::diagnostics::{Diagnostic, SourceId, Span};
 
@@ -315,6 +314,28 @@ impl Lexer<'_> {
             }),
         });
     }
+}
+
+/// What stands for a symbol outside ASCII.
+fn ascii_for(symbol: char) -> Option<&'static str> {
+    Some(match symbol {
+        '≤' | '⩽' => "`<=`",
+        '≥' | '⩾' => "`>=`",
+        '≠' => "`!=`",
+        '¬' => "`!` or `not`",
+        '∧' => "`&&` or `and`",
+        '∨' => "`||` or `or`",
+        '→' | '⇒' | '⟹' => "`imply`",
+        '↔' | '⇔' => "`==`",
+        '∀' => "`forall (i : int[0,3])`",
+        '∃' => "`exists (i : int[0,3])`",
+        '□' | '◻' => "`A[]`",
+        '◇' | '◊' => "`A<>` or `E<>`",
+        '·' | '×' => "`*`",
+        '−' | '–' => "`-`",
+        '‘' | '’' | '“' | '”' => "the name without quotation marks",
+        _ => return None,
+    })
 }
 
 /// The symbol of a byte that begins no longer one: most symbols of a model.
