@@ -68,26 +68,51 @@ def write_nrrd(
     directions: Sequence[Place] = ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     origin: Place = (0.0, 0.0, 0.0),
     space: str = "left-posterior-superior",
-    segments: Sequence[tuple[str, int]] = (),
+    segments: Sequence[tuple[str, int] | tuple[str, int, int]] = (),
+    layers: int | None = None,
+    more: Sequence[str] = (),
+    data_file: str | None = None,
 ) -> None:
-    """A NRRD file with named segments."""
+    """A NRRD file with named segments: their names, numbers and perhaps layers.
+
+    `layers` is the axis that counts layers. `more` are lines of the header. With `data_file`, the
+    voxels are in that file beside the header.
+    """
     head = ["NRRD0004", "type: unsigned char", f"dimension: {voxels.ndim}"]
     head += [f"space: {space}"] if space else ["space dimension: 3"]
     head += ["sizes: " + " ".join(map(str, voxels.shape))]
     shown = [f"({','.join(f'{c:g}' for c in row)})" for row in directions]
-    head += ["space directions: " + " ".join(shown), "kinds: domain domain domain"]
-    head += ["encoding: gzip", f"space origin: ({','.join(f'{c:g}' for c in origin)})"]
-    for number, (name, label) in enumerate(segments):
+    kinds = ["domain"] * 3
+    if layers is not None:
+        shown.insert(layers, "none")
+        kinds.insert(layers, "list")
+    head += ["space directions: " + " ".join(shown), "kinds: " + " ".join(kinds)]
+    head += ["encoding: gzip", f"space origin: ({','.join(f'{c:g}' for c in origin)})", *more]
+    for number, (name, label, *layer) in enumerate(segments):
         head += [f"Segment{number}_Name:={name}", f"Segment{number}_LabelValue:={label}"]
-        head += [f"Segment{number}_ID:=Segment_{number}", f"Segment{number}_Layer:=0"]
+        head += [f"Segment{number}_ID:=Segment_{number}"]
+        head += [f"Segment{number}_Layer:={layer[0] if layer else 0}"]
     data = gzip.compress(voxels.astype("u1").tobytes(order="F"), mtime=0)
+    if data_file is not None:
+        head += [f"data file: {data_file}"]
+        (path.parent / data_file).write_bytes(data)
+        data = b""
     path.write_bytes(("\n".join(head) + "\n\n").encode() + data)
 
 
 def write_nifti(
-    path: Path, voxels: np.ndarray, affine: np.ndarray, *, sform: int = 1, units: int = 2
+    path: Path,
+    voxels: np.ndarray,
+    affine: np.ndarray,
+    *,
+    sform: int = 1,
+    units: int = 2,
+    qform_at: Place | None = None,
 ) -> None:
-    """A NIfTI-1 file of bytes in one piece; units: 1 m, 2 mm, 3 um, 0 unknown."""
+    """A NIfTI-1 file of bytes in one piece; units: 1 m, 2 mm, 3 um, 0 unknown.
+
+    With `qform_at` it has a qform as well, which does not turn and has its origin there.
+    """
     head = bytearray(352)
     struct.pack_into("<i", head, 0, 348)
     struct.pack_into("<8h", head, 40, 3, *voxels.shape, 1, 1, 1, 1)
@@ -96,7 +121,8 @@ def write_nifti(
     struct.pack_into("<f", head, 108, 352.0)
     struct.pack_into("<f", head, 112, 1.0)
     head[123] = units
-    struct.pack_into("<hh", head, 252, 0, sform)
+    struct.pack_into("<hh", head, 252, int(qform_at is not None), sform)
+    struct.pack_into("<6f", head, 256, 0, 0, 0, *(qform_at or (0, 0, 0)))
     struct.pack_into("<12f", head, 280, *np.asarray(affine, dtype=float)[:3].ravel())
     head[344:348] = b"n+1\0"
     data = bytes(head) + voxels.astype("u1").tobytes(order="F")

@@ -167,8 +167,6 @@ ONLY_IN: dict[str, set[str]] = {
     "jinja2": {"render"},
     "matplotlib": {"experiment", "plot"},
     "scipy": {"experiment", "imaging", "needle", "plan", "traces"},
-    "trimesh": {"imaging"},
-    "nrrd": {"imaging"},
     "nibabel": {"imaging"},
     "dask": {"cluster"},
     "distributed": {"cluster"},

@@ -1,27 +1,32 @@
-"""Meshes from files: STL, OBJ and PLY, read by trimesh, and what must be true of them."""
+"""Meshes from files: STL, OBJ and PLY, and what must be true of them."""
 
 from __future__ import annotations
 
-import io
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from ntagen.files import open_file
 from ntagen.imaging.mistakes import ImageError
-from ntagen.imaging.optional import package
+from ntagen.imaging.obj import read_obj
+from ntagen.imaging.ply import read_ply
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.space import Space
+from ntagen.imaging.stl import is_text, read_stl
+from ntagen.imaging.surface_files import refuse_many
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-FORMATS: Final = ("stl", "obj", "ply")
-MOST_TRIANGLES: Final = 1_000_000
+_Reader = Callable[[bytes, str], "tuple[NDArray[np.float64], NDArray[np.int64]]"]
+_READERS: Final[dict[str, _Reader]] = {"stl": read_stl, "obj": read_obj, "ply": read_ply}
 MOST_BYTES: Final = 256 * 2**20
 _HEAD_BYTES: Final = 2**16
 _LARGEST_BYTES: Final = 2**40
+_FARTHEST: Final = 1e9
+"""Nothing of a file is farther from its origin, in units of the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,28 +66,16 @@ def read_mesh(path: str) -> Mesh:
         ImageError: It cannot be read, is too large, or is no closed surface.
     """
     kind = path.rpartition(".")[2].lower()
-    if kind not in FORMATS:
+    if kind not in _READERS:
         raise ImageError(
             "image-malformed",
             f"`{path}` is no mesh that can be read",
             "name a file that ends with .stl, .obj or .ply",
         )
     refuse_large(path)
-    head = _head(path)
     data = bytes_of(path, MOST_BYTES)
-    trimesh = package("trimesh", "meshes")
-    try:
-        loaded = trimesh.load(
-            io.BytesIO(data), file_type=kind, force="mesh", process=False, maintain_order=True
-        )
-        vertices, triangles = loaded.vertices, loaded.faces
-    except Exception as error:  # trimesh raises errors of any kind for broken files.
-        raise ImageError(
-            "image-malformed",
-            f"`{path}` is no {kind.upper()} file: {_first_line(error)}",
-            "export it once more",
-        ) from None
-    return checked(vertices, triangles, path, _space_in(kind, head))
+    vertices, triangles = _READERS[kind](data, path)
+    return checked(vertices, triangles, path, _space_in(kind, data[:_HEAD_BYTES]))
 
 
 def refuse_large(path: str) -> None:
@@ -91,7 +84,7 @@ def refuse_large(path: str) -> None:
     Raises:
         ImageError: It says so.
     """
-    _refuse_many(path, _declared(path.rpartition(".")[2].lower(), _head(path)))
+    refuse_many(path, _declared(path.rpartition(".")[2].lower(), _head(path)))
 
 
 def checked(
@@ -104,9 +97,6 @@ def checked(
     """
     import numpy as np
 
-    vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
-    triangles = np.asarray(triangles, dtype=np.int64).reshape(-1, 3)
-    _refuse_many(path, len(triangles))
     if not len(triangles):
         raise ImageError(
             "image-malformed", f"`{path}` has no triangles", "export the surface, not its points"
@@ -117,10 +107,17 @@ def checked(
             f"`{path}` has points that are not finite numbers (NaN or infinite)",
             "export it once more",
         )
+    if np.abs(vertices).max() > _FARTHEST:
+        raise ImageError(
+            "image-malformed",
+            f"`{path}` has a point {np.abs(vertices).max():.3g} units away from its origin",
+            "export it once more",
+        )
     vertices, numbers = np.unique(vertices, axis=0, return_inverse=True)
     triangles = numbers.reshape(-1)[triangles]
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (c != a)]
+    _refuse_repeated(triangles, path)
     _require_closed(triangles, len(vertices), path)
     mesh = Mesh(vertices, triangles, space)
     size = float((vertices.max(axis=0) - vertices.min(axis=0)).max())
@@ -140,6 +137,25 @@ def inverted(path: str) -> ImageError:
         f"the normals of `{path}` point inwards",
         "turn them round in the program that made the file (flip or recalculate normals outside)",
     )
+
+
+def _refuse_repeated(triangles: NDArray[np.int64], path: str) -> None:
+    """No triangle may stand twice, seen from the same side.
+
+    Raises:
+        ImageError: One does.
+    """
+    import numpy as np
+
+    first = triangles.argmin(axis=1)
+    turned = np.take_along_axis(triangles, (first[:, None] + np.arange(3)) % 3, axis=1)
+    twice = len(turned) - len(np.unique(turned, axis=0))
+    if twice:
+        raise ImageError(
+            "mesh-not-closed",
+            f"`{path}` repeats {twice:,} of its triangles",
+            "remove the copies in the program that made it (merge faces, remove doubles)",
+        )
 
 
 def _require_closed(triangles: NDArray[np.int64], count: int, path: str) -> None:
@@ -185,23 +201,10 @@ def _head(path: str) -> bytes:
 
 def _declared(kind: str, head: bytes) -> int:
     """How many triangles the beginning of a file says that there are; 0 if it does not."""
-    if kind == "stl" and len(head) >= 84 and not _is_text_stl(head):
+    if kind == "stl" and len(head) >= 84 and not is_text(head):
         return int.from_bytes(head[80:84], "little")
-    found = re.search(rb"element\s+face\s+(\d+)", head) if kind == "ply" else None
+    found = re.search(rb"element\s+face\s+(\d{1,18})\s", head) if kind == "ply" else None
     return int(found[1]) if found else 0
-
-
-def _is_text_stl(head: bytes) -> bool:
-    return head.lstrip().startswith(b"solid") and b"facet" in head
-
-
-def _refuse_many(path: str, count: int) -> None:
-    if count > MOST_TRIANGLES:
-        raise ImageError(
-            "image-too-large",
-            f"`{path}` has {count:,} triangles, more than {MOST_TRIANGLES:,}",
-            "reduce it (decimate), or cut away what the needle cannot reach",
-        )
 
 
 def _space_in(kind: str, head: bytes) -> Space | None:
@@ -209,11 +212,6 @@ def _space_in(kind: str, head: bytes) -> Space | None:
     if kind == "ply":
         head = head.partition(b"end_header")[0]
     elif kind == "stl":
-        head = head.partition(b"\n")[0] if _is_text_stl(head) else head[:80]
+        head = head.partition(b"\n")[0] if is_text(head) else head[:80]
     found = re.search(rb"SPACE\s*=\s*(LPS|RAS)", head)
     return None if found is None else ("LPS" if found[1] == b"LPS" else "RAS")
-
-
-def _first_line(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return (lines[0] if lines else type(error).__name__)[:120]

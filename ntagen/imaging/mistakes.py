@@ -20,6 +20,7 @@ Defect = Literal[
     "unit-unknown",
     "part-missing",
     "matrix-degenerate",
+    "matrix-ambiguous",
 ]
 """The kinds of defects, by the names that the environment language has for them."""
 

@@ -1,4 +1,4 @@
-"""The packages that read files of anatomy; who reads no such file does not need them."""
+"""The package that reads headers of NIfTI; who reads no such file does not need it."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Final
 
 from ntagen.imaging.mistakes import ImageError
 
-PACKAGES: Final = {"trimesh": "trimesh", "nrrd": "pynrrd", "nibabel": "nibabel"}
+PACKAGES: Final = {"nibabel": "nibabel"}
 """By module: the package that has it."""
 
 
 def package(module: str, what: str) -> ModuleType:
-    """A module of a package for `what`, such as ``meshes``.
+    """A module of a package for `what`, such as ``NIfTI files``.
 
     Raises:
         ImageError: The package is not installed.

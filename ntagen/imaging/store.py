@@ -17,7 +17,7 @@ from ntagen.errors import InputError
 from ntagen.files import read_file, write_files
 from ntagen.shapes import Field
 
-_VERSION: Final = 1
+_VERSION: Final = 2
 _MOST_FILES: Final = 100
 _MOST_BYTES: Final = 64 * 2**20
 

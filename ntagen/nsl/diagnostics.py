@@ -185,6 +185,7 @@ KINDS: Final = _kinds(
     ("N108", "matrix-degenerate", "error", "A matrix of a file may only turn and move."),
     ("N109", "transform-missing", "error", "Imaging space needs a place in the needle's frame."),
     ("N110", "clause-misused", "error", "A region from such a file has no such clause."),
+    ("N111", "matrix-ambiguous", "error", "Two matrices of a NIfTI file place it differently."),
     # Motions.
     ("N120", "period-wrong", "error", "A motion repeats itself after some time."),
     ("N121", "periods-differ", "error", "All regions move with one breath."),

@@ -59,6 +59,7 @@ class DraftImage:
         space: LPS or RAS.
         unit_mm: How many mm one unit of the file is.
         part: The name of a segment or of a point, or the number of a label.
+        matrix: Which matrix of a NIfTI file counts: qform or sform.
         radius_mm: How thick points and lines are.
         grid_mm: How fine the table of distances is.
     """
@@ -68,6 +69,7 @@ class DraftImage:
     space: Placed[str] | None = None
     unit_mm: Placed[float] | None = None
     part: Placed[str] | Placed[int] | None = None
+    matrix: Placed[str] | None = None
     radius_mm: Placed[float] | None = None
     grid_mm: Placed[float] | None = None
 

@@ -11,6 +11,7 @@ from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.quantity import LENGTH, NUMBER, UNITS
 
 _SPACES: Final = ("LPS", "RAS")
+_MATRICES: Final = ("qform", "sform")
 _CLAUSES: Final[dict[tree.ImageForm, frozenset[str]]] = {
     "mesh": frozenset({"in", "grid"}),
     "segmentation": frozenset({"in", "segment", "label", "grid"}),
@@ -45,7 +46,7 @@ class ImageResolver:
         if "segment" in clauses and "label" in clauses:
             self._repeated(clauses["label"])
             return None
-        space, unit_mm, is_right = self._space(clauses.get("in"))
+        space, unit_mm, matrix, is_right = self._space(shape.form, clauses.get("in"))
         part: Placed[str] | Placed[int] | None = None
         for keyword in ("segment", "point"):
             if keyword in clauses:
@@ -70,23 +71,25 @@ class ImageResolver:
                 lengths[keyword] = Placed(length, value.span)
                 is_right = is_right and length is not None
         path = Placed(shape.path.text, shape.path.span)
-        image = DraftImage(
-            shape.form, path, space, unit_mm, part, lengths.get("radius"), lengths.get("grid")
-        )
+        radius_mm, grid_mm = lengths.get("radius"), lengths.get("grid")
+        image = DraftImage(shape.form, path, space, unit_mm, part, matrix, radius_mm, grid_mm)
         return image if is_right else None
 
     def _space(
-        self, clause: tree.Clause | None
-    ) -> tuple[Placed[str] | None, Placed[float] | None, bool]:
-        """The space and the unit after `in`, in any order, and whether all is right."""
+        self, form: tree.ImageForm, clause: tree.Clause | None
+    ) -> tuple[Placed[str] | None, Placed[float] | None, Placed[str] | None, bool]:
+        """The space, the unit and the matrix after `in`, in any order, and if all is right."""
         space: Placed[str] | None = None
         unit: Placed[float] | None = None
+        matrix: Placed[str] | None = None
         for word in () if clause is None else clause.words:
             known = UNITS.get(word.text)
             if word.text in _SPACES and space is None:
                 space = Placed(word.text, word.span)
             elif known is not None and known[1] == LENGTH and unit is None:
                 unit = Placed(known[0], word.span)
+            elif word.text in _MATRICES and matrix is None and form == "segmentation":
+                matrix = Placed(word.text, word.span)
             else:
                 self._reporter.report(
                     "unknown-choice",
@@ -95,8 +98,8 @@ class ImageResolver:
                     hint=did_you_mean(word.text, (*_SPACES, "mm", "cm", "m"))
                     or "write for example `in LPS mm`",
                 )
-                return None, None, False
-        return space, unit, True
+                return None, None, None, False
+        return space, unit, matrix, True
 
     def transform(self, statement: tree.Transform, scope: Scope) -> DraftTransform | None:
         """Where imaging space is; None after a mistake."""

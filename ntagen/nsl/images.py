@@ -15,6 +15,7 @@ from ntagen.shapes import Field, Shape
 
 if TYPE_CHECKING:
     from ntagen.imaging.grid import Wish
+    from ntagen.imaging.nifti import Matrix
     from ntagen.imaging.space import Rigid, Space
 
 _FILE_BYTES: Final = 512 * 2**20
@@ -49,9 +50,7 @@ class ImageBuilder:
 
     def _kept(self, image: DraftImage, path: str, wish: Wish) -> Field | None:
         """The field, which is computed only once for all runs with the same file."""
-        import hashlib
-
-        from ntagen.imaging.reading import bytes_of
+        from ntagen.imaging.segmentations import files_of
         from ntagen.imaging.store import kept
 
         if image.form == "mesh":
@@ -61,9 +60,10 @@ class ImageBuilder:
             refuse_large(path)
         space, unit = image.space, image.unit_mm
         key = (
-            hashlib.sha256(bytes_of(path, _FILE_BYTES)).hexdigest(),
+            _digest([path] if image.form == "mesh" else files_of(path)),
             image.form,
             None if image.part is None else image.part.value,
+            None if image.matrix is None else image.matrix.value,
             None if space is None else space.value,
             None if unit is None else unit.value,
             self._imaging,
@@ -88,7 +88,7 @@ class ImageBuilder:
 
             mesh = read_mesh(path)
             motion = self._motion(image, mesh.space, path)
-            unit_mm = self._unit(image, None, path)
+            unit_mm = self._unit(image, None, path, mesh.space)
             if motion is None or unit_mm is None:
                 return None
             placed = replace(mesh, vertices=motion.points(mesh.vertices * unit_mm))
@@ -97,11 +97,15 @@ class ImageBuilder:
         from ntagen.imaging.voxels import field_of_mask
 
         part = None if image.part is None else image.part.value
+        matrix = None if image.matrix is None else cast("Matrix", image.matrix.value)
         mask = read_mask(
-            path, Part(segment=part) if isinstance(part, str) else Part(label=cast("int", part))
+            path,
+            Part(segment=part, matrix=matrix)
+            if isinstance(part, str)
+            else Part(label=cast("int", part), matrix=matrix),
         )
-        motion = self._motion(image, mask.space, path)
-        unit_mm = self._unit(image, mask.unit_mm, path)
+        motion = self._motion(image, mask.space, path, mask.said)
+        unit_mm = self._unit(image, mask.unit_mm, path, mask.space)
         if motion is None or unit_mm is None:
             return None
         return field_of_mask(mask, motion, unit_mm, wish)
@@ -166,8 +170,17 @@ class ImageBuilder:
             return None
         return space, motion if draft.is_from else motion.inverse()
 
-    def _motion(self, image: DraftImage, said: Space | None, path: str) -> Rigid | None:
-        """From the space of a file to the frame of the scene; None after a mistake."""
+    def _motion(
+        self, image: DraftImage, said: Space | None, path: str, word: str | None = None
+    ) -> Rigid | None:
+        """From the space of a file to the frame of the scene; None after a mistake.
+
+        Args:
+            image: The region.
+            said: The space of the coordinates that were read, if the file says it.
+            path: The file.
+            word: What the file says of its space, if it is not that name.
+        """
         from ntagen.imaging.space import between
 
         written = None if image.space is None else image.space.value
@@ -175,17 +188,20 @@ class ImageBuilder:
             self._reporter.report(
                 "space-unknown",
                 image.path.span,
-                f"nothing says whether `{path}` is in LPS or in RAS",
+                f"nothing says whether `{path}` is in LPS or in RAS"
+                + (f"; it says `space: {word}`" if word is not None else ""),
                 hint="look it up where the file was made, and write `in LPS` or `in RAS`",
             )
             return None
-        if said is not None and written is not None and said != written:
+        if said is not None and written is not None and (word is not None or said != written):
             span = image.path.span if image.space is None else image.space.span
             self._reporter.report(
                 "space-unknown",
                 span,
-                f"`{path}` says that it is in {said}, and this says {written}",
-                hint=f"write `in {said}`, or nothing",
+                f"`{path}` says that it is in {word or said}, and this says {written}",
+                hint=f"write `in {said}`, or nothing"
+                if word is None
+                else f"leave out `{written}`; what is in {word} is brought to {said}",
             )
             return None
         if self._draft.transform is None:
@@ -203,8 +219,17 @@ class ImageBuilder:
         space, motion = self._imaging
         return motion.after(between(cast("Space", said or written), space))
 
-    def _unit(self, image: DraftImage, said_mm: float | None, path: str) -> float | None:
-        """How many mm one unit of a file is; None after a mistake."""
+    def _unit(
+        self, image: DraftImage, said_mm: float | None, path: str, said: Space | None
+    ) -> float | None:
+        """How many mm one unit of a file is; None after a mistake.
+
+        Args:
+            image: The region.
+            said_mm: The unit of the file, if it says it.
+            path: The file.
+            said: The space of the file, if it says it; the hint leaves it out then.
+        """
         written = image.unit_mm
         if written is None or written.value is None:
             if said_mm is None:
@@ -212,7 +237,8 @@ class ImageBuilder:
                     "unit-unknown",
                     image.path.span,
                     f"nothing says in which unit `{path}` is",
-                    hint="look it up where the file was made, and write for example `in LPS mm`",
+                    hint="look it up where the file was made, and write for example `in "
+                    + ("mm`" if said else f"{image.space.value if image.space else 'LPS'} mm`"),
                 )
             return said_mm
         if said_mm is not None and said_mm != written.value:
@@ -252,6 +278,21 @@ class ImageBuilder:
         if not isinstance(error, ImageError):
             raise error
         self._reporter.report(error.defect, span, error.message, hint=error.hint)
+
+
+def _digest(paths: list[str]) -> str:
+    """A name for the content of files that no other content has.
+
+    Raises:
+        ImageError: One cannot be read.
+    """
+    import hashlib
+
+    from ntagen.imaging.reading import bytes_of
+
+    return hashlib.sha256(
+        "".join(hashlib.sha256(bytes_of(path, _FILE_BYTES)).hexdigest() for path in paths).encode()
+    ).hexdigest()
 
 
 class _ReportedError(Exception):

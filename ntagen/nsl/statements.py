@@ -231,7 +231,7 @@ class _StatementReader(ExpressionReader):
     def _clause(self) -> tree.Clause | None:
         """A clause of a shape from a file, if one comes next.
 
-        ``"in" NAME [NAME] | ("segment" | "point") STRING
+        ``"in" NAME [NAME [NAME]] | ("segment" | "point") STRING
         | ("label" | "radius" | "grid") expression``
         """
         begin = self._index
@@ -240,8 +240,8 @@ class _StatementReader(ExpressionReader):
             return None
         if word.type == "IN":
             names = [self._name()]
-            if unit := self._take("NAME"):
-                names.append(tree.Identifier(unit.span, unit.text))
+            while len(names) < 3 and (more := self._take("NAME")):
+                names.append(tree.Identifier(more.span, more.text))
             return tree.Clause(self._span(begin), "in", tuple(names))
         if word.type in ("SEGMENT", "POINT"):
             of_text = cast("Literal['segment', 'point']", word.text)

@@ -173,18 +173,62 @@ def test_segments_are_found_by_their_names(tmp_path: Path) -> None:
     assert dot.criticals[0].shape.volume_mm3() == pytest.approx(3.0)
 
 
-def test_segments_in_layers_are_found(tmp_path: Path) -> None:
-    """Segments that overlap have a layer each, as in files of Slicer."""
-    layers = np.stack([VOXELS == 1, VOXELS == 7]).astype(np.uint8)
-    path = tmp_path / "s.seg.nrrd"
-    anatomy.write_nrrd(path, layers, segments=[("tumor", 1), ("dot", 1)])
-    data = path.read_bytes().replace(b"space directions: ", b"space directions: none ")
-    data = data.replace(b"kinds: ", b"kinds: list ").replace(b"1_Layer:=0", b"1_Layer:=1")
-    path.write_bytes(data)
+@pytest.mark.parametrize("axis", [0, 1, 2, 3])
+def test_segments_in_layers_are_found(axis: int, tmp_path: Path) -> None:
+    """Segments that overlap have a layer each; the axis without a direction counts them."""
+    layers = np.stack([VOXELS == 1, VOXELS == 7], axis=axis).astype(np.uint8)
+    names = [("tumor", 1, 0), ("dot", 1, 1)]
+    anatomy.write_nrrd(tmp_path / "s.seg.nrrd", layers, segments=names, layers=axis)
     line = 'critical C1 segmentation "s.seg.nrrd" segment "{}" grid 1 mm'
     for name, volume in (("tumor", 4 * 6 * 4), ("dot", 1)):
         scene = load(tmp_path, line.format(name))
         assert scene.criticals[0].shape.volume_mm3() == pytest.approx(volume)
+    load(tmp_path, line.format("tumor"))
+    assert np.allclose(bounds(load(tmp_path, line.format("tumor"))), voxel_bounds(np.eye(4)))
+
+
+@pytest.mark.parametrize("space", ["left-anterior-superior", "LAS", "Left-Anterior-Superior"])
+def test_what_is_left_stays_left(space: str, tmp_path: Path) -> None:
+    """In LAS only y is turned round on the way to LPS: x goes to the left in both."""
+    anatomy.write_nrrd(tmp_path / "s.nrrd", VOXELS, space=space, origin=(20, 10, -20))
+    scene = load(tmp_path, 'critical C1 segmentation "s.nrrd" label 1 grid 1 mm')
+    to_lps = np.diag([1.0, -1, 1])
+    affine = np.concatenate([to_lps, to_lps @ [[20], [10], [-20]]], axis=1)
+    assert np.allclose(bounds(scene), voxel_bounds(affine))
+
+
+def test_voxels_beside_their_header_are_read(tmp_path: Path) -> None:
+    """A change of the voxels alone is a change of the scene: no field is taken from the cache."""
+    line = 'critical C1 segmentation "s.nhdr" label 1 grid 1 mm'
+    path = tmp_path / "s.nhdr"
+    anatomy.write_nrrd(path, VOXELS, data_file="s.raw.gz")
+    header = path.read_bytes()
+    assert np.allclose(bounds(load(tmp_path, line)), voxel_bounds(np.eye(4)))
+    anatomy.write_nrrd(path, VOXELS[::-1], data_file="s.raw.gz")
+    assert path.read_bytes() == header
+    assert not np.allclose(bounds(load(tmp_path, line)), voxel_bounds(np.eye(4)))
+
+
+@pytest.mark.parametrize(("words", "x"), [("qform", 40.0), ("sform", 0.0)])
+def test_a_matrix_of_nifti_can_be_named(words: str, x: float, tmp_path: Path) -> None:
+    nifti(qform_at=(40.0, 0.0, 0.0))(tmp_path)
+    scene = load(tmp_path, LABEL.replace("label", f"in RAS {words} label"))
+    affine = np.diag([-1.0, -1, 1]) @ np.concatenate([np.eye(3), [[x], [0], [0]]], axis=1)
+    assert np.allclose(bounds(scene), voxel_bounds(affine))
+
+
+def test_names_in_any_script_are_found(tmp_path: Path) -> None:
+    seg(segments=[("Gefäß", 1), ("Gefß", 7)])(tmp_path)
+    scene = load(tmp_path, SEGMENT.replace("tumor", "Gefäß"))
+    assert scene.criticals[0].shape.volume_mm3() == pytest.approx(4 * 6 * 4)
+
+
+def test_a_text_in_capitals_is_read(tmp_path: Path) -> None:
+    points, faces = anatomy.box(MIDDLE, SIZE)
+    anatomy.write_text_stl(tmp_path / "m.stl", points, faces)
+    path = tmp_path / "m.stl"
+    path.write_text(path.read_text("utf-8").upper(), "utf-8")
+    assert np.allclose(bounds(load(tmp_path, STL)), box_bounds(np.array(MIDDLE), np.array(SIZE)))
 
 
 def test_a_mesh_that_moves_has_a_larger_grid(tmp_path: Path) -> None:
@@ -300,6 +344,48 @@ def nifti(affine: np.ndarray | None = None, **changes: int) -> Prepare:
     return lambda folder: anatomy.write_nifti(folder / "s.nii", VOXELS, grid, **changes)
 
 
+def extra(folder: Path) -> None:
+    """A binary STL file with seven bytes too many."""
+    mesh("m.stl")(folder)
+    path = folder / "m.stl"
+    path.write_bytes(path.read_bytes() + b"ntagen!")
+
+
+def solid(change: Callable[[list[str]], list[str]]) -> Prepare:
+    """A text STL file with changed lines."""
+
+    def prepare(folder: Path) -> None:
+        mesh("text.stl")(folder)
+        lines = (folder / "text.stl").read_text("utf-8").splitlines()
+        (folder / "m.stl").write_text("\n".join(change(lines)), "utf-8")
+
+    return prepare
+
+
+def ply(old: str, new: str) -> Prepare:
+    """A text PLY file with a change."""
+
+    def prepare(folder: Path) -> None:
+        mesh("m.ply")(folder)
+        text = (folder / "m.ply").read_text("utf-8")
+        assert old in text
+        (folder / "m.ply").write_text(text.replace(old, new, 1), "utf-8")
+
+    return prepare
+
+
+def header_alone(folder: Path) -> None:
+    """The header of a file whose voxels are lost."""
+    anatomy.write_nrrd(folder / "s.nhdr", VOXELS, data_file="s.raw")
+    (folder / "s.raw").unlink()
+
+
+def two_layers(*segments: tuple[str, int, int]) -> Prepare:
+    """Two layers with the same number."""
+    layers = np.stack([VOXELS == 1, VOXELS == 7]).astype(np.uint8)
+    return seg(voxels=layers, layers=0, segments=segments)
+
+
 def marks(*lists: dict[str, object]) -> Prepare:
     return lambda folder: anatomy.write_markups(folder / "p.mrk.json", *lists)
 
@@ -307,6 +393,8 @@ def marks(*lists: dict[str, object]) -> Prepare:
 MESH = 'critical C1 mesh "m.obj" in LPS mm grid 1 mm'
 STL = 'critical C1 mesh "m.stl" in LPS mm'
 SEGMENT = 'critical C1 segmentation "s.nrrd" segment "tumor" grid 1 mm'
+PLY = 'critical C1 mesh "m.ply" in LPS mm grid 1 mm'
+HEADER = 'critical C1 segmentation "s.nhdr" label 1 grid 1 mm'
 LABEL = 'critical C1 segmentation "s.nii" label 1 grid 1 mm'
 MARKS = 'critical C1 markups "p.mrk.json" radius 1 mm'
 POINT = anatomy.points(("F-1", MIDDLE))
@@ -316,7 +404,7 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
     "folder": (lambda f: (f / "m.obj").mkdir(), MESH, "N002", "cannot read", "name a file"),
     "empty file": (text("m.obj", ""), MESH, "N005", "is empty", "once more"),
     "no triangles": (text("m.obj", "v 0 0 0\n"), MESH, "N101", "has no triangles", "surface"),
-    "no mesh": (text("m.stl", "hello"), STL, "N101", "has no triangles", "surface"),
+    "no mesh": (text("m.stl", "hello"), STL, "N101", "is no STL file", "once more"),
     "unknown ending": (
         text("m.off", "OFF"),
         'critical C1 mesh "m.off" in LPS mm',
@@ -357,6 +445,75 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
         "10,000,000 triangles",
         "decimate",
     ),
+    "a triangle twice": (
+        mesh(change=lambda p, f: (p, np.vstack([f, f[:1]]))),
+        MESH,
+        "N103",
+        "repeats 1 of its triangles",
+        "remove the copies",
+    ),
+    "bytes behind the last triangle": (
+        extra,
+        STL,
+        "N101",
+        "7 bytes behind the last of its 12 triangles",
+        "longer file",
+    ),
+    "STL cut off": (
+        text("m.stl", b" " * 80 + b"\x0c\0\0\0" + b"\0" * 100),
+        STL,
+        "N101",
+        "12 triangles, and has bytes for 2",
+        "cut off",
+    ),
+    "facet of four": (
+        solid(lambda lines: [*lines[:3], lines[3], *lines[3:]]),
+        STL,
+        "N101",
+        "4 corners in line 8",
+        "once more",
+    ),
+    "facet without an end": (solid(lambda lines: lines[:6]), STL, "N101", "ends in", "cut off"),
+    "line of no STL": (
+        solid(lambda lines: [*lines[:2], "vertices 1 2 3", *lines[3:]]),
+        STL,
+        "N101",
+        "`vertices 1 2 3` cannot stand in line 3",
+        "once more",
+    ),
+    "point of OBJ that is not there": (
+        text("m.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"),
+        MESH,
+        "N101",
+        "point 2 (counted from 0), and 2 points",
+        "once more",
+    ),
+    "point 0 of OBJ": (text("m.obj", "v 0 0 0\nf 0 1 1\n"), MESH, "N101", "point `0`", "once"),
+    "number of OBJ": (text("m.obj", "v 0 0 zero\n"), MESH, "N101", "`0 0 zero`", "once"),
+    "curve of OBJ": (text("m.obj", "curv 0 1 1 2\n"), MESH, "N101", "line 1: `curv", "once"),
+    "point of PLY that is not there": (
+        ply("3 0 1 3", "3 0 1 8"),
+        PLY,
+        "N101",
+        "point 8 (counted from 0), and 8 points",
+        "once more",
+    ),
+    "a billion points": (
+        ply("vertex 8", "vertex 1000000000000"),
+        PLY,
+        "N102",
+        "1,000,000,000,000 points, more than",
+        "decimate",
+    ),
+    "too few lines of PLY": (ply("vertex 8", "vertex 900"), PLY, "N101", "is too short", "cut off"),
+    "too many lines of PLY": (ply("face 12", "face 11"), PLY, "N101", "has more lines", "once"),
+    "far away": (
+        mesh(change=lambda p, f: (p * 1e200, f)),
+        MESH,
+        "N101",
+        "units away from its origin",
+        "once more",
+    ),
     "grid too fine": (
         mesh(),
         MESH.replace("1 mm", "0.05 mm"),
@@ -383,7 +540,7 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
         'critical C1 mesh "m.obj" in RAS',
         "N106",
         "in which unit",
-        "`in LPS mm`",
+        "`in RAS mm`",
     ),
     "segment not there": (
         seg(),
@@ -439,7 +596,134 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
     "flat affine": (nifti(np.diag([1.0, 1, 0, 1])), LABEL, "N108", "spacing", "greater than 0"),
     "no affine": (nifti(sform=0), LABEL, "N108", "neither an sform", "geometry"),
     "NRRD without space": (seg(space=""), SEGMENT, "N105", "LPS or in RAS", "`in LPS`"),
-    "unit of NIfTI not said": (nifti(units=0), LABEL, "N106", "in which unit", "mm"),
+    **{
+        f"space {name}": (seg(space=name), SEGMENT, "N105", f"`space: {name}`", "save it in left")
+        for name in ("scanner-xyz", "3D-left-handed", "scanner-xyz-time", "left-superior")
+    },
+    "space without sides": (
+        seg(space="3D-right-handed"),
+        SEGMENT,
+        "N105",
+        "LPS or in RAS; it says `space: 3D-right-handed`",
+        "`in LPS`",
+    ),
+    "LAS contradicted": (
+        seg(space="LAS"),
+        SEGMENT.replace("segment ", "in RAS segment "),
+        "N105",
+        "says that it is in LAS, and this says RAS",
+        "leave out `RAS`; what is in LAS is brought to LPS",
+    ),
+    "two units": (
+        seg(more=['space units: "mm" "cm" "mm"']),
+        SEGMENT,
+        "N106",
+        '`space units: "mm" "cm" "mm"`',
+        "save it in mm",
+    ),
+    "spacings that disagree": (
+        seg(more=["spacings: 1 2 1"]),
+        SEGMENT,
+        "N101",
+        "`spacings: 1 2 1` in",
+        "remove the field",
+    ),
+    "field twice": (seg(more=["encoding: raw"]), SEGMENT, "N101", "`encoding` stands", "remove"),
+    "no field of NRRD": (
+        seg(more=["Segment0_Name: tumor"]),
+        SEGMENT,
+        "N101",
+        "`Segment0_Name: tumor` in the header",
+        "`:=` if it is a key",
+    ),
+    "two layers with a number": (
+        two_layers(("tumor", 1, 0), ("dot", 1, 1)),
+        SEGMENT.replace('segment "tumor"', "label 1"),
+        "N107",
+        "2 layers of",
+        "those with this number are `tumor`, `dot`",
+    ),
+    "two segments with a name": (
+        two_layers(("tumor", 1, 0), ("tumor", 1, 1)),
+        SEGMENT,
+        "N107",
+        "2 segments with the name `tumor`",
+        "another name",
+    ),
+    "two segments with a number": (
+        seg(segments=[("tumor", 1), ("rest", 1)]),
+        SEGMENT,
+        "N107",
+        "`tumor` and `rest` of",
+        "in Slicer",
+    ),
+    "layer that is not there": (
+        two_layers(("tumor", 1, 2)),
+        SEGMENT,
+        "N107",
+        "`Segment0_Layer`",
+        "in Slicer",
+    ),
+    "voxels in another folder": (
+        text(
+            "s.nhdr",
+            "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 1 1 1\n"
+            "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+            "encoding: raw\ndata file: ../s.raw\n",
+        ),
+        HEADER,
+        "N101",
+        "`data file: ../s.raw` in",
+        "data attached",
+    ),
+    "voxels that are missing": (header_alone, HEADER, "N001", "s.raw", "folder"),
+    "too few voxels": (
+        text(
+            "s.nrrd",
+            "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 9 9 9\n"
+            "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+            "encoding: raw\n\n12345",
+        ),
+        SEGMENT.replace('segment "tumor"', "label 1"),
+        "N101",
+        "fewer voxels than its sizes say (9 x 9 x 9)",
+        "cut off",
+    ),
+    "10^12 voxels": (
+        text(
+            "s.nrrd",
+            "NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 9999 9999 9999\n"
+            "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: (0,0,0)\n"
+            "encoding: raw\n\n12345",
+        ),
+        SEGMENT.replace('segment "tumor"', "label 1"),
+        "N102",
+        "999,700,029,999 voxels",
+        "coarser",
+    ),
+    "matrices that disagree": (
+        nifti(qform_at=(40.0, 0.0, 0.0)),
+        LABEL,
+        "N111",
+        "place the same voxel up to 40 mm apart",
+        "`in qform` or `in sform`",
+    ),
+    "qform that is not there": (
+        nifti(),
+        LABEL.replace("label", "in qform label"),
+        "N108",
+        "it has no qform",
+        "geometry",
+    ),
+    "qform of NRRD": (
+        seg(),
+        SEGMENT.replace("segment ", "in qform segment "),
+        "N111",
+        "has no qform",
+        "leave out",
+    ),
+    "unit of NIfTI not said": (nifti(units=0), LABEL, "N106", "in which unit", "`in mm`"),
+    "unknown unit of NIfTI": (nifti(units=5), LABEL, "N106", "`xyzt_units` in", "in mm"),
     "unit contradicted": (
         nifti(),
         LABEL.replace("label 1", "in cm label 1"),
@@ -447,7 +731,7 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
         "its unit is 1 mm",
         "leave the unit out",
     ),
-    "damaged NRRD": (text("s.nrrd", "NRRD0004\ntype: x\n"), SEGMENT, "N101", "no NRRD", "once"),
+    "damaged NRRD": (text("s.nrrd", "NRRD0004\ntype: x\n"), SEGMENT, "N101", "`sizes`", "once"),
     "damaged NIfTI": (text("s.nii", b"\0" * 400), LABEL, "N101", "no NIfTI", "once more"),
     "point not there": (
         marks(POINT),
@@ -565,21 +849,16 @@ def test_without_a_transform_nothing_is_guessed(tmp_path: Path) -> None:
     assert "transform from LPS" in found.hint
 
 
-@pytest.mark.parametrize(
-    ("module", "package", "line"),
-    [("trimesh", "trimesh", MESH), ("nrrd", "pynrrd", SEGMENT), ("nibabel", "nibabel", LABEL)],
-)
 def test_a_package_that_is_missing_is_named(
-    module: str, package: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for prepare in (mesh(), seg(), nifti()):
-        prepare(tmp_path)
-    monkeypatch.setitem(sys.modules, module, None)
+    nifti()(tmp_path)
+    monkeypatch.setitem(sys.modules, "nibabel", None)
     # A field that is in the cache needs no package.
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    found = mistake(tmp_path, line)
+    found = mistake(tmp_path, LABEL)
     assert found.code == "N100"
-    assert f"package {package}," in found.message
+    assert "package nibabel," in found.message
     assert found.hint == "install it with `python -m pip install 'ntagen[imaging]'`"
 
 
