@@ -204,7 +204,11 @@ def read_file(path: str | Path, limit_bytes: int) -> bytes:
     Raises:
         OSError: The file cannot be read, or is too large (`errno.EFBIG`).
     """
-    return b"".join(read_pieces(path, limit_bytes))
+    # Pieces in a list would be in memory twice when they are joined.
+    whole = io.BytesIO()
+    for piece in read_pieces(path, limit_bytes):
+        whole.write(piece)
+    return whole.getvalue()
 
 
 def read_pieces(path: str | Path, limit_bytes: int) -> Iterator[bytes]:

@@ -150,9 +150,14 @@ class _Text:
     def points(self, element: _Element, surface: Surface) -> None:
         """Adds the points of all elements."""
         places = [_place(element, (name,), self._path, is_list=False) for name in "xyz"]
+        if any(one.length is not None for one in element.properties):
+            raise malformed(self._path, "has lists at its points", "export the surface alone")
         for _ in range(element.count):
-            row = self.row(element)
-            surface.points.extend([row[place][0] for place in places])
+            words = self._words()
+            if len(words) != len(element.properties):
+                why = f"has no `vertex` in line {self._number:,} behind the header"
+                raise malformed(self._path, why)
+            surface.add_point([words[place] for place in places], self._number)
 
     def skip(self, element: _Element) -> None:
         """Leaves out all elements."""

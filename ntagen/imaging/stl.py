@@ -49,7 +49,8 @@ def read_stl(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.in
         raise malformed(path, why, "was it written over a longer file? export it once more")
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     triangles = np.frombuffer(data, dtype=kind, count=count, offset=_HEAD_BYTES)
-    points = triangles["corners"].reshape(-1, 3).astype(float)
+    with np.errstate(invalid="ignore"):  # A NaN that signals is one as well.
+        points = triangles["corners"].reshape(-1, 3).astype(float)
     return points, np.arange(3 * count, dtype=np.int64).reshape(-1, 3)
 
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 MOST_VOXELS: Final = 2**28
 MOST_ALONG: Final = 2**16
 _PIECE_BYTES: Final = 2**22
+_WORD_BYTES: Final = 2**10
+"""A number in text is not longer."""
 
 Encoding = Literal["raw", "gzip", "bzip2", "text"]
 
@@ -253,6 +255,8 @@ def _text(volume: Volume) -> Iterator[NDArray[np.float64]]:
         if piece and words and not piece[-1:].isspace():
             rest = words.pop()
         try:
+            if len(rest) > _WORD_BYTES:
+                raise ValueError(rest[:10])
             yield np.array(list(map(float, words)))
         except ValueError:
             raise ImageError(
