@@ -142,6 +142,10 @@ class _Handler(BaseHTTPRequestHandler):
         """Answers GET."""
         self._answer("GET")
 
+    def do_HEAD(self) -> None:
+        """Answers HEAD: what GET would answer, without the content."""
+        self._answer("GET")
+
     def do_POST(self) -> None:
         """Answers POST."""
         self._answer("POST")
@@ -268,4 +272,5 @@ class _Handler(BaseHTTPRequestHandler):
         if self.close_connection:
             self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(data)
+        if self.command != "HEAD":
+            self.wfile.write(data)

@@ -304,6 +304,34 @@ def test_what_is_not_there_is_said(server: Server) -> None:
         assert request(server, method, path, body)[0] == 404
 
 
+@pytest.mark.parametrize("path", ["/", "/api/files", "/other", "/api/jobs/1"])
+def test_head_is_get_without_its_content(server: Server, path: str) -> None:
+    def fixed(headers: http.client.HTTPMessage) -> dict[str, str]:
+        # The page has another nonce each time.
+        changing = {"Date", "Content-Security-Policy"}
+        return {name: value for name, value in headers.items() if name not in changing}
+
+    expected, data, headers = request(server, "GET", path)
+    status, nothing, told = request(server, "HEAD", path)
+    assert (status, nothing) == (expected, b"")
+    assert fixed(told) == fixed(headers)
+    assert int(told["Content-Length"]) == len(data) > 0
+
+
+def test_head_needs_the_token_too(server: Server) -> None:
+    status, data, _ = request(server, "HEAD", "/", headers={"X-Ntagen-Token": "other"})
+    assert (status, data) == (403, b"")
+
+
+def test_a_connection_goes_on_after_head(server: Server) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    with contextlib.closing(connection):
+        for method in ("HEAD", "GET"):
+            connection.request(method, "/", headers={"X-Ntagen-Token": server.token})
+            answer = connection.getresponse()
+            assert (answer.status, bool(answer.read())) == (200, method == "GET")
+
+
 def test_a_request_without_a_length_is_refused(server: Server) -> None:
     with socket.create_connection(("127.0.0.1", server.port), 10) as connection:
         connection.sendall(
