@@ -392,9 +392,11 @@ def _with_severity(rejection: str) -> str:
 
 def _criteria(text: str | None) -> tuple[str, ...]:
     """The ranking on the command line; empty without one."""
+    if text is None:
+        return ()
     from ntagen.plan.rank import parse_ranking
 
-    return () if text is None else parse_ranking(text)
+    return parse_ranking(text)
 
 
 def _say_idle_options(queries: Sequence[QueryForm], *, is_environment: bool) -> None:

@@ -84,9 +84,9 @@ def is_defence(task: Task | None, query: Asked) -> bool:
 
 def for_task(options: Options, task: Task | None, query: Asked) -> dict[str, Any]:
     """Options of an environment's game: a guide; if the tissue answers, no list of plans."""
-    from ntagen.plan.synthesise import GUIDE
-
     if task is None or not seeks_target(query):
         return {}
+    from ntagen.plan.synthesise import GUIDE
+
     guided = {"guide": options.guide or GUIDE}
     return guided | {"plans": "none"} if is_defence(task, query) else guided

@@ -127,6 +127,21 @@ def test_a_first_plan_waits_for_no_library(words: list[str]) -> None:
     assert run.stdout.splitlines()[-1] == "set()"
 
 
+@pytest.mark.parametrize(
+    "options", [[], ["--verify", "--trace", "-"], ["--threads", "2", "--json"]]
+)
+def test_a_check_of_a_model_imports_nothing_about_needles(options: list[str]) -> None:
+    model = ROOT / "examples" / "models" / "four_states.xta"
+    rooms = ("drive", "motion", "needle", "nsl", "plan", "render", "rules", "scene", "shapes")
+    script = (
+        f"import sys; from ntagen.cli import main; main({['check', str(model), *options]!r});"
+        f"print([m for m in sys.modules for room in {rooms!r} if f'{{m}}.'.startswith("
+        "f'ntagen.{room}.')])"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.splitlines()[-1] == "[]"
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_disk_behind_the_output_is_one_message() -> None:
     with Path("/dev/full").open("w") as full:
