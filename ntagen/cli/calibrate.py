@@ -122,8 +122,12 @@ def command(
     from ntagen.tracking.transform_file import to_json
 
     files = [tracker_points] if scene_points is None else [tracker_points, scene_points]
-    pairs = _pairs(files, frames, (source, target), by_order)
-    fit = register(pairs)
+    try:
+        fit = register(_pairs(files, frames, (source, target), by_order))
+    except InputError as error:
+        if any(str(file) in str(error) for file in files):
+            raise
+        raise InputError(f"{' and '.join(map(str, files))}: {error}") from error
     errors = _errors(fit, places, environment)
     document = to_json(fit)
     if output is not None:

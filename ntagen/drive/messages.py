@@ -47,6 +47,12 @@ KINDS: Final[tuple[type[Record], ...]] = (
 """All kinds of records, in the order of the file of descriptors."""
 
 _FIELDS: Final = {kind: tuple(f.name for f in dataclasses.fields(kind)) for kind in KINDS}
+_SOMETIMES: Final = frozenset({"heading", "bevel"})
+"""These directions are empty if they were not measured."""
+
+_LARGEST: Final = 1e12
+"""No time, length, angle or force of a run is larger, in units of the log."""
+
 _FIELD: Final = descriptor_pb2.FieldDescriptorProto
 _SCALARS: Final = {
     float: _FIELD.TYPE_DOUBLE,
@@ -54,6 +60,23 @@ _SCALARS: Final = {
     str: _FIELD.TYPE_STRING,
     bool: _FIELD.TYPE_BOOL,
 }
+
+
+def _lengths(kind: type[Record]) -> dict[str, frozenset[int] | None]:
+    """By field, how many numbers it may have; None for a number, a text, and any length."""
+    found: dict[str, frozenset[int] | None] = {}
+    for name, hint in get_type_hints(kind).items():
+        if name not in _FIELDS[kind]:
+            continue
+        arguments = get_args(hint)
+        if arguments and Ellipsis not in arguments:
+            found[name] = frozenset({len(arguments)})
+        else:
+            found[name] = frozenset({0, 3}) if arguments and name in _SOMETIMES else None
+    return found
+
+
+_LENGTHS: Final = {kind: _lengths(kind) for kind in KINDS}
 
 
 def message_class(kind: type[Record]) -> type[Message]:
@@ -80,14 +103,21 @@ def decode(name: str, data: bytes) -> tuple[int, Record]:
     Raises:
         KeyError: No kind of record has this name.
         google.protobuf.message.DecodeError: The data is not a message of this type.
+        ValueError: A number is none or much too large, or a vector has another length.
     """
     kind = {f"{PACKAGE}.{kind.__name__}": kind for kind in KINDS}[name]
     message: Any = message_class(kind)()
     message.ParseFromString(data)
     values: dict[str, Any] = {}
-    for field in _FIELDS[kind]:
+    for field, lengths in _LENGTHS[kind].items():
         value = getattr(message, field)
-        values[field] = value if isinstance(value, float | int | str) else tuple(value)
+        is_vector = not isinstance(value, float | int | str)
+        values[field] = tuple(value) if is_vector else value
+        numbers = values[field] if is_vector else (value,)
+        if not all(abs(one) <= _LARGEST for one in numbers if isinstance(one, float)):
+            raise ValueError(f"{field} has a number that cannot be right")
+        if lengths is not None and len(numbers) not in lengths:
+            raise ValueError(f"{field} has {len(numbers)} numbers")
     return int(getattr(message, SEQUENCE)), kind(**values)
 
 

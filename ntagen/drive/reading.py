@@ -4,16 +4,16 @@ The file is read from front to back, without its index: a writer that was killed
 All data before the cut is good; data after the cut was never acknowledged.
 
 Anybody may have written a log. Compressed data is unpacked piece by piece, and never to more than a
-multiple of the file's size (`_Budget`).
+multiple of the file's size, nor to more than a limit beyond it (`_Budget`).
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
-import struct
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import IO, Any, Final, cast
 
@@ -21,13 +21,14 @@ import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Footer, McapRecord, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, Footer, Header, McapRecord, Metadata, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from ntagen.drive.following import Course
 from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, SCENE, TREE
 from ntagen.drive.messages import PACKAGE, decode
+from ntagen.drive.no_log import HEAD, Contents, no_log, nothing_attached
 from ntagen.drive.records import Record
 from ntagen.drive.scene_json import samples_in, scene_from_json
 from ntagen.drive.settings import Settings
@@ -45,13 +46,16 @@ MAX_RECORD_BYTES: Final = 64 * 2**20
 
 _SPARE_BYTES: Final = 8 * 2**20
 _LARGEST_RATIO: Final = 32
-_KEPT_BYTES: Final = 400
-"""The approximate memory of a record, besides its message."""
+_MOST_BYTES: Final = 192 * 2**20
+"""So much may be unpacked and kept besides the file's own size."""
+
+_KEPT_BYTES: Final = 800
+"""The memory of what is kept of a record of the file, besides its own bytes; real ones take less,
+also as rows."""
 
 _PIECE_BYTES: Final = 2**16
 
-_HEAD: Final = struct.Struct("<BQ")
-"""The start of a record: its kind, and the length of the rest."""
+_START_BYTES: Final = 16
 
 _LARGEST_WINDOW_BYTES: Final = 8 * 2**20
 """The largest window of compressed data; more than any common setting needs."""
@@ -66,12 +70,14 @@ class RunLog:
         metadata: The options with which the run was started.
         attachments: The attached files by name.
         torn_at_byte: The byte at which a file that is cut off becomes unreadable; None if whole.
+        path: The file, for messages.
     """
 
     records: tuple[Record, ...]
     metadata: dict[str, str]
     attachments: dict[str, bytes]
     torn_at_byte: int | None
+    path: Path = field(compare=False)
 
     @property
     def scene(self) -> Scene:
@@ -96,9 +102,10 @@ class RunLog:
         """
         try:
             document = json.loads(self.metadata["settings"])
-        except (KeyError, ValueError) as error:
-            raise InputError("the log has no settings of a run") from error
-        return Settings.from_json(document)
+        except (KeyError, ValueError, RecursionError) as error:
+            raise InputError(f"{self.path}: the log has no settings of a run") from error
+        with self.naming():
+            return Settings.from_json(document)
 
     @property
     def course(self) -> Course | None:
@@ -113,7 +120,9 @@ class RunLog:
         try:
             return course_from_log(self.metadata[COURSE], tree)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
-            raise InputError(f"the strategy of the run cannot be read: {error!r}") from error
+            raise InputError(
+                f"{self.path}: the strategy of the run cannot be read: {error!r}"
+            ) from error
 
     def scene_of(self, number: int) -> Scene:
         """The scene of a synthesis.
@@ -142,11 +151,21 @@ class RunLog:
         """
         return frame_of(self.rows(), "`rows` has the records")
 
+    @contextlib.contextmanager
+    def naming(self) -> Iterator[None]:
+        """Lets an error about what the log has begin with the name of the log."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from error
+
     def _scene(self, name: str) -> Scene:
         if name not in self.attachments:
-            raise InputError("the log has no scene\nhint: it was cut off before the run began")
+            is_torn = self.torn_at_byte is not None
+            raise nothing_attached(self.path, name, self.attachments, is_torn=is_torn)
         known = samples_in(self.attachments[SCENE]) if SCENE in self.attachments else {}
-        return scene_from_json(self.attachments[name], known)
+        with self.naming():
+            return scene_from_json(self.attachments[name], known)
 
 
 def _flat(fields: dict[str, Any]) -> dict[str, Any]:
@@ -181,10 +200,8 @@ def read_log(path: str | Path) -> RunLog:
         file.seek(0)
         collected = _Collected()
         torn_at_byte = _read(file, collected, _Budget(path, file_bytes))
-    if METADATA not in collected.metadata:
-        raise InputError(
-            f"{path}: not the log of a run\nhint: give a file that `ntagen drive --log` wrote"
-        )
+        if METADATA not in collected.metadata:
+            raise _no_log(path, file, collected, torn_at_byte)
     metadata = collected.metadata[METADATA]
     if metadata.get("format_version") != str(FORMAT_VERSION):
         raise InputError(
@@ -192,7 +209,17 @@ def read_log(path: str | Path) -> RunLog:
             f"reads only version {FORMAT_VERSION}"
         )
     records = tuple(record for _, record in sorted(collected.records, key=lambda item: item[0]))
-    return RunLog(records, metadata, collected.attachments, torn_at_byte)
+    return RunLog(records, metadata, collected.attachments, torn_at_byte, path)
+
+
+def _no_log(path: Path, file: IO[bytes], collected: _Collected, torn: int | None) -> InputError:
+    """The error about a file without the metadata of a run."""
+    file.seek(0)
+    start = file.read(_START_BYTES)
+    file.seek(torn or 0)
+    at = None if torn is None else file.read(HEAD.size)
+    contents = replace(collected.contents, records=len(collected.records))
+    return no_log(path, start, contents, at, torn or 0)
 
 
 class _Collected:
@@ -202,24 +229,32 @@ class _Collected:
         self.records: list[tuple[int, Record]] = []
         self.metadata: dict[str, dict[str, str]] = {}
         self.attachments: dict[str, bytes] = {}
+        self.contents = Contents()
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, str] = {}
 
-    def add(self, item: McapRecord) -> None:
-        """Takes one record of the file."""
+    def add(self, item: McapRecord) -> bool:
+        """Takes one record of the file; returns whether anything of it is kept."""
         match item:
+            case Header():
+                self.contents.profile = item.profile
             case Schema():
                 self._schemas[item.id] = item.name
             case Channel():
                 self._channels[item.id] = self._schemas.get(item.schema_id, "")
+                self.contents.topics[item.topic] = item.message_encoding
             case Metadata():
                 self.metadata[item.name] = dict(item.metadata)
             case Attachment():
                 self.attachments[item.name] = item.data
             case McapMessage():
                 name = self._channels.get(item.channel_id, "")
-                if name.startswith(f"{PACKAGE}."):
-                    self.records.append(decode(name, item.data))
+                if not name.startswith(f"{PACKAGE}."):
+                    return False
+                self.records.append(decode(name, item.data))
+            case _:
+                return False
+        return True
 
 
 def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None:
@@ -232,7 +267,8 @@ def _read(file: IO[bytes], collected: _Collected, budget: _Budget) -> int | None
         try:
             item = next(items)
             for one in _unpacked(item, budget) if isinstance(item, Chunk) else (item,):
-                collected.add(one)
+                if collected.add(one):
+                    budget.take(_KEPT_BYTES)
         except StopIteration:
             return good_byte
         except (InputError, MemoryError):
@@ -270,7 +306,8 @@ class _Budget:
     def __init__(self, path: Path, file_bytes: int) -> None:
         self._path = path
         self.file_bytes = file_bytes
-        self._all = self._left = _SPARE_BYTES + _LARGEST_RATIO * file_bytes
+        ratio_bytes = _SPARE_BYTES + _LARGEST_RATIO * file_bytes
+        self._all = self._left = min(ratio_bytes, file_bytes + _MOST_BYTES)
 
     def take(self, count: int) -> None:
         """Takes bytes from the budget.
@@ -282,7 +319,7 @@ class _Budget:
         if self._left < 0:
             raise InputError(
                 f"{self._path}: not the log of a run: it unpacks to more than "
-                f"{self._all // 2**20:,} MiB"
+                f"{self._all // 2**20:,} MiB, or has too many records"
             )
 
 
@@ -327,15 +364,14 @@ def _unpacked(chunk: Chunk, budget: _Budget) -> Iterator[McapRecord]:
     """
     unpacking = _Unpacking(chunk, budget)
     stream = ReadDataStream(cast("io.BytesIO", unpacking))
-    while head := unpacking.read(_HEAD.size):
-        opcode, length = _HEAD.unpack(head)
+    while head := unpacking.read(HEAD.size):
+        opcode, length = HEAD.unpack(head)
         match opcode:
             case Opcode.SCHEMA:
                 yield Schema.read(stream)
             case Opcode.CHANNEL:
                 yield Channel.read(stream)
             case Opcode.MESSAGE:
-                budget.take(_KEPT_BYTES)
                 yield McapMessage.read(stream, length)
             case _:
                 stream.read(length)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -34,6 +35,7 @@ from ntagen.scene import Needle, Scene, Vector
 
 _SPACING_MM: Final = 0.5
 _LONGEST: Final = 200
+_SCENE_OF: Final = re.compile(r"rebuild-(\d{4,9})/scene\.json", re.ASCII)
 
 
 def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> Picture:
@@ -163,9 +165,9 @@ def _followed(log: RunLog, shown: int) -> tuple[Curve, list[Curve]] | None:
 
 def _last_scene(log: RunLog) -> Scene:
     """The scene that the driver knew at the last synthesis."""
-    names = (name for name in log.attachments if name.endswith("/scene.json"))
-    numbers = sorted(int(name.removeprefix("rebuild-").partition("/")[0]) for name in names)
-    return log.scene_of(numbers[-1]) if numbers else log.scene
+    found = map(_SCENE_OF.fullmatch, log.attachments)
+    numbers = [int(one[1]) for one in found if one]
+    return log.scene_of(max(numbers)) if numbers else log.scene
 
 
 def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
@@ -175,12 +177,22 @@ def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
         folder = f"rebuild-{number:04d}"
         if f"{folder}/plans.json" in log.attachments:
             scene = log.scene_of(number)
-            try:
-                items = json.loads(log.attachments[f"{folder}/plans.json"])["plans"][:shown]
-                return [plan_from_json(item["actions"]) for item in items], scene.needle
-            except (KeyError, TypeError, ValueError) as error:
-                raise InputError(f"the plans of the run cannot be read: {error!r}") from error
+            with log.naming():
+                return _plans_in(log.attachments[f"{folder}/plans.json"], shown), scene.needle
     return [], log.scene.needle
+
+
+def _plans_in(data: bytes, shown: int) -> list[Plan]:
+    """The first plans of an attachment.
+
+    Raises:
+        InputError: It has none.
+    """
+    try:
+        items = json.loads(data)["plans"][:shown]
+        return [plan_from_json(item["actions"]) for item in items]
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"the plans of the run cannot be read: {error!r}") from error
 
 
 def _split(points: list[Vector]) -> list[Curve]:

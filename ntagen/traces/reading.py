@@ -24,11 +24,13 @@ import numpy as np
 from ntagen.errors import InputError
 from ntagen.files import open_file
 from ntagen.traces.trace import Samples
-from ntagen.tracking.tables import Row, Table, read_table
+from ntagen.tracking.tables import Row, Table, read_table, shown
 from ntagen.units import MM_PER
 
 _LARGEST_LOG_BYTES: Final = 2**33
-_MCAP_MAGIC: Final = b"\x89MCAP"
+_RECORDINGS: Final = (b"\x89MCAP", b"SQLite format 3\0", b"#ROSBAG")
+"""What logs and bags begin with: of a bag, the reader of logs says what it is."""
+
 _AXIS: Final = re.compile(
     r"(?:(?P<group>.*\S)[ _.\-/]+)?T?(?P<axis>[xyz])"
     r"(?:[ _,]*[(\[]?(?P<unit>um|µm|μm|mm|cm|m)[)\]]?)?",
@@ -80,7 +82,7 @@ def _is_log(path: Path) -> bool:
     if not path.is_file():
         return False
     with open_file(path, _LARGEST_LOG_BYTES) as file:
-        return file.read(len(_MCAP_MAGIC)) == _MCAP_MAGIC
+        return file.read(max(map(len, _RECORDINGS))).startswith(_RECORDINGS)
 
 
 def _samples_of_run(path: Path) -> Samples:
@@ -116,14 +118,14 @@ def _value(table: Table, row: Row, index: int) -> float:
     number = table.number(row, index)
     if math.isfinite(number):
         return number
-    column = f"`{table.head.cells[index]}`" if table.head else f"column {index + 1}"
+    column = f"`{shown(table.head.cells[index])}`" if table.head else f"column {index + 1}"
     if all(not math.isfinite(table.number(one, index)) for one in table.rows):
         raise InputError(
-            f"{row.place}: {column} is '{row.cells[index]}', and it has no numbers at all\n"
+            f"{row.place}: {column} is '{shown(row.cells[index])}', and it has no numbers at all\n"
             "hint: say which columns are x, y and z, as in --columns 2,3,4"
         )
     raise InputError(
-        f"{row.place}: {column} is '{row.cells[index]}', which is not a number\n"
+        f"{row.place}: {column} is '{shown(row.cells[index])}', which is not a number\n"
         "hint: leave the cell empty if the position is missing"
     )
 
@@ -238,7 +240,7 @@ def _named(table: Table, names: list[str], columns: Columns) -> Axes:
         told = [_group_name(names[triples[group][0]]) or "x" for group in groups]
         likely = next((name for name in told if "tip" in name.lower()), told[0])
         raise InputError(
-            f"{_place(table)}: there are several positions: {', '.join(told)}\n"
+            f"{_place(table)}: there are several positions: {', '.join(map(shown, told))}\n"
             f"hint: say which one is the tip's, as in --columns '{likely}'"
         )
     return _with_units(table, names, triples[groups[0]], columns)
@@ -258,7 +260,7 @@ def _triples(table: Table, names: Sequence[str]) -> dict[str, list[int]]:
             axis = match["axis"].lower()
             if axis in axes:
                 raise InputError(
-                    f"{_place(table)}: there are two columns {name}, {axes[axis] + 1} and "
+                    f"{_place(table)}: there are two columns {shown(name)}, {axes[axis] + 1} and "
                     f"{index + 1}\nhint: give each another name, or choose by numbers, as in "
                     "--columns 2,3,4"
                 )
@@ -296,8 +298,8 @@ def _with_units(table: Table, names: list[str], indices: list[int], columns: Col
         unit = "um" if unit in ("µm", "μm") else unit
         if unit not in MM_PER:
             raise InputError(
-                f"{_place(table)}: the unit of `{names[index]}` is '{unit}', which is no length "
-                f"that is known\nhint: the units are {', '.join(MM_PER)}"
+                f"{_place(table)}: the unit of `{shown(names[index])}` is '{unit}', which is no "
+                f"length that is known\nhint: the units are {', '.join(MM_PER)}"
             )
         axes.append((index, MM_PER[unit]))
     return axes
@@ -309,7 +311,7 @@ def _place(table: Table) -> str:
 
 def _not_found(table: Table, wanted: str) -> InputError:
     head = table.head.cells if table.head else []
-    names = ", ".join(head[:_NAMES_SHOWN])
+    names = ", ".join(map(shown, head[:_NAMES_SHOWN]))
     more = f", … ({len(head)} in all)" if len(head) > _NAMES_SHOWN else ""
     return InputError(
         f"{_place(table)}: there are no columns {wanted}; there are {names}{more}\n"

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ntagen.errors import InputError
 from ntagen.traces.chain import Array
+from ntagen.tracking.tables import require_near
 
 CHORD_MM: Final = 1.0
 """Points of a thinned trace are at least so far apart."""
@@ -279,6 +280,8 @@ def _require_numbers(samples: Samples) -> None:
             f"{samples.place(int(wrong[0]))}: this position is not finite\n"
             "hint: leave the sample out, or write 0, 0, 0 for a missing one"
         )
+    farthest = int(np.argmax(np.abs(points).max(axis=1)))
+    require_near(points[farthest].tolist(), samples.place(farthest))
 
 
 def _require_insertion(trace: Trace) -> None:

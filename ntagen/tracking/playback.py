@@ -22,7 +22,7 @@ from ntagen.needle.vectors import dot, unit
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
 from ntagen.tracking.points import axis_columns
-from ntagen.tracking.tables import Row, Table, read_table
+from ntagen.tracking.tables import Row, Table, read_table, require_near, shown
 
 HOLD_S: Final = 5.0
 """Within the recording, a sample counts for so long; the samples of a run are as far apart as its
@@ -104,9 +104,10 @@ def samples_of_log(path: Path) -> list[Measurement]:
     """The measurements of a run that `ntagen drive --log` wrote.
 
     Raises:
-        InputError: The file is not such a log.
+        InputError: The file is not such a log, or has no measurements.
     """
-    return [
+    log = read_log(path)
+    found = [
         Measurement(
             record.time_s,
             record.position_mm,
@@ -114,9 +115,13 @@ def samples_of_log(path: Path) -> list[Measurement]:
             _optional(record.heading),
             _optional(record.bevel),
         )
-        for record in read_log(path).records
+        for record in log.records
         if isinstance(record, Measured)
     ]
+    if not found:
+        cut = "" if log.torn_at_byte is None else f": it is cut off at byte {log.torn_at_byte}"
+        raise InputError(f"{path}: there are no measurements in this log{cut}")
+    return found
 
 
 def samples_of_table(path: Path, transform: Transform) -> tuple[list[Measurement], bool]:
@@ -159,6 +164,7 @@ class _Measurements:
     def of(self, row: Row) -> Measurement:
         """The measurement in a row."""
         x, y, z = (self._number(row, column) * factor for column, factor in self._axes)
+        require_near((x, y, z), row.place)
         heading, bevel = (self._direction(row, name) for name in _DIRECTIONS)
         if heading and bevel and abs(dot(heading, bevel)) > _RIGHT_ANGLE:
             raise InputError(f"{row.place}: heading and bevel are not at a right angle")
@@ -188,7 +194,7 @@ class _Measurements:
     def _number(self, row: Row, column: int) -> float:
         number = self._table.number(row, column)
         if not math.isfinite(number):
-            raise InputError(f"{row.place}: '{row.cells[column]}' is not a number")
+            raise InputError(f"{row.place}: '{shown(row.cells[column])}' is not a number")
         return number
 
 

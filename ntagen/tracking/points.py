@@ -19,7 +19,7 @@ from ntagen.errors import InputError
 from ntagen.scene import Vector
 from ntagen.tracking.frames import LPS, RAS, flipped, frame_named
 from ntagen.tracking.registration import Pairs
-from ntagen.tracking.tables import csv_rows, read_table, text_of
+from ntagen.tracking.tables import csv_rows, read_table, require_near, shown, text_of
 from ntagen.units import MM_PER
 
 _FCSV_FRAMES: Final = {"0": RAS, "1": LPS, "RAS": RAS, "LPS": LPS}
@@ -126,11 +126,15 @@ def axis_columns(path: Path, head: Sequence[str]) -> dict[str, list[tuple[int, f
             of_frame = axes.setdefault(match["frame"] or "", {})
             if match["axis"].lower() in of_frame:
                 raise InputError(
-                    f"{path}:1: there is a column {cell} before\nhint: names must differ"
+                    f"{path}:1: there is a column {shown(cell)} before\nhint: names must differ"
                 )
             of_frame[match["axis"].lower()] = (index, MM_PER[match["unit"].lower()])
     if not axes or any(set(one) != set("xyz") for one in axes.values()):
-        told = f"the columns are {', '.join(head)}" if head else "the columns have no names"
+        told = (
+            f"the columns are {', '.join(map(shown, head))}"
+            if head
+            else "the columns have no names"
+        )
         raise InputError(
             f"{path}:1: {told}\n"
             "hint: name them x_mm, y_mm, z_mm, or with frames: tracker_x_mm, …, scene_x_mm, …; "
@@ -154,8 +158,8 @@ def _fcsv(path: Path, text: str, frames: Iterator[str]) -> Points:
             told = _FCSV_FRAMES.get(found[2].upper())
             if told is None:
                 raise InputError(
-                    f"{path}:{number}: the coordinate system {found[2]} is neither RAS nor LPS\n"
-                    "hint: save the points in RAS or LPS"
+                    f"{path}:{number}: the coordinate system {shown(found[2])} is neither RAS nor "
+                    "LPS\nhint: save the points in RAS or LPS"
                 )
     names = [column.strip() for column in columns.split(",")]
     positions: dict[str, Vector] = {}
@@ -181,7 +185,7 @@ def _markups(path: Path, text: str, frames: Iterator[str]) -> Points:
         )
     told, points = lists[0].get("coordinateSystem"), lists[0].get("controlPoints")
     if told is not None and told not in (RAS, LPS):
-        raise InputError(f"{path}: the coordinate system {told} is neither RAS nor LPS")
+        raise InputError(f"{path}: the coordinate system {shown(told)} is neither RAS nor LPS")
     factor = _unit_of(path, lists[0].get("coordinateUnits", "mm"))
     positions: dict[str, Vector] = {}
     for index, point in enumerate(points if isinstance(points, list) else []):
@@ -190,9 +194,11 @@ def _markups(path: Path, text: str, frames: Iterator[str]) -> Points:
             raise InputError(f"{place} is not an object")
         label, values = point.get("label") or point.get("id"), point.get("position")
         if point.get("positionStatus", "defined") != "defined" or not isinstance(values, list):
-            raise InputError(f"{place}, {label}, has no position\nhint: place it, or delete it")
+            raise InputError(
+                f"{place}, {shown(label)}, has no position\nhint: place it, or delete it"
+            )
         if len(values) != 3:
-            raise InputError(f"{place}, {label}, has {len(values)} coordinates")
+            raise InputError(f"{place}, {shown(label)}, has {len(values)} coordinates")
         numbers = [_number(value, place, "a coordinate") for value in values]
         _add(positions, str(label or ""), _scaled(numbers, factor), place)
     return Points(_frame(path, told, frames), positions)
@@ -204,7 +210,7 @@ def _unit_of(path: Path, units: object) -> float:
     factors = {MM_PER.get(word) for word in words}
     factor = factors.pop() if len(factors) == 1 else None
     if factor is None:
-        raise InputError(f"{path}: positions in {', '.join(sorted(words))} cannot be read")
+        raise InputError(f"{path}: positions in {shown(', '.join(sorted(words)))} cannot be read")
     return factor
 
 
@@ -251,7 +257,7 @@ def _frame(path: Path, told: str | None, frames: Iterator[str]) -> str:
 def _number(value: Any, place: str, what: str) -> float:  # noqa: ANN401  from JSON or CSV
     try:
         number = float(value) if not isinstance(value, bool) else math.nan
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
         raise _no_number(place, what, value)
@@ -259,7 +265,7 @@ def _number(value: Any, place: str, what: str) -> float:  # noqa: ANN401  from J
 
 
 def _no_number(place: str, what: str, value: object) -> InputError:
-    return InputError(f"{place}: {what} is '{value}', which is not a number")
+    return InputError(f"{place}: {what} is '{shown(value)}', which is not a number")
 
 
 def _scaled(numbers: Sequence[float], factor: float) -> Vector:
@@ -271,5 +277,6 @@ def _add(positions: dict[str, Vector], name: str, position_mm: Vector, place: st
     if not name:
         raise InputError(f"{place}: this point has no name")
     if name in positions:
-        raise InputError(f"{place}: there is a point {name} before\nhint: names must differ")
+        raise InputError(f"{place}: there is a point {shown(name)} before\nhint: names must differ")
+    require_near(position_mm, place)
     positions[name] = position_mm

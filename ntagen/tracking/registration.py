@@ -39,6 +39,9 @@ _Array = npt.NDArray[np.float64]
 
 LEAST_POINTS: Final = 3
 
+MOST_POINTS: Final = 200
+"""Pairs of them are compared; nobody measures so many."""
+
 _FLAT_RATIO: Final = 0.05
 """Points are on a line, or in a plane, if they extend less than this part of the extent beyond."""
 
@@ -239,15 +242,23 @@ def _require_points(pairs: Pairs, source: _Array, target: _Array) -> None:
             f"there are {count} pairs of points, and a registration needs {LEAST_POINTS} or more\n"
             "hint: six points around the target are a good choice"
         )
+    if count > MOST_POINTS:
+        raise InputError(
+            f"there are {count} pairs of points, and {MOST_POINTS} are allowed\n"
+            "hint: six points around the target are a good choice"
+        )
     for frame, points in ((pairs.source, source), (pairs.target, target)):
         for name, point in zip(pairs.names, points, strict=True):
             if not np.all(np.isfinite(point)):
                 raise InputError(f"the point {name} has no position in the frame {frame}")
-        for i, j in itertools.combinations(range(count), 2):
-            if np.linalg.norm(points[i] - points[j]) < _same_mm(points):
+        least_mm = _same_mm(points)
+        for i in range(count - 1):
+            near = np.flatnonzero(np.linalg.norm(points[i + 1 :] - points[i], axis=1) < least_mm)
+            if len(near):
+                other = pairs.names[i + 1 + near[0]]
                 raise InputError(
-                    f"{pairs.names[i]} and {pairs.names[j]} are the same place in the frame {frame}"
-                    "\nhint: measure each point once, and leave out the others"
+                    f"{pairs.names[i]} and {other} are the same place in the frame {frame}\n"
+                    f"hint: measure each point once, and leave out the others"
                 )
 
 

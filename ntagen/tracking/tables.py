@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -21,6 +21,16 @@ from ntagen.units import MM_PER, N_PER, RAD_PER, S_PER
 
 LARGEST_BYTES: Final = 16 * 2**20
 
+FARTHEST_MM: Final = 1e6
+"""A coordinate is at most 1 km: more is a mistake in the unit or in the number."""
+
+_SHOWN: Final = 40
+
+_MOST_CELLS: Final = 4_000_000
+_CELLS_OF_A_ROW: Final = 4
+"""A row takes the memory of so many cells, besides its own."""
+
+_LINE: Final = re.compile(r"([^\r\n]*)(?:\r\n|\r|\n|(?<=[^\r\n])$)")
 _POINT: Final = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _COMMA: Final = re.compile(r"[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?", re.ASCII | re.IGNORECASE)
 _THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
@@ -40,11 +50,16 @@ _SEPARATOR_TOLD: Final = re.compile(r"sep=(.)", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A line of a table: where it is, for messages, and its cells."""
+    """A line of a table: its file, its number, and its cells."""
 
-    place: str
+    path: Path
     line: int
     cells: list[str]
+
+    @property
+    def place(self) -> str:
+        """Where it is, for messages."""
+        return f"{self.path}:{self.line}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +104,7 @@ class Table:
             return math.nan
         if self.mixed:
             raise InputError(
-                f"{row.place}: the comma in '{cell}' can be read in two ways: {self.mixed}"
+                f"{row.place}: the comma in '{shown(cell)}' can be read in two ways: {self.mixed}"
             )
         return _finite(float(cell.replace(",", ".")))
 
@@ -105,25 +120,43 @@ def read_table(path: Path, comments: str = "#") -> Table:
     Raises:
         InputError: The file cannot be read, is no such table, or is empty.
     """
-    lines = [
-        "" if line.lstrip()[:1] in comments and line.strip() else line
-        for line in text_of(path).splitlines()
-    ]
-    first = next((index for index, line in enumerate(lines) if line.strip()), None)
+    text = text_of(path)
+    first = next((line for line in _lines(text, comments) if line.strip()), None)
     if first is None:
         raise InputError(f"{path}: this file is empty")
-    told = _SEPARATOR_TOLD.fullmatch(lines[first].strip())
+    told = _SEPARATOR_TOLD.fullmatch(first.strip())
     if told:
         # A spreadsheet begins a file so.
-        lines[first] = ""
-    separator = told[1] if told else _separator(lines[first])
-    rows = list(_rows(path, lines, separator))
+        text = text.replace(told[0], "", 1)
+    separator = told[1] if told else _separator(first)
+    rows = list(_limited(path, _rows(path, _lines(text, comments), separator)))
     if not rows:
         raise InputError(f"{path}: this file is empty")
     head = None if any(map(_is_number, rows[0].cells)) else rows.pop(0)
     units = _units(head, rows)
     _require_widths(len(head.cells if head else rows[0].cells), rows, separator)
     return Table(path, head, units, rows, _mixed(rows, separator))
+
+
+def require_near(position_mm: Sequence[float], place: str) -> None:
+    """Refuses a position that cannot be that of a needle or a marker.
+
+    Raises:
+        InputError: It is so.
+    """
+    largest_mm = max(map(abs, position_mm))
+    if largest_mm > FARTHEST_MM:
+        raise InputError(
+            f"{place}: the position is {largest_mm:.3g} mm away, and {FARTHEST_MM:g} mm is "
+            "allowed\n"
+            "hint: is the unit right, and is the number whole?"
+        )
+
+
+def shown(text: object) -> str:
+    """A text of a file for a message; a long one is cut off."""
+    words = str(text)
+    return words if len(words) <= _SHOWN else f"{words[:_SHOWN]}…"
 
 
 def unit_of(name: str) -> str:
@@ -133,22 +166,19 @@ def unit_of(name: str) -> str:
     return unit if _plain(unit) in _UNITS else ""
 
 
-def csv_rows(path: Path, lines: Iterable[str], separator: str) -> list[Row]:
+def csv_rows(path: Path, lines: Iterable[str], separator: str) -> Iterator[Row]:
     """The lines of a table with separators between its cells; empty ones are left out.
 
     Raises:
         InputError: It is no such table.
     """
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
-    rows = []
     try:
         for cells in reader:
-            line = reader.line_num
             if len(cells) > 1 or any(map(str.strip, cells)):
-                rows.append(Row(f"{path}:{line}", line, [cell.strip() for cell in cells]))
+                yield Row(path, reader.line_num, [cell.strip() for cell in cells])
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}: this is no CSV: {error}") from None
-    return rows
 
 
 def text_of(path: Path) -> str:
@@ -178,14 +208,37 @@ def _separator(line: str) -> str | None:
     return "," if "," in outside else None
 
 
-def _rows(path: Path, lines: list[str], separator: str | None) -> Iterable[Row]:
+def _lines(text: str, comments: str) -> Iterator[str]:
+    """The lines of a text, one after the other; comments are empty. It makes no list of them."""
+    for found in _LINE.finditer(text):
+        line = found[1]
+        yield "" if line.lstrip()[:1] in comments and line.strip() else line
+
+
+def _rows(path: Path, lines: Iterable[str], separator: str | None) -> Iterator[Row]:
     if separator is not None:
-        return csv_rows(path, lines, separator)
-    return [
-        Row(f"{path}:{line}", line, [cell.strip('"') for cell in text.split()])
-        for line, text in enumerate(lines, start=1)
-        if text.strip()
-    ]
+        yield from csv_rows(path, lines, separator)
+        return
+    for line, text in enumerate(lines, start=1):
+        if text.strip():
+            yield Row(path, line, [cell.strip('"') for cell in text.split()])
+
+
+def _limited(path: Path, rows: Iterable[Row]) -> Iterator[Row]:
+    """The rows, as long as they do not take too much memory.
+
+    Raises:
+        InputError: They do.
+    """
+    left = _MOST_CELLS
+    for row in rows:
+        left -= len(row.cells) + _CELLS_OF_A_ROW
+        if left < 0:
+            raise InputError(
+                f"{row.place}: this table is too large: {row.line:,} lines with "
+                f"{len(row.cells):,} columns and more\nhint: give a part of it"
+            )
+        yield row
 
 
 def _require_widths(width: int, rows: list[Row], separator: str | None) -> None:
@@ -245,7 +298,7 @@ def _units(head: Row | None, rows: list[Row]) -> list[str]:
         told = _plain(unit_of(name))
         if told and unit and told != unit:
             raise InputError(
-                f"{row.place}: the unit of `{name}` is '{unit}' here\n"
+                f"{row.place}: the unit of `{shown(name)}` is '{unit}' here\n"
                 "hint: let the name of the column and the line of units tell the same unit"
             )
     return units
@@ -268,7 +321,7 @@ def _mixed(rows: list[Row], separator: str | None) -> str:
         for cell in row.cells:
             if "." in cell and _POINT.fullmatch(cell):
                 return (
-                    f"'{cell}' in line {row.line} has a decimal point\n"
+                    f"'{shown(cell)}' in line {row.line} has a decimal point\n"
                     "hint: write all numbers with the same decimal mark, and none between thousands"
                 )
     if separator == "," and all(map(_THOUSANDS.fullmatch, commas)):

@@ -61,7 +61,7 @@ def read_transform(path: Path) -> Transform:
         )
     except OSError as error:
         raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(
             f"{path}: this is not a registration: {error}\n"
             "hint: make one with `ntagen calibrate POINTS -o FILE`"

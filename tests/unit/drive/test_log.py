@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Message, Metadata, Schema
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
@@ -43,12 +43,13 @@ from ntagen.drive.viewing import quaternion
 from ntagen.errors import InputError
 from ntagen.needle.kinematics import bending_axis
 from ntagen.scene import MEASURED_TISSUE, Pose, Scene
+from ntagen.traces.reading import read_samples
 from tests.scenes import poses
 from tests.steering import PAPER, scene
 
 ROOT = Path(__file__).parents[3]
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-1e12, 1e12)
 
 SCALARS = {
     float: numbers,
@@ -218,6 +219,21 @@ def test_a_torn_log_gives_all_before_the_tear(tmp_path: Path, share: float) -> N
     assert 0 < log.torn_at_byte <= len(data) * share
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        Predicted(1.0, (math.nan, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.0),
+        Predicted(1.0, (1e300, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), 0.0),
+        Command(math.inf, "push", 1.0),
+        Measured(1.0, 2.0, (1.0, 2.0), 0.0, (), ()),  # type: ignore[arg-type]
+        Measured(1.0, 2.0, (1.0, 2.0, 3.0), 0.0, (1.0,), ()),
+    ],
+)
+def test_a_record_that_cannot_be_right_is_none(wrong: Record) -> None:
+    with pytest.raises(ValueError, match=r"numbers|cannot be right"):
+        decode(f"ntagen.{type(wrong).__name__}", encode(wrong, 1))
+
+
 def test_a_wrong_length_in_a_chunk_is_a_tear(tmp_path: Path) -> None:
     data = bytearray(written(tmp_path / "run.mcap").read_bytes())
     chunk = RecordBuilder()
@@ -239,6 +255,92 @@ def test_what_is_no_log_is_refused(tmp_path: Path, data: bytes) -> None:
     path.write_bytes(data)
     with pytest.raises(InputError, match="not the log of a run"):
         read_log(path)
+
+
+def check_is_no_log(path: Path, *says: str) -> None:
+    with pytest.raises(InputError, match="not the log of a run") as refusal:
+        read_log(path)
+    text = str(refusal.value)
+    assert text.startswith(f"{path}: ")
+    assert "hint:" in text
+    assert all(words in text for words in says), text
+
+
+def test_a_packed_log_that_is_cut_off_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with path.open("wb") as out:
+        writer = Writer(out, chunk_size=1 << 24, compression=CompressionType.ZSTD)
+        writer.start()
+        schema = writer.register_schema("ntagen.Command", "protobuf", b"")
+        channel = writer.register_channel("/ntagen/command", "protobuf", schema)
+        for number in range(1000):
+            data = encode(Command(number * 1.7, "push", number**0.5), number)
+            writer.add_message(channel, number, data, number)
+        writer.finish()
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 3])
+    start = data.index(bytes([Opcode.CHUNK]), 20)
+    check_is_no_log(path, f"cut off at byte {start}", "within its first chunk of packed data")
+
+
+def test_a_log_whose_metadata_were_filtered_out_is_told(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.mcap")
+    kinds = {Opcode.METADATA, Opcode.ATTACHMENT, Opcode.METADATA_INDEX, Opcode.ATTACHMENT_INDEX}
+    path.write_bytes(without(path.read_bytes(), kinds))
+    count = len((*MANY, ALARM))
+    check_is_no_log(path, f"it has {count} records of a run", "the metadata `ntagen`", "filter")
+
+
+def test_a_log_without_attachments_says_which_one_is_missing(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.mcap")
+    path.write_bytes(without(path.read_bytes(), {Opcode.ATTACHMENT, Opcode.ATTACHMENT_INDEX}))
+    log = read_log(path)
+    assert log.records == (*MANY, ALARM)
+    with pytest.raises(InputError, match=r"the attachment scene\.json is missing") as refusal:
+        _ = log.scene
+    assert str(path) in str(refusal.value)
+    assert "leave out metadata and attachments" in str(refusal.value)
+
+
+def test_a_log_without_measurements_says_where_it_is_cut_off(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.mcap")
+    data = path.read_bytes()
+    # Behind the metadata, which say that it is a log.
+    end = 17 + int.from_bytes(data[9:17], "little")
+    end += 9 + int.from_bytes(data[end + 1 : end + 9], "little")
+    path.write_bytes(data[: end + 20])
+    with pytest.raises(InputError, match="no measurements in this log: it is cut off at byte"):
+        read_samples(path)
+
+
+def without(data: bytes, kinds: set[Opcode]) -> bytes:
+    """A file without the records of some kinds, and without its end."""
+    kept, start = bytearray(data[:8]), 8
+    while start + 9 <= len(data) and data[start] != Opcode.DATA_END:
+        end = start + 9 + int.from_bytes(data[start + 1 : start + 9], "little")
+        if data[start] not in kinds:
+            kept += data[start:end]
+        start = end
+    footer = RecordBuilder()
+    Footer(0, 0, 0).write(footer)
+    return bytes(kept + footer.end() + data[:8])
+
+
+def test_a_bag_of_ros_is_told_with_its_topics(tmp_path: Path) -> None:
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as out:
+        writer = Writer(out)
+        writer.start(profile="ros2", library="rosbag2")
+        schema = writer.register_schema("geometry_msgs/msg/PoseStamped", "ros2msg", b"")
+        for topic in ("/sensor/tip", "/sensor/base"):
+            writer.add_message(writer.register_channel(topic, "cdr", schema), 0, bytes(64), 0)
+        writer.finish()
+    check_is_no_log(path, "a bag of ROS", "/sensor/tip, /sensor/base", "`ntagen match`")
+    for start, says in ((b"SQLite format 3\0", "bags of ROS 2"), (b"#ROSBAG V2.0\n", "ROS 1")):
+        path.write_bytes(start + bytes(100))
+        check_is_no_log(path, says, "`ntagen match`")
+        with pytest.raises(InputError, match=says):
+            read_samples(path.rename(tmp_path / "bag.db3"))
 
 
 def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:

@@ -142,6 +142,19 @@ def test_a_number_that_is_not_finite_is_refused_with_its_place(wrong: float) -> 
     check_refused(points, "row 7", "not finite")
 
 
+def test_a_position_that_is_too_far_is_refused_with_its_place() -> None:
+    points = line(50.0)
+    points[6, 1] = 1e30
+    check_refused(points, "row 7", "1e+30 mm away", "hint:")
+
+
+def test_a_hint_about_a_trace_that_turns_back_leaves_enough_of_it() -> None:
+    forth = line(6.0)
+    with pytest.raises(InputError, match="turns back") as refusal:
+        trace_of(samples_of(np.vstack([forth, forth[::-1], line(40.0)])))
+    assert "--until" not in str(refusal.value)
+
+
 def test_a_trace_that_turns_back_is_refused_with_its_place() -> None:
     forth = line(30.0)
     check_refused(np.vstack([forth, forth[::-1]]), "row 61", "turns back", "30.0 mm", "--until 30")

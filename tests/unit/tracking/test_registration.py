@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from ntagen.errors import InputError
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, LPS, RAS, Transform
-from ntagen.tracking.registration import Fit, Pairs, register
+from ntagen.tracking.registration import LEAST_POINTS, Fit, Pairs, register
 
 Array = npt.NDArray[np.float64]
 
@@ -210,3 +211,19 @@ def test_other_frames_are_not_guessed() -> None:
     assert IDENTITY.between("scene", "scene") == IDENTITY
     with pytest.raises(InputError, match="nothing says how RAS lies in it"):
         IDENTITY.between("scene", RAS)
+
+
+def test_more_points_than_anybody_measures_are_refused() -> None:
+    many = np.random.default_rng(1).uniform(-1e3, 1e3, (201, 3))
+    with pytest.raises(InputError, match="201 pairs of points, and 200 are allowed"):
+        register(pairs(many, moved(many)))
+
+
+def test_the_pages_and_the_program_advise_the_same_number_of_points() -> None:
+    docs = Path(__file__).parents[3] / "docs"
+    for page in ("tracking.md", "tutorials/hardware.md"):
+        assert "six points or more" in (docs / page).read_text("utf-8"), page
+    assert "Three are the least" in (docs / "tracking.md").read_text("utf-8")
+    assert LEAST_POINTS == 3
+    with pytest.raises(InputError, match="six points around the target"):
+        register(pairs(CUBE[:2], CUBE[:2]))
