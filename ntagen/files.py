@@ -24,7 +24,7 @@ import re
 import stat
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import IO, BinaryIO, Final, Literal
+from typing import IO, Any, BinaryIO, Final, Literal
 
 from ntagen import system
 from ntagen.errors import InputError
@@ -35,6 +35,9 @@ MODEL_BYTES: Final = 256 * 2**20
 
 EVIDENCE_BYTES: Final = 2 * 2**30
 """The largest trace, certificate or strategy."""
+
+MOST_VALUES: Final = 1_000_000
+"""The most values in a text in JSON; a scene of a thousand regions has 20,000."""
 
 _LINKS_FOLLOWED: Final = 40
 _PIECE_BYTES: Final = 2**20
@@ -209,6 +212,26 @@ def read_file(path: str | Path, limit_bytes: int) -> bytes:
     for piece in read_pieces(path, limit_bytes):
         whole.write(piece)
     return whole.getvalue()
+
+
+def json_of(text: str | bytes) -> Any:  # noqa: ANN401  any document
+    """The value of a text in JSON that anybody may have written.
+
+    Seven bytes of JSON can take 240 bytes of memory, so the number of values is limited.
+
+    Raises:
+        ValueError: It is no JSON, or has more than `MOST_VALUES` values.
+        RecursionError: It is nested too deeply.
+    """
+    import json
+
+    if isinstance(text, str):
+        count = text.count(",") + text.count("[") + text.count("{")
+    else:
+        count = text.count(b",") + text.count(b"[") + text.count(b"{")
+    if count > MOST_VALUES:
+        raise ValueError(f"it has more than {MOST_VALUES:,} values")
+    return json.loads(text)
 
 
 def read_pieces(path: str | Path, limit_bytes: int) -> Iterator[bytes]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -34,7 +33,7 @@ from ntagen.drive.scene_json import samples_in, scene_from_json
 from ntagen.drive.settings import Settings
 from ntagen.drive.trees import COURSE, course_from_log
 from ntagen.errors import InputError
-from ntagen.files import open_file
+from ntagen.files import json_of, open_file
 from ntagen.frames import frame_of
 from ntagen.scene import Scene
 
@@ -101,7 +100,7 @@ class RunLog:
             InputError: The log has none.
         """
         try:
-            document = json.loads(self.metadata["settings"])
+            document = json_of(self.metadata["settings"])
         except (KeyError, ValueError, RecursionError) as error:
             raise InputError(f"{self.path}: the log has no settings of a run") from error
         with self.naming():

@@ -13,6 +13,7 @@ from typing import Any, Final, cast
 
 from ntagen.drive.json_values import value_from_json
 from ntagen.errors import InputError
+from ntagen.files import json_of
 from ntagen.imaging.store import digest_of, from_entry, to_entry
 from ntagen.motion import Motion
 from ntagen.scene import Region, Scene, Tissue
@@ -70,7 +71,7 @@ def _entries(value: Any) -> dict[str, Any]:  # noqa: ANN401  any dataclass
 def samples_in(text: str | bytes) -> dict[str, str]:
     """The samples in such a text by their digests; none if it is not one."""
     try:
-        found = json.loads(text).get("samples", {})
+        found = json_of(text).get("samples", {})
     except (AttributeError, ValueError, RecursionError):
         return {}
     return dict(found) if isinstance(found, dict) else {}
@@ -87,7 +88,7 @@ def scene_from_json(text: str | bytes, known: Mapping[str, str] | None = None) -
         InputError: The text is not a scene, or the scene breaks the rules.
     """
     try:
-        document = json.loads(text)
+        document = json_of(text)
         if document["version"] != VERSION:
             raise InputError(
                 f"the scene of the run has version {document['version']!r}, but this ntagen reads "

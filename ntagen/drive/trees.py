@@ -15,7 +15,7 @@ from ntagen.drive.following import Course
 from ntagen.drive.json_values import value_from_json
 from ntagen.drive.scene_json import scene_to_json
 from ntagen.errors import InputError
-from ntagen.files import read_file
+from ntagen.files import json_of, read_file
 from ntagen.plan.against_tissue import Defence
 from ntagen.plan.closed_loop import Segment, certify_all
 from ntagen.scene import Scene
@@ -75,7 +75,7 @@ def load_tree(path: Path, scene: Scene) -> Segment:
     except OSError as error:
         raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
     try:
-        document = json.loads(text)
+        document = json_of(text)
         if document["format"] != FORMAT:
             raise InputError(f"{path} has another format: {document['format']!r}\n{_HINT}")
         if document["version"] != VERSION:
@@ -121,9 +121,9 @@ def course_from_log(text: str, tree: bytes | None) -> Course:
     Raises:
         KeyError, TypeError, ValueError: It is none.
     """
-    said = json.loads(text)
+    said = json_of(text)
     only, lack = bool(said["only_guaranteed"]), str(said["lack"])
-    return Course(None if tree is None else tree_from_json(json.loads(tree)), only, lack)
+    return Course(None if tree is None else tree_from_json(json_of(tree)), only, lack)
 
 
 def _require_lengths(segment: Segment) -> None:

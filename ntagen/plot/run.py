@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Sequence
@@ -23,6 +22,7 @@ from ntagen.drive.records import (
 )
 from ntagen.drive.story import guaranteed, tell
 from ntagen.errors import InputError
+from ntagen.files import json_of
 from ntagen.needle.path import sample_poses
 from ntagen.plan.actions import Plan
 from ntagen.plan.branches import path_of
@@ -189,7 +189,7 @@ def _plans_in(data: bytes, shown: int) -> list[Plan]:
         InputError: It has none.
     """
     try:
-        items = json.loads(data)["plans"][:shown]
+        items = json_of(data)["plans"][:shown]
         return [plan_from_json(item["actions"]) for item in items]
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the plans of the run cannot be read: {error!r}") from error

@@ -7,7 +7,6 @@ not say it is refused. Positions are returned in mm; units that a file names are
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.errors import InputError
+from ntagen.files import json_of
 from ntagen.scene import Vector
 from ntagen.tracking.frames import LPS, RAS, flipped, frame_named
 from ntagen.tracking.registration import Pairs
@@ -174,7 +174,7 @@ def _fcsv(path: Path, text: str, frames: Iterator[str]) -> Points:
 def _markups(path: Path, text: str, frames: Iterator[str]) -> Points:
     """The points of a ``.mrk.json`` file."""
     try:
-        document = json.loads(text)
+        document = json_of(text)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: this is not JSON: {error}") from None
     lists = document.get("markups") if isinstance(document, dict) else None

@@ -18,7 +18,7 @@ import pytest
 
 from ntagen.cli import main
 from ntagen.errors import InputError
-from ntagen.files import GrowingFile, open_file, read_file, require_apart, write_files
+from ntagen.files import GrowingFile, json_of, open_file, read_file, require_apart, write_files
 
 ROOT = Path(__file__).parents[2]
 PAPER = str(ROOT / "examples" / "paper.nsl")
@@ -453,3 +453,10 @@ def test_check_does_not_replace_its_model(
     assert main(["check", str(model), *QUERY, "--strategy", str(model)]) == 2
     assert "would replace the model" in capsys.readouterr().err
     assert model.read_text() == GAME
+
+
+def test_json_with_too_many_values_is_refused_before_it_is_read() -> None:
+    for text in ("[" * 1_000_001, b"[" + b'{"":0},' * 600_000 + b"0]"):
+        with pytest.raises(ValueError, match="more than 1,000,000 values"):
+            json_of(text)
+    assert json_of("[1, {}]") == json_of(b"[1, {}]") == [1, {}]
