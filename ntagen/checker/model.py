@@ -13,7 +13,7 @@ from ntagen import _checker
 from ntagen.checker.answer import Answer
 from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeEntry
-from ntagen.checker.errors import failing, rejecting
+from ntagen.checker.errors import RejectedError, failing, rejecting
 from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.options import CodeEngine, Options, by_keywords
 from ntagen.checker.queries import Query, queries_from
@@ -437,8 +437,16 @@ class Model:
         """
         from ntagen.checker.strategy import Verification
 
-        with rejecting():
-            holds, lines = self._raw.verify(path or "evidence", text, forced, priorities)
+        name = path or "evidence"
+        try:
+            with rejecting():
+                holds, lines = self._raw.verify(name, text, forced, priorities)
+        except RejectedError as error:
+            if name in str(error):
+                raise
+            # What is wrong with the query in the file is said by its place in the query.
+            where = f"error: {name}: the query in this file cannot be asked of the model"
+            raise RejectedError([where, *error.diagnostics]) from None
         return Verification(holds, tuple(lines))
 
     def simulate(

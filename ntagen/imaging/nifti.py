@@ -154,7 +154,8 @@ def _affine(
         if not 1 <= code <= 5:
             raise _wrong(path, f"{form}_code", code, "which is no space of NIfTI")
         try:
-            made = header.get_qform() if form == "qform" else header.get_sform()
+            with np.errstate(all="ignore"):  # Numbers that are not finite are refused later.
+                made = header.get_qform() if form == "qform" else header.get_sform()
             found[form] = np.asarray(made, dtype=float)
         except Exception as error:  # nibabel raises errors of several kinds.
             raise ImageError(
@@ -171,7 +172,8 @@ def _affine(
         )
     if len(found) == 2:
         ends = np.array(list(itertools.product(*((0, size - 1) for size in sizes), [1])))
-        apart = float(np.abs(ends @ (found["qform"] - found["sform"]).T).max())
+        with np.errstate(all="ignore"):
+            apart = float(np.abs(ends @ (found["qform"] - found["sform"]).T).max())
         unit_mm = _UNITS_MM[int(header["xyzt_units"]) & 7]
         # A matrix that is not finite disagrees with all.
         if not apart * (unit_mm or 1.0) <= _APART_MM:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
@@ -105,8 +106,8 @@ def _mask(volume: Volume, part: Part) -> Mask:
     import numpy as np
 
     rows, origin, path = volume.rows, volume.origin, volume.path
-    spacing = np.linalg.norm(np.clip(rows, -1e200, 1e200), axis=1)
-    if not np.isfinite(rows).all() or spacing.min() <= 1e-9:
+    spacing = np.array([math.hypot(*map(float, row)) for row in rows])
+    if not (spacing.min() > 1e-9 and spacing.max() <= _FARTHEST):
         raise ImageError(
             "matrix-degenerate",
             f"the spacing of `{path}` is {', '.join(f'{s:g}' for s in spacing)}",

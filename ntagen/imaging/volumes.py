@@ -173,7 +173,11 @@ def voxels_of(
 def _meaning(numbers: NDArray[np.generic], volume: Volume) -> NDArray[np.generic]:
     if volume.scale == (1.0, 0.0):
         return numbers
-    return cast("NDArray[np.generic]", numbers.astype(float) * volume.scale[0] + volume.scale[1])
+    import numpy as np
+
+    with np.errstate(all="ignore"):  # A number that is too large is no label.
+        meaning = numbers.astype(float) * volume.scale[0] + volume.scale[1]
+    return cast("NDArray[np.generic]", meaning)
 
 
 def _numbers(volume: Volume) -> Iterator[NDArray[np.generic]]:
