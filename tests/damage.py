@@ -11,12 +11,16 @@ from pathlib import Path
 
 from ntagen.errors import InputError
 
+Read = Callable[[Path], object]
+
+SEED = int(os.environ.get("NTAGEN_SEED", "0"))
 MOST_BYTES = 512 * 2**20
 """No file may make a reader take more memory than this beyond the file's size."""
 
 NUMBERS = (
     *(b"0", b"-1", b"1", b"2", b"3", b"7", b"1e308", b"1e999", b"-1e-320", b"1e12", b"nan", b"inf"),
     *(b"", b"1,5", b"1_0", b"0x10", b"+.5", b"1e", b"null", b"[]", b"{}", b'"a"', b"true", b"-"),
+    *(b"NaN", b"MISSING", b"1.2.3"),
     *(b"255", b"65536", b"1000000000000", b"9" * 19, b"1" * 400, b"1" * 5000, b"\xd9\xa3"),
 )
 SIGNS = (
@@ -75,15 +79,31 @@ def with_number(data: bytes, draw: random.Random) -> bytes:
     return data[:start] + draw.choice(NUMBERS) + data[end:]
 
 
-def is_read(path: Path, read: Callable[[], object], name: str, number: int | str) -> bool:
-    """Whether a damaged file is read; if not, the error is one of input, and has its name.
+def check_files(folder: Path, name: str, seeds: list[bytes], read: Read, files: int) -> int:
+    """All damaged files are read, or refused by an error that begins with their names.
+
+    Returns:
+        How many were read.
+    """
+    path = folder / name
+    read_well, before = 0, peak_bytes()
+    for number in range(SEED, SEED + files):
+        draw = random.Random(f"{name} {number}")
+        path.write_bytes(damaged(draw.choice(seeds), draw))
+        read_well += is_read(path, read, number)
+    assert peak_bytes() - before < MOST_BYTES
+    return read_well
+
+
+def is_read(path: Path, read: Read, number: int) -> bool:
+    """Whether a file is read; if not, the first line of the error has its name, with exit code 2.
 
     ``NTAGEN_FOUND=FOLDER`` keeps the files that are wrong.
     """
     try:
-        read()
+        read(path)
     except InputError as error:
-        if error.exit_code != 2 or name not in str(error):
+        if error.exit_code != 2 or str(path) not in str(error).partition("\n")[0]:
             raise AssertionError(f"file {number}: {error}") from error
         return False
     except BaseException as error:

@@ -87,6 +87,6 @@ def read_table(folder: Path) -> Campaign:
         document = json.loads(read_file(path, MODEL_BYTES))
         if document["format"] != FORMAT_VERSION:
             raise InputError(f"{path} has the format {document['format']}, not {FORMAT_VERSION}")
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, RecursionError, TypeError) as error:
         raise InputError(f"{path} is no table of an experiment: {error}") from error
     return Campaign(document, folder, {})

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import difflib
 import itertools
-import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from ntagen.files import json_of
 from ntagen.imaging.mistakes import ImageError
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.space import Space, rigid
@@ -52,12 +52,12 @@ def read_marks(path: str, radius_mm: float | None, point: str | None = None) -> 
     """
     data = bytes_of(path, _MOST_BYTES)
     try:
-        document = json.loads(data)
+        document = json_of(data)
         lists = list(document["markups"])
         marks = [mark for one in lists for mark in _marks(path, one, radius_mm, point)]
     except ImageError:
         raise
-    except (ValueError, KeyError, TypeError, RecursionError, IndexError) as error:
+    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise ImageError(
             "image-malformed",
             f"`{path}` is no file of markups: {type(error).__name__} {error}"[:160],

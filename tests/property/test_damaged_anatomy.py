@@ -28,12 +28,11 @@ from ntagen.errors import InputError
 from ntagen.experiment.reading import read_experiment
 from ntagen.experiment.results import read_table
 from tests import anatomy
-from tests.damage import MOST_BYTES, damaged, is_read, peak_bytes
+from tests.damage import MOST_BYTES, SEED, check_files, damaged, is_read, peak_bytes
 from tests.random_anatomy import random_mesh, random_nifti, random_nrrd
 
 ROOT = Path(__file__).parents[2]
 FILES = int(os.environ.get("NTAGEN_FILES", "60"))
-SEED = int(os.environ.get("NTAGEN_SEED", "0"))
 TEXT_OF_ITK = """#Insight Transform File V1.0
 #Transform 0
 Transform: AffineTransform_double_3_3
@@ -105,20 +104,13 @@ def test_damaged_anatomy_is_read_or_refused(kind: str, tmp_path: Path) -> None:
         files = {**files, victim: damaged_inside(files[victim], draw)}
         for name, data in files.items():
             (tmp_path / name).write_bytes(data)
-        text = anatomy.environment(line, frame=frame)
-        read_well += is_read(
-            tmp_path / victim,
-            lambda text=text: nsl.loads(text, str(tmp_path / "e.nsl")),
-            "e.nsl:",
-            number,
-        )
+        (tmp_path / "e.nsl").write_text(anatomy.environment(line, frame=frame), "utf-8")
+        read_well += is_read(tmp_path / "e.nsl", nsl.load, number)
     assert peak_bytes() - before < MOST_BYTES
     assert FILES < 60 or 0 < read_well < FILES
 
 
 # ------------------------------------------------------------- what the engine and the driver write
-
-Read = Callable[[Path], object]
 
 
 @pytest.fixture(scope="module")
@@ -158,16 +150,7 @@ def test_damaged_evidence_is_read_or_refused(
             raise InputError(f"{path}: no text") from None
         model.verify(text, str(path))
 
-    check_files(tmp_path / name, evidence[name], read)
-
-
-def check_files(path: Path, seed: bytes, read: Read, files: int = FILES) -> None:
-    """All damaged files are read, or refused by an error that has their name."""
-    before = peak_bytes()
-    for number in range(SEED, SEED + files):
-        path.write_bytes(damaged(seed, random.Random(f"{path.name} {number}")))
-        is_read(path, lambda: read(path), str(path), number)
-    assert peak_bytes() - before < MOST_BYTES
+    check_files(tmp_path, name, [evidence[name]], read, FILES)
 
 
 @pytest.fixture(scope="module")
@@ -182,19 +165,20 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 @pytest.mark.slow
 def test_damaged_plans_are_read_or_refused(tree: bytes, tmp_path: Path) -> None:
     scene = nsl.load(ROOT / "examples" / "answering" / "answering.nsl")
-    check_files(tmp_path / "plans.json", tree, lambda path: load_tree(path, scene))
+    check_files(tmp_path, "plans.json", [tree], lambda path: load_tree(path, scene), FILES)
 
 
 @pytest.mark.parametrize("name", ["virtual.toml", "sensitivity.toml", "real.toml"])
 def test_damaged_experiments_are_read_or_refused(name: str, tmp_path: Path) -> None:
     """The scenes lie elsewhere, so each name of one is a mistake as well."""
     seed = (ROOT / "examples" / "experiments" / name).read_bytes()
-    check_files(tmp_path / name, seed, read_experiment, max(1, FILES // 3))
+    check_files(tmp_path, name, [seed], read_experiment, max(1, FILES // 3))
 
 
 def test_damaged_tables_are_read_or_refused(tmp_path: Path) -> None:
     seed = json.dumps({"format": 1, "name": "a", "rows": [{"id": "r", "runs": 3}], "runs": []})
-    check_files(tmp_path / "table.json", seed.encode(), lambda path: read_table(path.parent))
+    seeds = [seed.encode()]
+    check_files(tmp_path, "table.json", seeds, lambda path: read_table(path.parent), FILES)
 
 
 # ------------------------------------------------------------------------------------------- claims

@@ -11,8 +11,6 @@ import json
 import math
 import os
 import random
-import re
-import shutil
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -38,117 +36,11 @@ from ntagen.tracking.playback import Playback, samples_of_log, samples_of_table
 from ntagen.tracking.points import Points, pair, read_points
 from ntagen.tracking.registration import register
 from ntagen.tracking.transform_file import read_transform
+from tests.damage import SEED, Read, check_files, damaged, is_read
 
 ROOT = Path(__file__).parents[2]
 FILES = int(os.environ.get("NTAGEN_FILES", "60"))
 LOGS = int(os.environ.get("NTAGEN_FILES", "16"))
-SEED = int(os.environ.get("NTAGEN_SEED", "0"))
-MOST_BYTES = 512 * 2**20
-
-Read = Callable[[Path], object]
-
-NUMBERS = (
-    *(b"0", b"-1", b"1e308", b"1e999", b"-1e-320", b"nan", b"inf", b"NaN", b"", b"1,5", b"1_0"),
-    *(b"1" * 400, b"1" * 5000, b"0x10", b"+.5", b"1e", b"\xd9\xa3", b"null", b"[]", b"{}", b'"a"'),
-    *(b"1000000000000", b"true", b"MISSING", b"1.2.3", b"-", b"9" * 19),
-)
-SIGNS = (
-    b",",
-    b";",
-    b"\t",
-    b"\n",
-    b"\r",
-    b'"',
-    b"'",
-    b"#",
-    b"\0",
-    b"\xff",
-    b"\xe2\x80\xa8",
-    b"|",
-    b"[",
-    b"{",
-)
-SIZES = (0, 1, 2**16, 10**12, 2**31 - 1, 2**32 - 1, 2**63, 2**64 - 1)
-
-
-def damaged(data: bytes, draw: random.Random) -> bytes:
-    """A file with a few changes."""
-    for _ in range(draw.choice([1, 1, 2, 4, 20])):
-        start = draw.randrange(len(data) + 1)
-        end = min(len(data), start + draw.choice([1, 4, 30, 400]))
-        match draw.randrange(9):
-            case 0:
-                data = data[:start]
-            case 1:
-                data = data[:start] + data[end:]
-            case 2:
-                data = data[:start] + data[start:end] * draw.choice([2, 2, 50]) + data[end:]
-            case 3:
-                data = data[:start] + draw.randbytes(end - start) + data[end:]
-            case 4 if start < len(data):
-                flipped = data[start] ^ 1 << draw.randrange(8)
-                data = data[:start] + bytes([flipped]) + data[start + 1 :]
-            case 5:
-                data = data[:start] + draw.choice(SIGNS) + data[draw.choice([start, start + 1]) :]
-            case 6:
-                size = draw.choice(SIZES)
-                width = draw.choice([4, 8])
-                packed = (size & (256**width - 1)).to_bytes(width, "little")
-                data = data[:start] + packed + data[start + width :]
-            case _:
-                data = _with_number(data, draw)
-    return data
-
-
-def _with_number(data: bytes, draw: random.Random) -> bytes:
-    """One of the numbers in a text is another one."""
-    window = draw.randrange(max(1, len(data) - 2000)) if len(data) > 2000 else 0
-    places = list(re.finditer(rb"-?[0-9]+(\.[0-9]+)?", data[window : window + 2000]))
-    if not places:
-        return data
-    place = draw.choice(places)
-    start, end = window + place.start(), window + place.end()
-    return data[:start] + draw.choice(NUMBERS) + data[end:]
-
-
-def check_files(folder: Path, name: str, seeds: list[bytes], read: Read, files: int) -> int:
-    """All damaged files are read, or refused by an error that begins with their names.
-
-    Returns:
-        How many were read.
-    """
-    draw = random.Random(f"{name} {SEED}")
-    path = folder / name
-    read_well, before = 0, peak_bytes()
-    for number in range(files):
-        path.write_bytes(damaged(draw.choice(seeds), draw))
-        read_well += is_read(path, read, number)
-    assert peak_bytes() - before < MOST_BYTES
-    return read_well
-
-
-def is_read(path: Path, read: Read, number: int) -> bool:
-    """Whether a file is read; if not, the first line of the error has its name."""
-    try:
-        read(path)
-    except InputError as error:
-        if str(path) not in str(error).partition("\n")[0]:
-            raise AssertionError(f"file {number}: {error}") from error
-        return False
-    except BaseException:
-        if "NTAGEN_FOUND" in os.environ:
-            shutil.copy(path, Path(os.environ["NTAGEN_FOUND"]) / f"{SEED}-{number}-{path.name}")
-        raise
-    return True
-
-
-def peak_bytes() -> int:
-    """The greatest size that this process had; 0 where nobody counts it."""
-    status = Path("/proc/self/status")
-    if not status.exists():
-        return 0
-    found = re.search(r"VmHWM:\s+(\d+) kB", status.read_text())
-    return int(found[1]) * 1024 if found else 0
 
 
 # Tables of traces.
