@@ -45,7 +45,7 @@ _UNITS: Final = frozenset({*MM_PER, *RAD_PER, *S_PER, *N_PER, "µm", "μm"} | _O
 _FOLDED: Final = frozenset({*MM_PER, *RAD_PER, *S_PER, *N_PER})
 _BRACKETS: Final = re.compile(r"[(\[<](.*)[)\]>]")
 _UNIT_AT_END: Final = re.compile(r".*?(?:[ _,]+|[ _,]*[(\[])(?P<unit>[^\s_,()\[\]]+)[)\]]?")
-_SEPARATOR_TOLD: Final = re.compile(r"sep=(.)", re.IGNORECASE)
+_SEPARATOR_TOLD: Final = re.compile(r"sep=([,;|])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,15 +121,17 @@ def read_table(path: Path, comments: str = "#") -> Table:
         InputError: The file cannot be read, is no such table, or is empty.
     """
     text = text_of(path)
-    first = next((line for line in _lines(text, comments) if line.strip()), None)
-    if first is None:
+    numbered = enumerate(_lines(text, comments))
+    begin, first = next(((at, line) for at, line in numbered if line.strip()), (0, ""))
+    if not first:
         raise InputError(f"{path}: this file is empty")
     told = _SEPARATOR_TOLD.fullmatch(first.strip())
+    separator = told[1] if told else _separator(first)
+    lines = _lines(text, comments)
     if told:
         # A spreadsheet begins a file so.
-        text = text.replace(told[0], "", 1)
-    separator = told[1] if told else _separator(first)
-    rows = list(_limited(path, _rows(path, _lines(text, comments), separator)))
+        lines = ("" if at == begin else line for at, line in enumerate(lines))
+    rows = list(_limited(path, _rows(path, lines, separator)))
     if not rows:
         raise InputError(f"{path}: this file is empty")
     head = None if any(map(_is_number, rows[0].cells)) else rows.pop(0)

@@ -49,6 +49,7 @@ def check_read(folder: Path, text: str, columns: Columns | None = None) -> None:
         '"time, s","x_mm","y_mm","z_mm"\n0.00,1,2,3\n0.50,4,5,6\n',
         'time,x,y,z\n"0,5","1,0","2,0","3,0"\n"1,5","4,00","5,00","6,00"\n',
         "sep=;\nx;y;z\n1;2;3\n4;5;6\n",
+        "# sep=;\n\nsep=|\nx|y|z\n1|2|3\n4|5|6\n",
         "Time,X,Y,Z\ns,mm,mm,mm\n0.00,1,2,3\n0.50,4,5,6\n",
         "Time;X;Y;Z\n[ms];[cm];[cm];[cm]\n0;0,1;0,2;0,3\n500;0,4;0,5;0,6\n",
         "x (µm),y (µm),z (µm)\n1000,2000,3000\n4000,5000,6000\n",
