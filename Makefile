@@ -107,6 +107,7 @@ picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadlocks, state spaces, code, loading, zones) and trackers
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
+	$(BIN)/python tests/benchmarks/rounding.py
 	$(BIN)/python tests/benchmarks/many_regions.py
 	$(BIN)/python tests/benchmarks/moving.py
 	$(BIN)/python tests/benchmarks/fields.py

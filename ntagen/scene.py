@@ -286,7 +286,8 @@ class Scene:
         unexplored: Unexplored regions.
         safe: Safe regions.
         tissue: How the tissue behaves.
-        resolution_per_mm: Fixed-point units in one mm (`_SI_` of the model).
+        resolution_per_mm: Fixed-point units in one mm (`_SI_` of the model); None chooses what is
+            fine enough (`ntagen.rounding`).
         safety: ``sampled`` checks regions at the ends of model steps as the paper does;
             ``swept`` also on the arc between them.
         queries: Named queries besides the two of the paper.
@@ -305,7 +306,7 @@ class Scene:
     unexplored: tuple[Region, ...] = ()
     safe: tuple[Region, ...] = ()
     tissue: Tissue = field(default_factory=Tissue)
-    resolution_per_mm: int = 1000
+    resolution_per_mm: int | None = None
     safety: Literal["sampled", "swept"] = "sampled"
     queries: tuple[NamedQuery, ...] = ()
     breath: Breath | None = None
@@ -314,7 +315,9 @@ class Scene:
     def __post_init__(self) -> None:
         _require(
             rules.finite(self.axis, "the axis") or rules.unit_vector(self.axis, "the axis"),
-            rules.finite([self.resolution_per_mm], "the resolution")
+            None
+            if self.resolution_per_mm is None
+            else rules.finite([self.resolution_per_mm], "the resolution")
             or rules.resolution(self.resolution_per_mm),
         )
         if self.safety not in ("sampled", "swept"):

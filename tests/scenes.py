@@ -19,6 +19,7 @@ PAPER = Scene(
     targets=(Region.ball("T1", "target", (0.0, -50.0, 0.0), 10.0),),
     criticals=(Region.ball("C1", "critical", (0.0, -25.0, 0.0), 2.0),),
     detections=(Region.ball("D1", "detection", (0.0, -25.0, 0.0), 5.0, "C1"),),
+    resolution_per_mm=1000,
 )
 """The instance that the paper publishes as numbers."""
 

@@ -21,7 +21,7 @@ DETECTION = Region.ball("D1", "detection", (0.0, -25.0, 0.0), 5.0, around="C1")
 
 
 def scene(*regions: Region, targets: Sequence[Region] = (TARGET,), name: str = "test") -> Scene:
-    """The paper's needle and limits with these critical and detection regions."""
+    """The paper's needle, limits and resolution with these critical and detection regions."""
     return Scene(
         name=name,
         needle=Needle(tip=ENTRY, radius_mm=30.0, speed_mm_per_s=1.0),
@@ -33,6 +33,7 @@ def scene(*regions: Region, targets: Sequence[Region] = (TARGET,), name: str = "
             min_roll_distance_mm=2.0,
         ),
         targets=tuple(targets),
+        resolution_per_mm=1000,
     ).with_regions(*regions)
 
 

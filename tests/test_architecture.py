@@ -18,7 +18,17 @@ PACKAGE = Path(__file__).parents[1] / "ntagen"
 EVERYWHERE = {"values"}
 """What every room may import: `dataclass`, which knows nothing of this program."""
 
-BASE = {"errors", "hardware", "motion", "parameters", "rules", "scene", "shapes", "units"}
+BASE = {
+    "errors",
+    "hardware",
+    "motion",
+    "parameters",
+    "rounding",
+    "rules",
+    "scene",
+    "shapes",
+    "units",
+}
 MAY_IMPORT: dict[str, set[str]] = {
     "cache": set(),
     "values": set(),
@@ -28,6 +38,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "units": set(),
     "rules": {"units"},
     "scene": {"errors", "motion", "rules", "shapes"},
+    "rounding": {"rules", "scene", "shapes"},
     "shapes": set(),
     "motion": {"shapes"},
     "parameters": {"rules", "units"},
@@ -165,7 +176,7 @@ ONLY_IN: dict[str, set[str]] = {
     "pytest": {"pytest_plugin"},
     "rich": {"cli"},
     "jinja2": {"render"},
-    "matplotlib": {"experiment", "plot"},
+    "matplotlib": {"checker.picture", "experiment", "plot"},
     "scipy": {"experiment", "imaging", "needle", "plan", "traces"},
     "nibabel": {"imaging"},
     "dask": {"cluster"},

@@ -51,7 +51,8 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
 
     For an environment, it also shows each region (its volume, its bounds, and its distance from
     the straight way between the tip and the middle of the last target; negative if it is in the
-    way), and all settings of `ntagen drive` and where each comes from.
+    way), how far rounding may move the model's path, and all settings of `ntagen drive` and where
+    each comes from.
 
     \b
     The JSON object has "format": "ntagen-model", "version": 1, and
@@ -71,6 +72,10 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
       settings   of an environment: by their words, field, value, shown and origin
       regions    of an environment: name, kind, shape, volume_mm3, low_mm and high_mm (bounds),
                  from_straight_way_mm; null is infinite
+      resolution_per_mm, resolution_origin ("file" or "chosen"), path_error_mm (a bound of the
+                 distance between the model's path and the exact one; null if none is known),
+                 depth_mm (down to which it holds), circle_error_mm (the bound on a single circle,
+                 down to the targets), least_margin_mm: of an environment
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(not as_json):
         loaded = load_model(path, include)
@@ -84,9 +89,11 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
     if as_json:
         text = model.facts_json()
         if loaded.task is not None and configuration is not None:
+            from ntagen.cli.precision import precision_facts
             from ntagen.cli.region_rows import region_facts
 
             more = {
+                **precision_facts(loaded.task.scene),
                 "settings": _settings(configuration),
                 "regions": region_facts(loaded.task.scene),
             }
@@ -117,6 +124,7 @@ def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
 
 def _show_task(task: Task, configuration: Configuration) -> None:
     """Prints regions, devices and settings of an environment."""
+    from ntagen.cli.precision import precision_line
     from ntagen.cli.region_rows import region_rows
     from ntagen.cli.steering import show_settings
 
@@ -125,6 +133,7 @@ def _show_task(task: Task, configuration: Configuration) -> None:
     echo(f"\nregions: {', '.join(counts)}")
     for row in region_rows(task.scene, ROWS_SHOWN):
         echo(f"  {row}")
+    echo(precision_line(task.scene))
     for device in (task.device, task.tracker):
         if device is not None:
             echo(str(device))

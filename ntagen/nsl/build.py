@@ -15,6 +15,7 @@ from typing import Any, Final, Literal, cast
 
 from ntagen import rules
 from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
+from ntagen.motion import Breath
 from ntagen.nsl import build_devices
 from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
@@ -23,6 +24,14 @@ from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
 from ntagen.parameters import Given
+from ntagen.rounding import (
+    COARSEST_PER_MM,
+    USUAL_PER_MM,
+    chosen,
+    least_margin,
+    precision_of,
+    units_per_mm,
+)
 from ntagen.scene import (
     DEFAULT_LENGTH_MM,
     MEASURED_TISSUE,
@@ -47,8 +56,8 @@ DEFAULT_STEP_S: Final = 2.0
 DEFAULT_ROLLS_DEG: Final = (90.0, 180.0, 270.0)
 DEFAULT_MAX_ROLLS: Final = 2
 DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
-DEFAULT_RESOLUTION_PER_MM: Final = 1000
-"""The defaults: the values of the paper's declaration."""
+"""The defaults: the values of the paper's declaration. That of the resolution is chosen by
+`ntagen.rounding`."""
 
 
 _ABSURD_MM: Final = 1e100
@@ -107,18 +116,38 @@ class _Builder:
         for name, query in draft.queries.items():
             self._reporter.obeys(rules.query(name, query.value or ""), query.span)
         tissue = self._tissue()
-        resolution = self._resolution()
         spheres = self._regions.spheres(needle)
         breath = None if limits is None else self._motions.breath(limits)
+        written = self._resolution()
+        is_wrong = written is None and "resolution" in draft.seen
+        made = None
+        if needle is not None and limits is not None and not self._reporter.has_errors:
+            made = self._made(needle, limits, tissue, spheres, breath, written)
+        resolution = _units_per_mm(made, written)
         # The next rules compute squares, which are infinite for absurdly large values.
-        if self._check_range(resolution or 1, tip, needle, limits, spheres):
+        least = 1 if is_wrong else min(resolution, written or COARSEST_PER_MM)
+        if self._check_range(least, tip, needle, limits, spheres):
             if tip is not None:
                 self._regions.check(tip, spheres)
             self._check_targets(tissue, spheres)
-            if needle is not None and limits is not None and resolution is not None:
+            if needle is not None and limits is not None and not is_wrong:
                 self._check_step(needle, limits, resolution, spheres)
-        if self._reporter.has_errors or needle is None or limits is None or resolution is None:
+        if self._reporter.has_errors or made is None:
             return None
+        self._check_rounding(made)
+        return made
+
+    def _made(
+        self,
+        needle: Needle,
+        limits: Limits,
+        tissue: Tissue,
+        spheres: list[PlacedRegion],
+        breath: Breath | None,
+        resolution: int | None,
+    ) -> Scene:
+        """The scene, before the rules that depend on its resolution."""
+        draft = self._draft
         safety = cast('Literal["sampled", "swept"]', draft.choices.get("safety", "sampled"))
         return Scene(
             name=draft.name,
@@ -317,11 +346,9 @@ class _Builder:
         return replace(tissue, **values)
 
     def _resolution(self) -> int | None:
-        """Fixed-point units in a mm."""
+        """Fixed-point units in a mm if they are written, and rightly."""
         placed = self._draft.resolution
-        if placed is None:
-            return None if "resolution" in self._draft.seen else DEFAULT_RESOLUTION_PER_MM
-        if placed.value is None:
+        if placed is None or placed.value is None:
             return None
         if not self._reporter.obeys(rules.resolution(placed.value), placed.span):
             return None
@@ -371,6 +398,26 @@ class _Builder:
                 hint="make the step shorter",
                 notes=("regions are checked at the ends of pushes only",),
             )
+
+    def _check_rounding(self, scene: Scene) -> None:
+        """Rounding moves the path on a circle by less than the least margin of the task."""
+        found, (margin_mm, whose) = precision_of(scene), least_margin(scene)
+        if found.circle_error_mm <= margin_mm:
+            return
+        placed, best = self._draft.resolution, chosen(scene)
+        shorter = "write the `length` of the needle that the task needs, so that plans are shorter"
+        is_best = found.per_mm == best.per_mm
+        self._report(
+            "resolution-coarse",
+            self._draft.span if placed is None else placed.span,
+            f"at {found.per_mm} per mm rounding may move the model's path by more than"
+            f" {margin_mm:.4g} mm, {whose}",
+            hint=shorter if is_best else f"write `{best.per_mm} per mm`, or leave it out",
+            notes=(
+                f"on a single circle it is up to {found.circle_error_mm:.3g} mm; with all rolls "
+                f"{found.bound}",
+            ),
+        )
 
     def _check_range(
         self,
@@ -431,6 +478,13 @@ class _Builder:
             if region.motion is not None:
                 extent += region.motion.reach_mm
             yield f"`{region.name}`", reach + extent, sphere.place
+
+
+def _units_per_mm(scene: Scene | None, written: int | None) -> int:
+    """The resolution with which the rules reckon; without a scene, a usual one."""
+    if scene is not None:
+        return units_per_mm(scene)
+    return USUAL_PER_MM if written is None else written
 
 
 def _of_kind(spheres: list[PlacedRegion], kind: RegionKind) -> tuple[Region, ...]:

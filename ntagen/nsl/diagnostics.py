@@ -173,6 +173,13 @@ KINDS: Final = _kinds(
     ("N094", "tip-error-too-large", "error", "Targets are larger than the error of the tip."),
     # Files of another kind.
     ("N095", "json-file", "error", "The file is JSON, and not an environment."),
+    # Rounding.
+    (
+        "N096",
+        "resolution-coarse",
+        "warning",
+        "The model rounds; its path may be farther from the exact one than the task allows.",
+    ),
     # Regions from files.
     ("N100", "package-missing", "error", "A package that reads such files is not installed."),
     ("N101", "image-malformed", "error", "The file is not what its name says."),

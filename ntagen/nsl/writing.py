@@ -103,7 +103,8 @@ def _lines(task: Task, mistakes: list[str]) -> Iterator[_Line]:
         (tissue.curvature_ratio, tissue.roll_rad, tissue.tip_mm)
     )
     yield f"tissue {tissue.kind}{bounds if is_bounded else ''}", "tissue"
-    yield f"resolution {number(scene.resolution_per_mm)} per mm", "resolution_per_mm"
+    if scene.resolution_per_mm is not None:
+        yield f"resolution {number(scene.resolution_per_mm)} per mm", "resolution_per_mm"
     yield f"safety {scene.safety}", "safety"
     for index, query in enumerate(scene.queries):
         place = f"queries[{index}]"

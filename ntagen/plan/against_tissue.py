@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from ntagen.errors import InputError, ModelError
 from ntagen.plan.closed_loop import Reach, Segment, certify_all, decisions_of
 from ntagen.plan.synthesise import GUIDE, STRATEGY_QUERY
+from ntagen.rounding import units_per_mm
 from ntagen.scene import Scene
 
 if TYPE_CHECKING:
@@ -141,7 +142,7 @@ def defend(
         )
 
     tip_mm = scene.tissue.tip_mm
-    reserve_mm = _ROUNDING_UNITS / scene.resolution_per_mm
+    reserve_mm = _ROUNDING_UNITS / units_per_mm(scene)
     for _ in range(_PLAYS):
         found = play(tip_mm + reserve_mm)
         if found.reach is None or found.holds:
@@ -170,7 +171,8 @@ def _played(scene: Scene, margin_mm: float, options: Options) -> Defence:
     if answer.verified is False:
         raise ModelError("the strategy fails its check\n" + "\n".join(answer.verification))
     is_won = answer.verdict == "satisfied"
-    tree = decisions_of(answer, scene) if is_won else None
+    # Lengths in it are in the units of the model that was played.
+    tree = decisions_of(answer, harder) if is_won else None
     verdict: Literal["satisfied", "not satisfied", "unknown"] = "unknown"
     if answer.verdict in ("satisfied", "not satisfied"):
         verdict = "satisfied" if is_won else "not satisfied"

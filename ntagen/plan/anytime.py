@@ -37,13 +37,15 @@ from ntagen.plan.rank import (
 )
 from ntagen.plan.stricter import BETWEEN_STEPS_MM, deeper, near_center, shorter, stricter, wider
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
+from ntagen.rounding import precision_of
 from ntagen.scene import Scene
 
 _TRIED: Final = 64
 """If the first plans do not hold, at most so many are tried."""
 
 _ROUNDED_MM: Final = 0.7
-"""A place on a path of the model, at the usual resolution, may be this far from the exact one."""
+"""At 1,000 units per mm, a place on a path of the model may be this far from the exact one. Where
+the bound of `ntagen.rounding` is less, that counts."""
 
 _CERTIFIED: Final = 20
 """Between two looks at the clock, so many plans are certified."""
@@ -266,7 +268,7 @@ class _Search:
             criterion = CRITERIA[name]
             for _ in self._settle(name, criterion, among[-1]):
                 yield
-            rounded_mm = 0.0 if criterion.is_exact else _ROUNDED_MM
+            rounded_mm = 0.0 if criterion.is_exact else self._rounded_mm()
             most = self._badness(criterion) + criterion.resolution(self.scene) + rounded_mm
             among.append(criterion.among(among[-1], most))
         if self.count > 1:
@@ -281,6 +283,10 @@ class _Search:
                 yield
                 if is_enough:
                     return
+
+    def _rounded_mm(self) -> float:
+        """How far a place on a path of the model may be from the exact one."""
+        return min(_ROUNDED_MM, precision_of(self.scene).path_error_mm)
 
     def _find_first(self) -> bool:
         """Looks for a plan that holds; whether there is one, or no proof that there is none."""

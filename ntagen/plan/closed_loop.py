@@ -23,6 +23,7 @@ from ntagen import rules
 from ntagen.errors import NtagenError
 from ntagen.needle.kinematics import Arc, orthonormal, roll
 from ntagen.needle.nearest import nearest_to, places_on
+from ntagen.rounding import units_per_mm
 from ntagen.scene import Pose, Scene
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def decisions_of(answer: Answer, scene: Scene) -> Segment:
     Raises:
         NtagenError: It is no such strategy.
     """
-    return _Reader(dict(_decisions(answer)), scene).segment((), 0, 0)
+    return _Reader(dict(_decisions(answer)), scene, units_per_mm(scene)).segment((), 0, 0)
 
 
 def _decisions(answer: Answer) -> Iterator[tuple[Key, int]]:
@@ -158,6 +159,7 @@ class _Reader:
 
     decided: Mapping[Key, int]
     scene: Scene
+    per_mm: int
 
     def segment(self, picks: tuple[int, ...], number: int, progress: int) -> Segment:
         """The decision before the first push of a segment, and what follows."""
@@ -190,10 +192,10 @@ class _Reader:
         self, factor: float, error: float, picks: tuple[int, ...], number: int, progress: int
     ) -> Branch:
         """Follows pushes up to the next roll, or to the end."""
-        needle, scale = self.scene.needle, self.scene.resolution_per_mm
+        needle = self.scene.needle
         push = needle.speed_mm_per_s * self.scene.limits.step_s
         dt, velocity_mm, _ = rules.time_units(self.scene.limits.step_s, needle.speed_mm_per_s)
-        units = dt * rules.units_of(velocity_mm, scale)
+        units = dt * rules.units_of(velocity_mm, self.per_mm)
         now, count = progress + units, 1
         while (angle := self.decided.get((picks, number, now), None)) == -1:
             now, count = now + units, count + 1

@@ -18,6 +18,7 @@ from ntagen.motion import Breath, Motion
 from ntagen.render.fixed_point import fixed_point
 from ntagen.render.frame import Matrix, turned
 from ntagen.render.solids import FORMS
+from ntagen.rounding import units_per_mm
 from ntagen.scene import Region, Scene
 from ntagen.shapes import HalfSpace, Sphere
 from ntagen.values import dataclass
@@ -124,7 +125,7 @@ def moving(scene: Scene, places: dict[int, int], frame: Matrix) -> Moving | None
         if region.motion is not None and region.kind != "safe" and region.motion not in motions:
             motions.append(region.motion)
     rows = min(period, MOST_ROWS)
-    scale = scene.resolution_per_mm
+    scale = units_per_mm(scene)
     # The ends of pushes are instants of the model; the swept check asks about all between them.
     shift = 0.5 if rows < period else 0.0
     off = 0.0 if rows == period and scene.safety == "sampled" else 0.5

@@ -13,6 +13,7 @@ The templates have the text and the arithmetic; this module makes every decision
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ntagen import rules
 from ntagen.errors import InputError
@@ -21,6 +22,7 @@ from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
 from ntagen.render.moving import Moving, moving, still
 from ntagen.render.solids import Solids, solids
+from ntagen.rounding import units_per_mm
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import Sphere
 from ntagen.units import deg_from_rad
@@ -155,7 +157,8 @@ def model_values(
         raise InputError("the scene has no target\nhint: add a line such as `target T1 sphere …`")
     if not scene.limits.roll_angles_rad:
         raise InputError("no roll is given\nhint: to forbid rolls, allow them `at most 0 times`")
-    scale = scene.resolution_per_mm
+    scale = units_per_mm(scene)
+    scene = replace(scene, resolution_per_mm=scale)
     frame = model_frame(scene.axis)
     writer = _Writer(scale, frame)
     needle, limits = scene.needle, scene.limits
@@ -238,7 +241,7 @@ def _check_motion(scene: Scene) -> None:
         InputError: The radius or the angle of one step is less than one unit, or a step is too
         long.
     """
-    needle, limits, per_mm = scene.needle, scene.limits, scene.resolution_per_mm
+    needle, limits, per_mm = scene.needle, scene.limits, units_per_mm(scene)
     push_mm = needle.speed_mm_per_s * limits.step_s
     for radius_mm in scene.radii_mm:
         breach = (

@@ -189,6 +189,11 @@ class Needle:
         self.prev_ROT_index = self.curr_ACT_index
         self._log(self.needle_progress, ROLL_ROTATE_ACTION, angle_deg)
         self.tip_roll = math.trunc(angle_deg / 180.0 * math.pi * self.instance.scale)
+        self.fold()
+        self.ROT_counter += 1
+
+    def fold(self) -> None:
+        """What ``rotate_rad()`` and ``pick()`` do with ``tip_roll``."""
         self._rotation(TIP_X, self.tip_roll, TIP_ACTION)
         self._update_circle_center()
         self._update_tip_rotation()
@@ -196,7 +201,6 @@ class Needle:
         self.matrices[TIP_CIRCLE] = [list(row) for row in self.matrices[ID]]
         self.matrices[TIP_ACTION] = [list(row) for row in self.matrices[ID]]
         self.motion_circle_yaw = 0
-        self.ROT_counter += 1
 
     def may_roll(self) -> bool:
         """Whether rolls are left, and the last one lies far enough behind."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -164,3 +165,33 @@ def test_regions_of_an_environment(capsys: pytest.CaptureFixture[str]) -> None:
     assert facts["T1"]["from_straight_way_mm"] == pytest.approx(-10.0)
     # The ellipsoid stands on the way; its middle is the deepest place.
     assert facts["E1"]["from_straight_way_mm"] == pytest.approx(-2.0, abs=2e-3)
+
+
+def test_how_far_rounding_may_move_the_path(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    lines = [
+        "environment e {",
+        "  needle { radius 100 mm  speed 1 mm/s }",
+        "  target T1 sphere (0, -50, 0) mm  radius 4 mm",
+        "  critical C1 sphere (0, -25, 9) mm  radius 1.5 mm",
+        "}",
+    ]
+    path = tmp_path / "e.nsl"
+    path.write_text("\n".join(lines))
+    out, err = info_run(capsys, 0, path)
+    assert re.search(r"resolution: \d+ per mm, chosen: .* by at most 0\.0\d+ mm, down", out)
+    assert err == ""
+    facts = json.loads(info_run(capsys, 0, path, "--json")[0])
+    assert facts["resolution_origin"] == "chosen"
+    assert 0.0 < facts["path_error_mm"] <= 0.05
+    assert (facts["least_margin_mm"], facts["depth_mm"]) == (1.5, pytest.approx(58.0, abs=2.0))
+    path.write_text("\n".join([*lines[:-1], "  resolution 1000 per mm", "}"]))
+    out, err = info_run(capsys, 0, path)
+    assert "resolution: 1000 per mm, written in the file: " in out
+    assert f"write `{facts['resolution_per_mm']} per mm`, or leave it out" in err
+    facts = json.loads(info_run(capsys, 0, path, "--json")[0])
+    assert (facts["resolution_per_mm"], facts["resolution_origin"]) == (1000, "file")
+    assert facts["path_error_mm"] > facts["least_margin_mm"]
+    path.write_text("\n".join([*lines[:-1], "  resolution 50 per mm", "}"]))
+    assert json.loads(info_run(capsys, 0, path, "--json")[0])["path_error_mm"] is None
