@@ -14,14 +14,14 @@ from typing import Final
 
 from ntagen.checker.edges import EdgeEntry, EngineStep, step_of
 from ntagen.checker.picture.diagram import Diagram, Edge, Location
-from ntagen.checker.picture.page import Svg
+from ntagen.checker.picture.page import Svg, kind_of
 from ntagen.checker.picture.svg import draw
 from ntagen.checker.states import SymbolicState
 from ntagen.errors import InputError
 from ntagen.files import write_files
 
 MOST_DRAWN: Final = 100
-"""A drawing of more states cannot be read."""
+"""A drawing of more states can hardly be read, so it is made only if more are asked for."""
 
 _PLACES_ON_A_LINE: Final = 3
 _LINES_OF_VALUES: Final = 6
@@ -66,7 +66,7 @@ class StateSpace:
     def __repr__(self) -> str:
         return f"<StateSpace of {len(self.states)} states and {len(self.moves)} moves>"
 
-    def svg(self, *, clocks: bool = True) -> Svg:
+    def svg(self, *, clocks: bool = True, limit: int = MOST_DRAWN) -> Svg:
         """The graph as a picture; the initial state has a second circle.
 
         Moves of the environment are dashed. Moves that have the same ends and the same text are one
@@ -74,16 +74,18 @@ class StateSpace:
 
         Args:
             clocks: Whether states with different zones are different.
+            limit: How many states the picture may have.
 
         Raises:
-            InputError: The graph has too many states for a picture.
+            InputError: The graph has more states.
         """
         diagram = _diagram(self, clocks=clocks)
-        if len(diagram.locations) > MOST_DRAWN:
+        count = len(diagram.locations)
+        if count > limit:
             few = "" if clocks is False else "leave out the clocks (--as discrete), "
             raise InputError(
-                f"the graph has {len(diagram.locations)} states, and a picture shows at most "
-                f"{MOST_DRAWN}\nhint: make constants of the model smaller, {few}"
+                f"the graph has {count} states, and the picture may have {limit}\n"
+                f"hint: allow more (--limit {count}), make constants of the model smaller, {few}"
                 "or write a file that ends in .dot, for Graphviz"
             )
         return Svg(draw(diagram))
@@ -92,15 +94,24 @@ class StateSpace:
         """The graph in the language of Graphviz, of any size; see `svg`."""
         return _dot(_diagram(self, clocks=clocks))
 
-    def save(self, path: str | os.PathLike[str], *, clocks: bool = True) -> None:
-        """Writes the graph to a file: DOT if its name ends in ``.dot``, else SVG.
+    def save(
+        self, path: str | os.PathLike[str], *, clocks: bool = True, limit: int = MOST_DRAWN
+    ) -> None:
+        """Writes the graph to a file; its ending is the format: that of a picture, or ``.dot``.
+
+        Args:
+            path: The file.
+            clocks: Whether states with different zones are different.
+            limit: How many states a picture may have.
 
         Raises:
-            InputError: The file cannot be written, or the graph is too large for a picture.
+            InputError: The file cannot be written, its ending is unknown, or the graph has too many
+                states for a picture.
         """
-        is_dot = Path(path).suffix.lower() == ".dot"
-        text = self.dot(clocks=clocks) if is_dot else self.svg(clocks=clocks).text
-        write_files({Path(path): text})
+        if kind_of(path, ("dot",)) == "dot":
+            write_files({Path(path): self.dot(clocks=clocks)})
+            return
+        self.svg(clocks=clocks, limit=limit).save(path)
 
     def _repr_svg_(self) -> str | None:
         return self.svg().text if len(self.states) <= MOST_DRAWN else None

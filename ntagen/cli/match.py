@@ -191,10 +191,10 @@ def _matched(
 
 def _require_picture(output: Path, environment: Path, traces: Sequence[Path]) -> None:
     """Refuses a picture that cannot be drawn, before anything is computed."""
+    from ntagen.checker.picture.page import kind_of
     from ntagen.plot.matches import MOST_ROWS
-    from ntagen.plot.save import format_of
 
-    format_of(output)
+    kind_of(output)
     inputs = {"environment": environment}
     inputs |= {f"trace {number}": path for number, path in enumerate(traces, start=1)}
     require_apart({"-o": output}, inputs)

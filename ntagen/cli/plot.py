@@ -12,7 +12,15 @@ import click
 from ntagen.cli.effects import say_idle
 from ntagen.cli.limits import limits
 from ntagen.cli.models import include_option, rank_option
-from ntagen.cli.plot_models import KINDS, LIMITED, MODELS, Wish, plot_model
+from ntagen.cli.plot_models import (
+    KINDS,
+    LIMITED,
+    MODELS,
+    MOST_DRAWN,
+    MOST_SEARCHED,
+    Wish,
+    plot_model,
+)
 from ntagen.cli.plot_runs import NAMES, RunWish, run_options
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
@@ -37,7 +45,8 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     "--output",
     metavar="FILE.png|pdf|svg|html|gif|dot",
     type=click.Path(path_type=Path),
-    help="The picture to write.  [default: the source's name with .png, in the current folder]",
+    help="The picture to write; .html and .gif are for scenes and runs, .dot is for state spaces.  "
+    "[default: the source's name with .png, of a model with .svg, in the current folder]",
 )
 @click.option(
     "--plans",
@@ -84,6 +93,15 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     help="With --as zones: the clocks of the two axes.  [default: the first on which decisions "
     "depend]",
 )
+@click.option(
+    "--limit",
+    "most_states",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="With --as states or discrete: draw at most this many states. A graph with more is not "
+    f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends in "
+    f".dot may have {MOST_SEARCHED:,}]",
+)
 @run_options
 @_LIMITS["timeout_s"]
 @_LIMITS["memory_bytes"]
@@ -98,6 +116,7 @@ def command(
     asked: str | None,
     at: str | None,
     clocks: str | None,
+    most_states: int | None,
     timeout_s: float | None,
     memory_bytes: int | None,
     include: tuple[Path, ...],
@@ -116,9 +135,9 @@ def command(
 
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
     of a query, what the strategy of a game does over two clocks (--as zones), the templates
-    (--as templates), or the states of a small model (--as states), in a file that ends in .svg.
+    (--as templates), or the states of a small model (--as states).
     For Pr and E it draws a histogram and the cumulative distribution with its band, for simulate
-    the runs over time, in a file that ends in .svg, .png or .pdf.
+    the runs over time. All pictures may end in .svg, .png or .pdf.
 
     \b
     Examples:
@@ -131,19 +150,20 @@ def command(
       ntagen plot model.xml --query "Pr[<=10](<> Gate.Open)" -o reached.png
       ntagen plot model.xml --query "simulate[<=10; 5]{Gate.Open, x}" -o runs.svg
       ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
-      ntagen plot model.xml --as states -o states.svg
+      ntagen plot model.xml --as states --limit 300 -o states.pdf
     """  # noqa: D301  click wants the control character
+    from ntagen.checker.picture.page import kind_of
     from ntagen.plan.rank import parse_ranking
-    from ntagen.plot.save import PICTURES, format_of, write_picture
+    from ntagen.plot.save import PAGES, write_picture
 
     if kind is not None or source.suffix.lower() in MODELS:
         _without_scene()
-        wish = Wish(kind, asked, at, clocks, timeout_s, memory_bytes)
+        wish = Wish(kind, asked, at, clocks, most_states, timeout_s, memory_bytes)
         path, code = plot_model(source, output, wish, include, run_wish)
         echo(f"wrote {path}")
         return code
     say_idle(
-        {"asked": "--query", "at": "--at", "clocks": "--clocks"},
+        {"asked": "--query", "at": "--at", "clocks": "--clocks", "most_states": "--limit"},
         "without --as: the scene is drawn, not its model",
     )
     say_idle(NAMES, "here: no random runs are drawn")
@@ -156,7 +176,7 @@ def command(
     elif shown == 0:
         say_idle({"ranking": "--rank", "tree_path": "--strategy"} | LIMITED, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
-    format_of(path, PICTURES)
+    kind_of(path, PAGES)
     require_apart({"-o": path}, {"source": source})
     picture = (
         _of_run(source, shown)

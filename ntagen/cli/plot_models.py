@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ntagen.checker.picture.page import kind_of
 from ntagen.cli.asked import Asked, queries_of
 from ntagen.cli.effects import say_idle
 from ntagen.cli.models import load_model, pointing_to_explanations
@@ -28,12 +29,12 @@ MODELS: Final = (".xml", ".xta", ".ta")
 """The endings of UPPAAL models."""
 
 KINDS: Final = {
-    "runs": "what the random runs of Pr, E or simulate say (.svg, .png or .pdf)",
+    "runs": "what the random runs of Pr, E or simulate say",
     "gantt": "the trace of a query as a chart, where each process is when",
     "sequence": "the trace, and what passes between the processes",
     "zones": "what the strategy of a game does over two clocks, in one state",
     "templates": "the templates, as UPPAAL's editor shows them",
-    "states": "the state space of a small model as a graph (.svg or .dot)",
+    "states": "the state space of a small model as a graph",
     "discrete": "the same without clocks",
 }
 """The pictures of a model, each with what it shows."""
@@ -43,6 +44,12 @@ LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
 
 GRAPHS: Final = ("states", "discrete")
 """Those that may be written for Graphviz, too."""
+
+MOST_DRAWN: Final = 100
+"""If no number is given, the picture of a graph has at most so many states."""
+
+MOST_SEARCHED: Final = 10_000
+"""If no greater number is given, at most so many symbolic states are searched for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +67,9 @@ class Wish:
 
     clocks: str | None
     """The clocks of zones, with a comma between them."""
+
+    most_states: int | None
+    """How many states a graph may have."""
 
     timeout_s: float | None
     memory_bytes: int | None
@@ -79,6 +89,7 @@ def plot_model(
         model = load_model(source, include).model
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
             say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
+            say_idle({"most_states": "--limit"}, "without --as states or discrete")
             path = path or Path(f"{source.stem}.svg")
             require_apart({"-o": path}, {"source": source})
             limits = {"timeout_s": wish.timeout_s, "memory_bytes": wish.memory_bytes}
@@ -112,27 +123,46 @@ def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
 def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
     """Writes a picture of a model that does not show random runs."""
     is_graph = wish.kind in GRAPHS
-    endings = (".svg", ".dot") if is_graph else (".svg",)
-    if path.suffix.lower() not in endings:
-        kinds = "this graph is SVG or DOT" if is_graph else "the pictures of a model are SVG"
-        raise InputError(
-            f"cannot draw {path}: {kinds}\n"
-            f"hint: choose a file name that ends in {' or '.join(endings)}"
-        )
+    kind_of(path, ("dot",) if is_graph else ())
+    if not is_graph:
+        say_idle({"most_states": "--limit"}, "without --as states or discrete")
     if wish.kind != "zones":
         say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
     if is_graph or wish.kind == "templates":
         drawn = "templates" if wish.kind == "templates" else "states"
         say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
     if is_graph:
-        space = model.state_space(timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes)
-        space.save(path, clocks=wish.kind == "states")
+        _plot_graph(model, path, wish)
         return
     if wish.kind == "templates":
         say_idle(LIMITED, "with --as templates: nothing is searched for")
         _templates(model).save(path)
         return
     _drawn(model, wish).save(path)
+
+
+def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
+    """Writes the graph of a state space.
+
+    Raises:
+        InputError: It has more states than the picture may have.
+        LimitError: More states would have to be searched for.
+    """
+    given = wish.most_states
+    searched = max(MOST_SEARCHED, given or 0)
+    try:
+        space = model.state_space(
+            searched, timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes
+        )
+    except LimitError as error:
+        said = str(error).partition("\n")[0]
+        if str(searched) not in said:
+            raise
+        raise LimitError(
+            f"{said}\nhint: search for more (--limit), or make constants of the model smaller"
+        ) from None
+    clocks = wish.kind == "states"
+    space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
 
 
 def _templates(model: Model) -> Svg:

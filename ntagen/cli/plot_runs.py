@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
     from ntagen.checker.picture.chart import Chart
 
-FIGURES: Final = (".svg", ".png", ".pdf")
-"""The endings of pictures of random runs."""
-
 NAMES: Final = {"runs": "--runs", "buckets": "--buckets", "width": "--bucket-width"} | {
     name: f"--{name}" for name in ("seed", "alpha", "epsilon", "threads")
 }
@@ -85,13 +82,10 @@ def plot_runs(model: Model, query: Asked, path: Path, wish: RunWish, limits: dic
         LimitError: A limit came before there was anything to draw.
     """
     from ntagen.checker import Interrupted
-    from ntagen.plot.charts import write_chart
+    from ntagen.checker.picture.chart import svg
+    from ntagen.checker.picture.page import kind_of
 
-    if path.suffix.lower() not in FIGURES:
-        raise InputError(
-            f"cannot draw {path}: pictures of random runs are SVG, PNG or PDF\n"
-            f"hint: choose a file name that ends in {', '.join(FIGURES[:-1])} or {FIGURES[-1]}"
-        )
+    kind_of(path)
     code = 0
     try:
         with progress_of(query.text, query.form, quiet=False) as reports:
@@ -107,7 +101,7 @@ def plot_runs(model: Model, query: Asked, path: Path, wish: RunWish, limits: dic
         if answer.estimate is None and not answer.trajectories:
             raise LimitError(f"{query.text} was {said} before there was anything to draw")
         echo(f"note: {said}: the picture shows the runs until then", err=True)
-    write_chart(_chart(answer, wish), path)
+    svg(_chart(answer, wish)).save(path)
     return code
 
 

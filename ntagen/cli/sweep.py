@@ -98,10 +98,11 @@ def command(
 
     docs/experiments.md says how to read the picture, and how to sweep several tasks at once.
     """  # noqa: D301  click wants the control character
+    from ntagen.checker.picture.page import kind_of
     from ntagen.experiment.one_sweep import quantity_of, sweep_of_task
     from ntagen.experiment.pictures import sensitivity
     from ntagen.nsl import load_task
-    from ntagen.plot.save import format_of, save
+    from ntagen.plot.save import save
 
     parameter = quantity_of(over)
     for warning in load_task(environment).warnings:
@@ -117,7 +118,7 @@ def command(
     )
     folder = folder or Path(f"{environment.stem}-{parameter.words.replace(' ', '-')}")
     figure = figure or folder / "sweep.png"
-    format_of(figure)
+    kind_of(figure)
     if not figure.parent.is_dir() and figure.parent != folder:
         raise InputError(f"there is no folder {figure.parent}\nhint: choose another --figure")
     campaign = made(experiment, folder, how)

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from ntagen.errors import InputError
 from ntagen.files import write_files
+from ntagen.plot.arrange import cells, fit_planes
 from ntagen.plot.colours import MEASURED, TRUE
 from ntagen.plot.picture import (
     GAP_MM,
@@ -114,7 +115,7 @@ def _frames(picture: Picture, times_s: Sequence[float]) -> Iterator[Any]:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    figure = Figure(figsize=(8.4, 5.8), dpi=100, layout="constrained")
+    figure = Figure(figsize=(8.4, 5.8), dpi=100)
     canvas: Any = FigureCanvasAgg(figure)
     depth, bounds = depth_axis(picture.scene), bounds_mm(picture)
     changing = [one for one in picture.scene.regions if _changes(one, picture)]
@@ -128,7 +129,8 @@ def _frames(picture: Picture, times_s: Sequence[float]) -> Iterator[Any]:
         views.append(_View(axes, (axis, depth), picture, changing))
     handles, labels = views[0].axes.get_legend_handles_labels()
     add_legend(figure, dict(zip(labels, handles, strict=True)), _LEGEND_COLUMNS)
-    figure.suptitle(heading_of(picture), fontsize=8.5, wrap=True)
+    heading = figure.suptitle(heading_of(picture), fontsize=8.5, y=0.985)
+    fit_planes(figure, [one.axes for one in views], [*cells(figure, heading, (1.0, 1.0))])
     corner = views[0].axes
     clock = corner.text(0.03, 0.97, "", va="top", transform=corner.transAxes, animated=True)
     canvas.draw()

@@ -15,13 +15,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
+from ntagen.plot.arrange import cells, fit_planes, fit_space
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
+from ntagen.plot.names import write_names
 from ntagen.plot.seeming import Seeming, note_of, seeming
 from ntagen.scene import Region, Scene, Vector
 from ntagen.shapes import UPRIGHT, Field, Sphere, directions, outline_mm, skin
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
 
 _AXES: Final = "xyz"
 COLOURS: Final = {
@@ -36,7 +39,9 @@ OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
 _LEGEND_COLUMNS: Final = 6
 _MANY_CURVES: Final = 400
 _SHADOW_POINTS: Final = 160
-_TITLE_WIDTH: Final = 120
+_TITLE_WIDTH: Final = 122
+_WIDTHS: Final = (1.0, 1.0, 1.15)
+_MOST_TICKS: Final = 5
 
 GAP_MM: Final = 1.0
 """Tip positions farther apart than this are on different lines: the tip was pulled back."""
@@ -101,22 +106,33 @@ class Picture:
 
 def draw(picture: Picture) -> Figure:
     """The figure; the caller saves it (`save`)."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 6.4), dpi=150, layout="constrained")
-    grid = figure.add_gridspec(1, 3, width_ratios=(1.0, 1.0, 1.3))
+    figure = Figure(figsize=(11.0, 6.4), dpi=150)
+    # It measures texts.
+    FigureCanvasAgg(figure)
     depth = depth_axis(picture.scene)
     bounds = bounds_mm(picture)
     across = [axis for axis in range(3) if axis != depth]
-    flat = [
-        draw_projection(figure.add_subplot(grid[0, i]), picture, (axis, depth), bounds)
-        for i, axis in enumerate(across)
+    flat = [figure.add_subplot(1, 3, 1), figure.add_subplot(1, 3, 2)]
+    drawn = [
+        draw_projection(axes, picture, (axis, depth), bounds)
+        for axes, axis in zip(flat, across, strict=True)
     ]
-    _draw_space(figure.add_subplot(grid[0, 2], projection="3d"), picture, depth, bounds)
+    space = figure.add_subplot(1, 3, 3, projection="3d")
+    lengths = _set_scales(space, picture, depth, bounds)
     handles, labels = flat[0].get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    add_legend(figure, unique)
-    figure.suptitle(heading_of(picture), fontsize=11, wrap=True)
+    add_legend(figure, dict(zip(labels, handles, strict=True)))
+    heading = figure.suptitle(heading_of(picture), fontsize=10.5, y=0.985)
+    *left, right = cells(figure, heading, _WIDTHS)
+    fit_planes(figure, flat, left)
+    fit_space(figure, space, lengths, right)
+    _draw_space(space, picture, depth)
+    start, end = picture.scene.needle.tip.position_mm, picture.scene.targets[-1].center_mm
+    path = picture.best or (start, end)
+    for axes, axis, outlines in zip(flat, across, drawn, strict=True):
+        write_names(axes, outlines, (axis, depth), path, COLOURS)
     return figure
 
 
@@ -125,7 +141,7 @@ def add_legend(figure: Figure, entries: Mapping[str, Any], columns: int = _LEGEN
     figure.legend(
         entries.values(),
         entries.keys(),
-        loc="outside lower center",
+        loc="lower center",
         ncols=min(len(entries), columns),
         frameon=False,
         fontsize=9,
@@ -186,7 +202,7 @@ def draw_projection(
     shown: tuple[int, int],
     bounds: list[tuple[float, float]],
     regions: Sequence[Region] | None = None,
-) -> Any:  # noqa: ANN401
+) -> list[tuple[Region, Patch]]:
     """Draws what is seen along the axis that is not among those `shown`.
 
     Args:
@@ -195,13 +211,18 @@ def draw_projection(
         shown: The axes of space across and down the page.
         bounds: The range of each axis of space.
         regions: These regions only; by default all.
+
+    Returns:
+        The regions with their outlines.
     """
     across, depth = shown
     seen: list[Seeming | None] = []
+    outlines = []
     for region in _back_to_front(picture.scene.regions if regions is None else regions):
         for ghost in _ghosts(region):
             axes.add_patch(outline_of(ghost, shown, _ghost_style(region)))
         outline = axes.add_patch(outline_of(region, shown, face_of(region, picture)))
+        outlines.append((region, outline))
         seen.append(seeming(picture.best, region, outline, shown))
     for style, curves in _curves(picture):
         for curve in _few(curves):
@@ -220,7 +241,7 @@ def draw_projection(
     axes.set_axisbelow(True)
     note = note_of([one for one in seen if one is not None], picture.best_label)
     axes.set_title(note, fontsize=7.5, color="#404040")
-    return axes
+    return outlines
 
 
 def _ghosts(region: Region) -> list[Region]:
@@ -359,14 +380,14 @@ def _few(curves: Sequence[Curve]) -> Sequence[Curve]:
     return [[point for curve in curves for point in (*curve, gap)]]
 
 
-def _draw_space(
-    axes: Any,  # noqa: ANN401
-    picture: Picture,
-    depth: int,
-    bounds: list[tuple[float, float]],
-) -> None:
-    """The view in space; its vertical axis is the direction of insertion."""
-    order = [*(i for i in range(3) if i != depth), depth]
+def _order(depth: int) -> list[int]:
+    """The axes of the view in space; its vertical one is the direction of insertion."""
+    return [*(i for i in range(3) if i != depth), depth]
+
+
+def _draw_space(axes: Any, picture: Picture, depth: int) -> None:  # noqa: ANN401
+    """Draws regions and paths into the view in space."""
+    order = _order(depth)
     for region in picture.scene.regions:
         _draw_solid(axes, region, order)
     for style, curves in _curves(picture):
@@ -374,24 +395,39 @@ def _draw_space(
             axes.plot(*([p[i] for p in curve] for i in order), **style)
     entry = picture.scene.needle.tip.position_mm
     axes.plot(*([entry[i]] for i in order), **_TIP_STYLE)
+
+
+def _set_scales(
+    axes: Any,  # noqa: ANN401
+    picture: Picture,
+    depth: int,
+    bounds: list[tuple[float, float]],
+) -> list[float]:
+    """Gives the view in space its scales; returns the lengths of its axes."""
+    order = _order(depth)
+    # What is drawn later does not change them.
+    axes.set_autoscale_on(False)
     limits = [bounds[i] for i in order]
     axes.set_xlim(limits[0])
     axes.set_ylim(limits[1])
     axes.set_zlim(limits[2] if picture.scene.axis[depth] <= 0.0 else limits[2][::-1])
-    axes.set_box_aspect([high - low for low, high in limits], zoom=1.15)
     for name, i in zip("xyz", order, strict=True):
-        getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=1)
-    axes.tick_params(labelsize=7, pad=0)
-    for pane in (axes.xaxis, axes.yaxis, axes.zaxis):
+        getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=8)
+    axes.tick_params(labelsize=6.5, pad=0)
+    lengths = [high - low for low, high in limits]
+    for pane, length_mm in zip((axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
         pane.set_pane_color((0.97, 0.975, 0.98, 1.0))
-        pane.set_major_locator(_ticks())
+        pane.set_major_locator(_ticks(length_mm, max(lengths)))
     axes.view_init(elev=14.0, azim=-58.0)
+    return lengths
 
 
-def _ticks() -> Any:  # noqa: ANN401
-    from matplotlib.ticker import MultipleLocator
+def _ticks(length_mm: float, longest_mm: float) -> Any:  # noqa: ANN401
+    """Ticks at round numbers, fewer of them on a short axis, and none where two axes meet."""
+    from matplotlib.ticker import MaxNLocator
 
-    return MultipleLocator(10.0)
+    most = max(3, round(_MOST_TICKS * length_mm / longest_mm))
+    return MaxNLocator(most, steps=(1, 2, 5, 10), prune="both")
 
 
 def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: ANN401

@@ -1,8 +1,7 @@
 """Charts of numbers: lines, steps, bands and bars over an axis, in one panel or several.
 
-A `Chart` is a plain value: here it becomes an SVG document for notebooks and files, and
-`ntagen.plot.charts` draws the same value for other formats. The legend stands below the panels,
-never on the data.
+A `Chart` is a plain value: here it becomes an SVG document for notebooks and files. The legend
+stands below the panels, never on the data.
 """
 
 from __future__ import annotations

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 from xml.sax.saxutils import escape
 
+from ntagen.errors import InputError
 from ntagen.files import write_files
+
+KINDS: Final = ("svg", "png", "pdf")
+"""The formats of all pictures, which are the endings of their names."""
 
 LIGHT: Final = (
     "#cfe0f5",
@@ -50,12 +54,39 @@ class Svg:
         return self.text
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes the document to a file, whole or not at all.
+        """Writes the picture to a file, whole or not at all; its ending is the format.
+
+        Args:
+            path: The file; its name ends in ``.svg``, ``.png`` or ``.pdf``.
 
         Raises:
-            InputError: The file cannot be written.
+            InputError: The file cannot be written, or its ending is another one.
         """
-        write_files({Path(path): self.text})
+        kind = kind_of(path)
+        if kind == "svg":
+            write_files({Path(path): self.text})
+            return
+        # Matplotlib takes half a second to load, and SVG does not need it.
+        from ntagen.checker.picture.figure import converted
+
+        write_files({Path(path): converted(self.text, kind)})
+
+
+def kind_of(path: str | os.PathLike[str], more: Sequence[str] = ()) -> str:
+    """The format that the ending of a picture's name says: one of `KINDS`, or of `more`.
+
+    Raises:
+        InputError: It is none of them.
+    """
+    kind = Path(path).suffix.lower().removeprefix(".")
+    known = (*KINDS, *more)
+    if kind not in known:
+        endings = ", ".join(f".{one}" for one in known)
+        raise InputError(
+            f"cannot draw {os.fspath(path)}: unknown kind of picture\n"
+            f"hint: choose a file name with one of these endings: {endings}"
+        )
+    return kind
 
 
 def page(

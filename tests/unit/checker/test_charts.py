@@ -132,7 +132,7 @@ def test_plot_draws_the_trace_of_a_query(tmp_path: Path) -> None:
     ("arguments", "says"),
     [
         (["--query", "A[] n <= 1"], "A[] n <= 1 is satisfied, and has no trace"),
-        (["--query", "A[] n <= 1", "-o", "a.png"], "pictures of a model are SVG"),
+        (["--query", "A[] n <= 1", "-o", "a.gif"], "endings: .svg, .png, .pdf"),
         ([], "the model has no queries"),
     ],
 )

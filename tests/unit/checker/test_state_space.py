@@ -102,8 +102,13 @@ def test_dot_has_the_same_graph_in_any_size() -> None:
 def test_a_large_graph_has_no_picture() -> None:
     space = counter(100).state_space()
     assert space._repr_svg_() is None
-    with pytest.raises(InputError, match="has 101 states, and a picture shows at most 100\nhint"):
+    with pytest.raises(
+        InputError, match=r"has 101 states, .* have 100\nhint: allow more \(--limit"
+    ):
         space.svg()
+    assert "101 symbolic states" in space.svg(limit=101).text
+    with pytest.raises(InputError, match="has 101 states, and the picture may have 7"):
+        space.svg(limit=7)
 
 
 def test_limits_are_errors() -> None:
@@ -130,5 +135,37 @@ def test_plot_draws_the_states(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert "3 discrete states" in path.read_text()
     assert main([*arguments, "states", "-o", str(path.with_suffix(".dot"))]) == 0
     assert path.with_suffix(".dot").read_text().startswith("digraph")
-    assert main([*arguments, "states", "-o", str(path.with_suffix(".png"))]) == 2
-    assert "ends in .svg or .dot" in capsys.readouterr().err
+    assert main([*arguments, "states", "-o", str(path.with_suffix(".gif"))]) == 2
+    assert "endings: .svg, .png, .pdf, .dot" in capsys.readouterr().err
+
+
+def test_a_limit_says_how_many_states_are_drawn(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    model, path = tmp_path / "counter.xta", tmp_path / "states.svg"
+    model.write_text(COUNTER.replace("MOST", "150"))
+    arguments = ["plot", str(model), "-o", str(path), "--as"]
+    assert main([*arguments, "states"]) == 2
+    assert "--limit 151" in capsys.readouterr().err
+    assert not path.exists()
+    for kind in ("states", "discrete"):
+        assert main([*arguments, kind, "--limit", "150"]) == 2
+        assert "has 151 states" in capsys.readouterr().err
+        assert main([*arguments, kind, "--limit", "151"]) == 0
+        assert path.read_text().count("<circle") == 152
+    assert main([*arguments, "templates", "--limit", "7"]) == 0
+    assert "--limit has no effect" in capsys.readouterr().err
+
+
+def test_a_greater_limit_searches_for_more_states(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    model, path = tmp_path / "counter.xta", tmp_path / "states.dot"
+    model.write_text(COUNTER.replace("MOST", "10001"))
+    arguments = ["plot", str(model), "-o", str(path), "--as", "states"]
+    assert main(arguments) == LimitError.exit_code
+    assert "more than 10000 symbolic states\nhint: search for more (--limit)" in (
+        capsys.readouterr().err
+    )
+    assert main([*arguments, "--limit", "10002"]) == 0
+    assert "10002 symbolic states" in path.read_text()

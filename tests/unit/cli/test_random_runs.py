@@ -261,7 +261,7 @@ def test_plot_takes_buckets_and_runs(path: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--query", REACHED, "-o", "a.jpg"], "pictures of random runs are SVG, PNG or PDF"),
+        (["--query", REACHED, "-o", "a.jpg"], "endings: .svg, .png, .pdf"),
         (["--query", "Pr[<=1](<> n > 100)"], "none of 72 runs reaches what"),
         (["--query", "Pr[<=1]([] n < 100)"], "none of 72 runs breaks what"),
         (["--query", "simulate[<=1; 5]{n} : 2 : n > 100"], "shows no run"),

@@ -114,7 +114,7 @@ def test_equal_pictures_are_equal_files(tmp_path: Path, ending: str) -> None:
 
 @pytest.mark.parametrize("name", ["scene.bmp", "scene"])
 def test_unknown_endings_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match=r"\.png, \.pdf, \.svg"):
+    with pytest.raises(InputError, match=r"\.svg, \.png, \.pdf"):
         save(draw(plans_picture(0)), tmp_path / name)
 
 
