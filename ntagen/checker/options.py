@@ -137,8 +137,9 @@ class Options:
 
     under_choice: UnderChoice = "race"
     """When the controller moves in random runs under a strategy that lets it choose: its processes
-    ``race`` for what the strategy allows, until it demands a move; or it moves as soon as it may
-    (``eager``), or only when it must (``lazy``)."""
+    ``race`` for what the strategy allows, with waiting as one more choice where it allows that too,
+    until it demands a move; or it moves as soon as it may (``eager``), or only when it must
+    (``lazy``)."""
 
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""

@@ -128,9 +128,9 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         type=click.Choice(["race", "eager", "lazy"]),
         default="race",
         help="For Pr, E and simulate under a strategy that lets the controller choose: its "
-        "processes draw delays as without the strategy, until it demands a move (race), or the "
-        "controller moves as soon as it may (eager), or only when it must (lazy).  "
-        "[default: race]",
+        "processes draw delays as without the strategy and may then wait on, until it demands a "
+        "move (race), or the controller moves as soon as it may (eager), or only when it must "
+        "(lazy).  [default: race]",
     ),
     "reductions": click.option(
         "--reductions",

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::answer::{Answer, Verdict};
 use super::codes;
 use super::evidence::named_strategies::StrategyFile;
-use super::loaded_model::{Due, LoadedModel, NamedStrategy};
+use super::loaded_model::{LoadedModel, NamedStrategy, Recipe};
 use super::options::Options;
 use super::query_form::unnamed;
 use super::rejection::Rejection;
@@ -35,9 +35,14 @@ impl LoadedModel {
         let (mut query, warnings) = self.compile(text.span)?;
         query.guide = self.compile_guide(options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
+        let rest;
+        let mut options = options;
         if let Some(name) = &query.under {
+            let start = Instant::now();
             // What is supported depends on it.
-            self.existing_strategy(name, query.span, options)?;
+            self.permitted_by(name, query.span, options)?;
+            rest = options.left_since(start);
+            options = &rest;
         }
         let start = Instant::now();
         self.refuse_unsupported(&query, options.priorities)?;
@@ -91,7 +96,7 @@ impl LoadedModel {
         let within = match &query.under {
             None => None,
             Some(name) => {
-                let strategy = self.existing_strategy(name, query.span, options)?;
+                let strategy = self.permitted_by(name, query.span, options)?.strategy;
                 let query = self.strategy(name).map(|one| one.query.clone());
                 Some(Arc::new(Under {
                     query: query.unwrap_or_default(),
@@ -99,26 +104,39 @@ impl LoadedModel {
                 }))
             }
         };
-        let answer = self.answer_within(query, options, within.as_ref());
-        let Some(name) = query.strategy.clone() else {
-            return Ok(answer);
-        };
+        let mut answer = self.answer_within(query, options, within.as_ref());
+        if let Some(name) = query.strategy.clone() {
+            self.keep_answer(name, query, &answer, (options, within));
+        }
+        if let Some(name) = &query.under {
+            self.note_freedom(name, &mut answer);
+        }
+        Ok(answer)
+    }
+
+    /// Keeps the strategy that a query defines.
+    fn keep_answer(
+        &mut self,
+        name: String,
+        query: &Query,
+        answer: &Answer,
+        (options, within): (&Options, Option<Arc<Under>>),
+    ) {
         let text = unnamed(&query.text).to_owned();
         // Where the query is not satisfied, the strategy is the environment's.
         let is_won = answer.verdict == Verdict::Satisfied;
         let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();
-        let due = (is_won && known.is_none()).then(|| {
-            Box::new(Due {
+        let recipe = is_won.then(|| {
+            Arc::new(Recipe {
                 query: query.clone(),
                 options: options.clone(),
                 within,
             })
         });
         self.keep_strategy(NamedStrategy {
-            due,
+            recipe,
             ..NamedStrategy::new(name, text, known)
         });
-        Ok(answer)
     }
 
     /// Why the model has no meaning if what does not fit is an error: a constant wrapped round.

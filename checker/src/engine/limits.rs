@@ -24,6 +24,17 @@ pub struct Limits {
     pub observer: Option<Observer>,
 }
 
+impl Limits {
+    /// The same with the time that is left if work began at this moment.
+    pub(crate) fn left_since(&self, start: Instant) -> Limits {
+        let left = |timeout: Duration| timeout.saturating_sub(start.elapsed());
+        Limits {
+            timeout: self.timeout.map(left),
+            ..self.clone()
+        }
+    }
+}
+
 impl std::fmt::Debug for Limits {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Limits {

@@ -12,6 +12,7 @@ use super::options::{CodeEngine, Options};
 use super::rejection::Rejection;
 use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
 use crate::exec::{Executor, Libraries};
+use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{Network, Overflow, Query};
 use crate::semantics::{self, FIRST_POOL, Model, Reading};
@@ -316,17 +317,27 @@ pub struct NamedStrategy {
     pub query: String,
     /// `None` if the query was not satisfied, or the strategy was not made.
     pub strategy: Option<Arc<Strategy>>,
-    /// How it is made when it is first used.
-    pub(crate) due: Option<Box<Due>>,
+    /// How it is made when it is first used, and what it leaves to choose.
+    pub(crate) recipe: Option<Arc<Recipe>>,
+    /// What a query under it follows, once one was asked.
+    pub(crate) permitted: Option<Permitted>,
 }
 
-/// A strategy that is still to be made.
+/// How a strategy is made.
 #[derive(Clone, Debug)]
-pub(crate) struct Due {
+pub(crate) struct Recipe {
     pub(crate) query: Query,
     pub(crate) options: Options,
     /// What the query is asked under.
     pub(crate) within: Option<Arc<Under>>,
+}
+
+/// What a query under a strategy follows.
+#[derive(Clone, Debug)]
+pub(crate) struct Permitted {
+    pub(crate) strategy: Arc<Strategy>,
+    /// How much of the game it leaves to choose; `None` is what the strategy itself says.
+    pub(crate) freedom: Option<Freedom>,
 }
 
 impl NamedStrategy {
@@ -336,7 +347,8 @@ impl NamedStrategy {
             name,
             query,
             strategy,
-            due: None,
+            recipe: None,
+            permitted: None,
         }
     }
 }

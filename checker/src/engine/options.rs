@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
@@ -201,6 +202,14 @@ impl Options {
         Rules {
             forced: self.forced,
             priorities: self.priorities,
+        }
+    }
+
+    /// The same with the time that is left if work began at this moment.
+    pub(crate) fn left_since(&self, start: Instant) -> Options {
+        Options {
+            limits: self.limits.left_since(start),
+            ..self.clone()
         }
     }
 

@@ -21,7 +21,7 @@ impl LoadedModel {
             return None;
         };
         let named = self.strategy(query.under.as_deref()?)?;
-        let strategy = named.strategy.as_ref()?;
+        let strategy = &named.permitted.as_ref()?.strategy;
         if *cooperative || time_optimal.is_some() {
             Some("E<> control: and control_t* under a strategy")
         } else if observations.is_some() {

@@ -65,8 +65,8 @@ impl Strategy {
         })
     }
 
-    /// The strategy that a query of the model defined by this name, made now if only its winner is
-    /// known so far; `None` if none did. `query` is the one that needs it.
+    /// What a query under the strategy with this name follows, made now if only its winner is known
+    /// so far; `None` if no query of the model defined one. `query` is the one that needs it.
     #[staticmethod]
     fn named(
         model: &Bound<'_, Model>,
@@ -83,7 +83,7 @@ impl Strategy {
                 };
                 let options = options::by_rule_of(model, options);
                 let span = model.add_query(query).span;
-                let strategy = model.existing_strategy(name, span, &options)?;
+                let strategy = model.permitted_by(name, span, &options)?.strategy;
                 let follower = Follower::new(model.network(), definition, strategy);
                 Ok(Some(Arc::new(follower)))
             })

@@ -179,6 +179,11 @@ impl<'a> Advice<'a> {
         self.restriction.choice == UnderChoice::Eager && self.has_decisions()
     }
 
+    /// Whether a process of the controller weighs its moves against waiting now.
+    pub(super) fn may_wait(&self) -> bool {
+        self.restriction.choice == UnderChoice::Race && self.said(0.0, false, |_| false).waits
+    }
+
     /// Lets the controller make moves that are allowed, but not demanded. Returns whether that
     /// makes a difference.
     pub(super) fn hurry(&mut self) -> bool {

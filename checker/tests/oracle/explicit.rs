@@ -230,7 +230,8 @@ pub(crate) fn winning(graph: &Graph, objective: &Objective<'_>, rule: Rule) -> V
         let mut changed = false;
         for node in (0..graph.nodes.len()).rev() {
             let wins = objective.goal[node]
-                || (objective.keep[node] && is_won(graph, node, &win, objective.must_reach, rule));
+                || (objective.keep[node]
+                    && is_won(graph, node, (&win, &win), objective.must_reach, rule));
             changed |= wins != win[node];
             win[node] = wins;
         }
@@ -251,9 +252,9 @@ pub(crate) fn recurring(graph: &Graph, goal: &[bool], keep: &[bool], rule: Rule)
             for node in (0..graph.nodes.len()).rev() {
                 let wins = keep[node]
                     && if goal[node] {
-                        is_won(graph, node, &kept, false, rule)
+                        is_won(graph, node, (&kept, &kept), false, rule)
                     } else {
-                        is_won(graph, node, &win, true, rule)
+                        is_won(graph, node, (&win, &win), true, rule)
                     };
                 changed |= wins != win[node];
                 win[node] = wins;
@@ -269,7 +270,15 @@ pub(crate) fn recurring(graph: &Graph, goal: &[bool], keep: &[bool], rule: Rule)
     }
 }
 
-fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule) -> bool {
+/// Whether the controller wins from a node, if moves must lead to nodes of the first set, and time
+/// to nodes of the second.
+pub(crate) fn is_won(
+    graph: &Graph,
+    node: usize,
+    (win, win_by_time): (&[bool], &[bool]),
+    must_reach: bool,
+    rule: Rule,
+) -> bool {
     let node = &graph.nodes[node];
     let (own, others): (Vec<&Step>, Vec<&Step>) =
         node.steps.iter().partition(|step| step.controllable);
@@ -285,7 +294,7 @@ fn is_won(graph: &Graph, node: usize, win: &[bool], must_reach: bool, rule: Rule
     if node.is_obliged {
         return wins_by_moving;
     }
-    if wins_by_moving || node.later.is_some_and(|later| win[later]) {
+    if wins_by_moving || node.later.is_some_and(|later| win_by_time[later]) {
         return true;
     }
     if node.later.is_some() {

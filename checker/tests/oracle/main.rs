@@ -15,6 +15,7 @@ mod compare;
 mod endless;
 mod every_kind;
 mod explicit;
+mod freedom;
 mod games;
 mod generate;
 mod mutations;

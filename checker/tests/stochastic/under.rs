@@ -103,6 +103,14 @@ fn deadline(wait: &str) -> String {
     )
 }
 
+/// How likely a process has moved when this part of the time is over in which the strategy lets it,
+/// if it draws uniformly and has so many moves to weigh against waiting. The moments that it draws,
+/// one after the other, each uniform in the rest, are a Poisson process in -log of the rest, of
+/// which waiting takes one in `moves + 1` away.
+fn weighed(part: f64, moves: u32) -> f64 {
+    1.0 - (1.0 - part).powf(f64::from(moves) / f64::from(moves + 1))
+}
+
 #[test]
 fn a_choice_without_time_is_uniform_among_what_is_allowed() {
     let model = "
@@ -132,7 +140,12 @@ fn a_bounded_delay_is_uniform_until_the_strategy_demands_a_move() {
     let mut model = with_strategy(&deadline("x <= 10"), "control: A[] not e.alarm");
     let race = UnderChoice::Race;
     expect(&mut model, race, "Pr[<=20](<> e.alarm)", 0.0);
-    expect(&mut model, race, "Pr[<=3](<> c.done)", 1.0 / 3.0);
+    expect(
+        &mut model,
+        race,
+        "Pr[<=3](<> c.done)",
+        weighed(1.0 / 3.0, 1),
+    );
     expect(&mut model, race, "Pr[<=5](<> c.done)", 1.0);
     expect(&mut model, race, "Pr[<=20]([] c.wait imply x <= 5)", 1.0);
 }
@@ -141,13 +154,14 @@ fn a_bounded_delay_is_uniform_until_the_strategy_demands_a_move() {
 fn an_exponential_delay_ends_when_the_strategy_demands_a_move() {
     let mut model = with_strategy(&deadline("; 1:2"), "control: A[] not e.alarm");
     let race = UnderChoice::Race;
-    let until = |time: f64| 1.0 - (-0.5 * (time - 2.0)).exp();
+    // Half of the rate: waiting is as likely as moving.
+    let until = |time: f64| 1.0 - (-0.25 * (time - 2.0)).exp();
     expect(&mut model, race, "Pr[<=3](<> c.done)", until(3.0));
     expect(&mut model, race, "Pr[<=4.999](<> c.done)", until(4.999));
     expect(&mut model, race, "Pr[<=5](<> c.done)", 1.0);
     expect(&mut model, race, "Pr[<=20](<> e.alarm)", 0.0);
     // The mean of the least of 5 and a shifted exponential time.
-    let mean = 2.0 + (1.0 - (-1.5_f64).exp()) / 0.5;
+    let mean = 2.0 + (1.0 - (-0.75_f64).exp()) / 0.25;
     let query = "E[<=5; 20000](max: c.wait ? x : 0) under S";
     let found = ask(&mut model, query, &Options::default())
         .estimate
@@ -159,12 +173,94 @@ fn an_exponential_delay_ends_when_the_strategy_demands_a_move() {
 fn without_a_rate_the_delay_is_uniform_until_the_demand() {
     let mut model = with_strategy(&deadline(""), "control: A[] not e.alarm");
     let race = UnderChoice::Race;
-    expect(&mut model, race, "Pr[<=3](<> c.done)", 1.0 / 3.0);
+    expect(
+        &mut model,
+        race,
+        "Pr[<=3](<> c.done)",
+        weighed(1.0 / 3.0, 1),
+    );
     expect(&mut model, race, "Pr[<=20](<> e.alarm)", 0.0);
     // Nothing says how long it waits without the strategy.
     let query = "Pr[<=3](<> c.done)";
     let refused = try_ask(&mut model, query, &Options::default()).expect_err("it fails");
     assert!(refused.rendered[0].contains("E0806"), "{refused:?}");
+}
+
+#[test]
+fn waiting_is_one_choice_more_and_none_of_the_environments() {
+    let text = "
+        process P() {
+            state start { ; 3 }, left, right, slipped, pit;
+            init start;
+            trans start -> left { }, start -> right { }, start -u-> slipped { }, pit -u-> pit { };
+        }
+        system P;";
+    let mut model = with_strategy(text, "control: A[] not P.pit");
+    let race = UnderChoice::Race;
+    // Each edge has a third of the rate 3, of which waiting takes a third from those of the
+    // controller.
+    let rates = (2.0 / 3.0, 1.0);
+    let all = 2.0 * rates.0 + rates.1;
+    expect(&mut model, race, "Pr[<=50](<> P.slipped)", rates.1 / all);
+    expect(&mut model, race, "Pr[<=50](<> P.left)", rates.0 / all);
+    let by_half = 1.0 - (-0.5 * all).exp();
+    expect(&mut model, race, "Pr[<=0.5]([] P.start)", 1.0 - by_half);
+    let text = text
+        .replace("; 3 }", "x <= 2 }")
+        .replace("process P() {", "clock x; process P() {");
+    let text = text.replace(", start -u-> slipped { }", "");
+    let mut model = with_strategy(&text, "control: A[] not P.pit");
+    expect(
+        &mut model,
+        race,
+        "Pr[<=1]([] P.start)",
+        1.0 - weighed(0.5, 2),
+    );
+    expect(&mut model, race, "Pr[<=2](<> P.left)", 0.5);
+}
+
+#[test]
+fn a_reach_strategy_leaves_all_that_keeps_the_win() {
+    let text = "
+        clock time;
+        process Job() {
+            clock x;
+            state Idle { ; 2 }, Work { x <= 3 }, Done { ; 1 }, Left;
+            init Idle;
+            trans
+                Idle -> Work { assign x = 0; },
+                Work -u-> Done { guard x >= 2; },
+                Done -> Left { };
+        }
+        Kim = Job();
+        system Kim;";
+    let mut model = with_strategy(text, "control: A<> Kim.Done && time <= 8");
+    let race = UnderChoice::Race;
+    expect(&mut model, race, "Pr[<=8](<> Kim.Done)", 1.0);
+    expect(&mut model, race, "Pr[<=1]([] Kim.Idle)", (-1.0_f64).exp());
+    expect(
+        &mut model,
+        race,
+        "Pr[<=4.999]([] Kim.Idle)",
+        (-4.999_f64).exp(),
+    );
+    expect(&mut model, race, "Pr[<=5]([] Kim.Idle)", 0.0);
+    expect(
+        &mut model,
+        UnderChoice::Lazy,
+        "Pr[<=4.99]([] Kim.Idle)",
+        1.0,
+    );
+    expect(&mut model, UnderChoice::Eager, "Pr[<=3](<> Kim.Done)", 1.0);
+    // Once the goal is reached there is nothing to weigh: the rate is that of the location. Eager,
+    // it is reached uniformly between 2 and 3.
+    let stays = (1.0_f64.exp() - 1.0) * (-2.0_f64).exp();
+    expect(
+        &mut model,
+        UnderChoice::Eager,
+        "Pr[<=4](<> Kim.Left)",
+        1.0 - stays,
+    );
 }
 
 #[test]

@@ -475,6 +475,55 @@ def test_strategies_within_strategies_are_loaded_in_queries(tmp_path: Path) -> N
     assert more.verify().holds
 
 
+JOBS = """
+clock time; bool busy;
+process Job() {
+  clock x;
+  state Idle { ; 1 }, Work { x <= 3 }, Done;
+  init Idle;
+  trans Idle -> Work { guard !busy; assign busy = true, x = 0; },
+        Work -u-> Done { guard x >= 2; assign busy = false; };
+}
+Kim = Job(); Peter = Job();
+system Kim, Peter;
+"""
+
+
+def test_queries_under_a_reach_strategy_follow_all_that_wins(tmp_path: Path) -> None:
+    """What is saved, and what is kept by hand, makes one move a state."""
+    path = tmp_path / "jobs.xta"
+    path.write_text(JOBS)
+    model = ntagen.load(path)
+    query = "control: A<> Kim.Done && time <= 8"
+    first = "E<> Peter.Done && not Kim.Done"
+    defined = model.check(f"strategy S = {query}", strategy=True)
+    assert defined.strategy is not None
+    answer = model.check(f"{first} under S")
+    assert answer.satisfied
+    assert answer.message == "S allows all moves and waits after which the win stays certain"
+    likely = model.check("Pr[<=8](<> Peter.Done && not Kim.Done) under S", runs=200)
+    assert likely.message is not None
+    assert "stays certain" in likely.message
+    assert isinstance(likely.value, float)
+    assert 0.2 < likely.value < 0.8
+    refined = model.check("strategy T = control: A<> Peter.Done && Kim.Done under S", strategy=True)
+    assert refined.strategy is not None
+    assert refined.strategy.under is not None
+    assert '"selection":"any"' in refined.strategy.under.json().replace(" ", "")
+    assert model.check('saveStrategy("s.json", S)', allow_write=[tmp_path]).satisfied
+    assert model.check('strategy One = loadStrategy("s.json")').satisfied
+    model.synthesize(query).keep("Kept")
+    for name in ("One", "Kept"):
+        answer = model.check(f"{first} under {name}")
+        assert (answer.verdict, answer.message) == ("not satisfied", None)
+    nearer = model.check("strategy N = control: A<> Kim.Done")
+    assert nearer.satisfied
+    told = model.check("A<> Kim.Done under N")
+    assert told.satisfied
+    assert told.message is not None
+    assert told.message.startswith("N allows only moves that come nearer to the goal")
+
+
 LAZY = """
 int[0, 59] level, before;
 process Dial() {

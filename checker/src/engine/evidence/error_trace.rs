@@ -150,6 +150,7 @@ impl LoadedModel {
             under: None,
             options,
             guide: None,
+            freedom: None,
         };
         let wanted = Abstraction::LowerUpper;
         let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);

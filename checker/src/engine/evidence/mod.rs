@@ -5,6 +5,7 @@ pub mod checked;
 pub(super) mod error_trace;
 pub mod evidence_file;
 pub mod named_strategies;
+mod permitted;
 pub(super) mod shown_states;
 pub mod strategy_check;
 pub(super) mod strategy_place;

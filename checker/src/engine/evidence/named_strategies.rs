@@ -12,13 +12,14 @@ use std::sync::Arc;
 
 use crate::diagnostics::{Diagnostic, Span};
 use crate::game::strategy::Strategy;
+use crate::game::strategy::freedom::Freedom;
 
 use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
 use crate::engine::format::strategy_json;
 use crate::engine::limits::stop_text;
-use crate::engine::loaded_model::{Due, LoadedModel, NamedStrategy};
+use crate::engine::loaded_model::{LoadedModel, NamedStrategy, Recipe};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::search::limits::Counters;
@@ -35,59 +36,98 @@ pub(crate) struct StrategyFile<'q> {
 }
 
 impl LoadedModel {
-    /// The strategy under which a query is asked, or that must be saved. If it is not made yet, it
-    /// is made within these limits.
+    /// The strategy with this name, as it is saved: one move a state. If it is not made yet, it is
+    /// made within these limits. `span` is the query that needs it.
     pub(crate) fn existing_strategy(
         &mut self,
         name: &str,
         span: Span,
         options: &Options,
     ) -> Result<Arc<Strategy>, Rejection> {
-        let due = self.strategy(name).and_then(|one| one.due.clone());
-        let remark = match due {
-            Some(due) => {
-                self.model.network.overflow = due.options.overflow;
-                self.prepare_code(due.options.code, due.options.tuning, span)?;
-                let remark = self.make_strategy(name, *due, options);
-                self.model.network.overflow = options.overflow;
-                remark
-            }
-            None => None,
-        };
-        let known = self.strategy(name);
-        if let Some(strategy) = known.and_then(|one| one.strategy.clone()) {
+        let named = self.strategy(name);
+        if let Some(strategy) = named.and_then(|one| one.strategy.clone()) {
             return Ok(strategy);
         }
-        let query = known.map_or("", |one| one.query.as_str());
-        let remark = remark.unwrap_or_else(|| String::from("its query gave none"));
-        let message = format!("there is no strategy '{name}': {remark}");
-        let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
-            .help(format!("the query was {query}"));
-        Err(Rejection::new(vec![diagnostic], &self.sources))
+        let Some(recipe) = named.and_then(|one| one.recipe.clone()) else {
+            return Err(self.no_strategy(name, span, "its query gave none"));
+        };
+        match self.made_by(&recipe, None, span, options)? {
+            Ok(strategy) => {
+                if let Some(named) = self.strategy_mut(name) {
+                    named.strategy = Some(Arc::clone(&strategy));
+                }
+                Ok(strategy)
+            }
+            Err(reason) => Err(self.no_strategy(name, span, &reason)),
+        }
     }
 
-    /// Makes a strategy. Returns why there is none, if it cannot be made; then the next use tries
-    /// again.
-    fn make_strategy(&mut self, name: &str, due: Due, options: &Options) -> Option<String> {
+    /// Makes a strategy that leaves this much to choose. An error of the inner result says why
+    /// there is none; then the next use tries again.
+    pub(super) fn made_by(
+        &mut self,
+        recipe: &Recipe,
+        freedom: Option<Freedom>,
+        span: Span,
+        options: &Options,
+    ) -> Result<Result<Arc<Strategy>, String>, Rejection> {
+        let own = &recipe.options;
         let with_strategy = Options {
             strategy: true,
             limits: options.limits.clone(),
-            ..due.options
+            ..own.clone()
         };
-        let answer = self.answer_within(&due.query, &with_strategy, due.within.as_ref());
-        let strategy = answer.evidence.strategy;
-        if strategy.is_none() {
-            return match answer.verdict {
-                Verdict::Unknown(reason) => Some(stop_text(reason).to_owned()),
-                _ => answer.message,
-            };
-        }
-        let mut named = self.strategies.iter_mut();
-        if let Some(named) = named.find(|one| one.name == name) {
-            named.strategy = strategy;
-            named.due = None;
-        }
-        None
+        let with_strategy = match freedom {
+            None => with_strategy,
+            Some(_) => Options {
+                verify: false,
+                plans: None,
+                ..with_strategy
+            },
+        };
+        let answer = self.within_rules_of(recipe, span, options, |model| {
+            model.answer_leaving(
+                &recipe.query,
+                &with_strategy,
+                recipe.within.as_ref(),
+                freedom,
+            )
+        })?;
+        let missing = || match answer.verdict {
+            Verdict::Unknown(reason) => stop_text(reason).to_owned(),
+            _ => answer
+                .message
+                .unwrap_or_else(|| String::from("its query gave none")),
+        };
+        Ok(answer.evidence.strategy.ok_or_else(missing))
+    }
+
+    /// Answers something with the code, and the rule for overflows, of a strategy.
+    pub(super) fn within_rules_of(
+        &mut self,
+        recipe: &Recipe,
+        span: Span,
+        options: &Options,
+        answer: impl FnOnce(&LoadedModel) -> Answer,
+    ) -> Result<Answer, Rejection> {
+        self.model.network.overflow = recipe.options.overflow;
+        let prepared = self.prepare_code(recipe.options.code, recipe.options.tuning, span);
+        let answer = prepared.map(|()| answer(self));
+        self.model.network.overflow = options.overflow;
+        answer
+    }
+
+    /// The error of a query that needs a strategy that there is not, and why.
+    pub(super) fn no_strategy(&self, name: &str, span: Span, reason: &str) -> Rejection {
+        let query = self.strategy(name).map_or("", |one| one.query.as_str());
+        let message = format!("there is no strategy '{name}': {reason}");
+        let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
+            .help(format!("the query was {query}"));
+        Rejection::new(vec![diagnostic], &self.sources)
+    }
+
+    pub(super) fn strategy_mut(&mut self, name: &str) -> Option<&mut NamedStrategy> {
+        self.strategies.iter_mut().find(|one| one.name == name)
     }
 
     /// Answers `saveStrategy`.

@@ -6,6 +6,7 @@ use crate::game::backward::winning_sets::Win;
 use crate::game::objectives::cooperative::Winning;
 use crate::game::solver::Solver;
 use crate::game::strategy::co_buchi;
+use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Start, Strategy, Way, attractor};
 use crate::ir::Predicate;
 use crate::network::{Failure, Symbolic};
@@ -31,6 +32,8 @@ pub(super) struct Solved<'s, 'n> {
     /// Fresh zones of the game, to look for runs in.
     pub(super) zones: &'s mut Symbolic<'n>,
     pub(super) options: &'s Options,
+    /// How much a strategy of the controller leaves to choose.
+    pub(super) freedom: Option<Freedom>,
 }
 
 /// The strategy of the winner of a game that was solved with both players working together. An
@@ -45,6 +48,7 @@ pub(super) fn strategy(
         rounds,
         zones,
         options,
+        freedom: _,
     } = solved;
     if winner == Player::Environment {
         let nodes = (0..solver.graph.nodes.len() as u32).rev().collect();

@@ -6,6 +6,7 @@ use std::time::Instant;
 use crate::cancellation;
 use crate::game::strategy::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
+use crate::game::strategy::freedom::Freedom;
 use crate::ir::{Predicate, Query, QueryKind};
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Symmetry};
@@ -34,6 +35,17 @@ impl LoadedModel {
         options: &Options,
         within: Option<&Arc<Under>>,
     ) -> Answer {
+        self.answer_leaving(query, options, within, None)
+    }
+
+    /// The same; a strategy to reach something leaves this much to choose.
+    pub(crate) fn answer_leaving(
+        &self,
+        query: &Query,
+        options: &Options,
+        within: Option<&Arc<Under>>,
+        freedom: Option<Freedom>,
+    ) -> Answer {
         let time_limit = within.and_then(|within| within.strategy.time_limit);
         let network = time_clock::with_limit(&self.model.network, time_limit);
         let under = within.map(|within| ClosedLoop::new(&network, &within.strategy));
@@ -46,6 +58,7 @@ impl LoadedModel {
                 .map(|(moves, strategy)| Followed { moves, strategy }),
             options,
             guide: query.guide,
+            freedom,
         };
         let mut answer = answer(subject, query);
         if time_limit.is_some() && query.strategy.is_none() {

@@ -14,6 +14,7 @@ use crate::game::forward::objective::Objective as GameObjective;
 use crate::game::objectives::buchi;
 use crate::game::solver::Solver;
 use crate::game::strategy::co_buchi;
+use crate::game::strategy::freedom::{self, Freedom};
 use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
@@ -244,6 +245,9 @@ impl<'a> Game<'a> {
             Ok(graph) => graph,
             Err(failure) => return Answer::failed(failure).into(),
         };
+        if self.subject.freedom.is_some() {
+            graph.disable_chains();
+        }
         let mut solver = Solver::new(&mut graph, sides.seeker, self.subject.options.forced);
         solver.be_guided_by(self.subject.guide);
         solver.share_among(self.subject.options.thread_count());
@@ -288,6 +292,7 @@ impl<'a> Game<'a> {
             rounds: self.is_recurring().then_some(&rounds[..]),
             zones: &mut zones_of_runs,
             options: self.subject.options,
+            freedom: self.subject.freedom,
         };
         let has_given_up = self.find_strategy(&mut solver, solved, &mut answer, watch);
         AttemptEnd {
@@ -391,6 +396,7 @@ impl<'a> Game<'a> {
             return solver.solve_cooperative(watch);
         }
         let extent = match self.plans() {
+            _ if self.subject.freedom.is_some() => Extent::Everything,
             Some(most) if most > 1 => Extent::Everything,
             // A strategy that keeps out of what was not explored would not be the most permissive
             // one.
@@ -418,6 +424,16 @@ fn strategy_of(
     solved: &Solved<'_, '_>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
+    if let Some(freedom) = solved
+        .freedom
+        .filter(|_| solved.winner == Player::Controller)
+    {
+        if freedom == Freedom::Nearer && !solver.put_into_layers(watch)? {
+            let reason = watch.look(&solver.counters());
+            return Ok(Err(reason.unwrap_or(StopReason::Interrupted)));
+        }
+        return freedom::extract(solver, freedom, watch);
+    }
     solver.put_into_layers(watch)?;
     match solved.rounds {
         Some(rounds) if solved.winner == Player::Environment => {

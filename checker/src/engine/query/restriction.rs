@@ -22,7 +22,7 @@ impl LoadedModel {
             return Ok(None);
         };
         self.expect_symbolic()?;
-        let strategy = self.existing_strategy(&name.text, query.span, options)?;
+        let strategy = self.permitted_by(&name.text, query.span, options)?.strategy;
         let readings = (self.network(), stochastic);
         let restriction = Restriction::new(readings, &strategy, options.under_choice);
         restriction.map(Some).map_err(|unfit| {

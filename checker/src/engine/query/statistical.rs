@@ -63,7 +63,9 @@ impl LoadedModel {
         let splitting = self.splitting(&mut stochastic.model, &compiled, options)?;
         self.prepare_stochastic(stochastic, (query.span, start), options)?;
         let network = &stochastic.model.network;
+        let start = Instant::now();
         let restriction = self.restriction(query, network, options)?;
+        let limits = options.limits.left_since(start);
         let behaviour = stochastic.behaviour(restriction.as_ref(), options);
         let runs_anywhere = Runs {
             behaviour,
@@ -72,7 +74,7 @@ impl LoadedModel {
         let may_have_more_room = self.pool < GREATEST_POOL;
         let precision = stochastic.precision(options);
         let start = Instant::now();
-        let mut watch = LimitWatch::new(options.limits.clone());
+        let mut watch = LimitWatch::new(limits);
         let observer = options.run_observer.clone();
         let result = watch.bound(|watch| {
             let mut runs = WatchedRuns::new(&compiled.kind, precision.alpha, watch, observer);
@@ -162,6 +164,9 @@ impl LoadedModel {
                 answer
             }
         };
+        if let Some(name) = &query.under {
+            self.note_freedom(&name.text, &mut answer);
+        }
         answer.seconds = start.elapsed().as_secs_f64();
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;

@@ -7,6 +7,7 @@ use crate::exec::Executor;
 use crate::game::Priorities;
 use crate::game::strategy::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
+use crate::game::strategy::freedom::Freedom;
 use crate::ir::{ClockAtom, FunctionId, Network, Predicate};
 use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic, Symmetry};
@@ -24,6 +25,9 @@ pub(crate) struct Subject<'a> {
     pub(crate) options: &'a Options,
     /// Where a game is explored first: where the value of this function is least.
     pub(crate) guide: Option<FunctionId>,
+    /// Of a game that the controller wins: how much its strategy leaves to choose. `None` is one
+    /// move a state, or what is usual for the objective.
+    pub(crate) freedom: Option<Freedom>,
 }
 
 /// A strategy that the controller follows.
@@ -77,6 +81,7 @@ pub(crate) fn symbolic<'a>(
         under,
         options,
         guide: _,
+        freedom: _,
     } = subject;
     let mut atoms = atoms_of(predicates);
     atoms.extend(further.iter().chain(subject.atoms()).cloned());

@@ -20,14 +20,14 @@ const BETWEEN_LOOKS: u32 = 64;
 
 impl Solver<'_, '_, '_> {
     /// Gives the gains of a game that the seeker wins stamps by layers, up to the first layer in
-    /// which the initial valuation is won. They stay as they are if a limit comes first, and if the
-    /// target must recur.
+    /// which the initial valuation is won; returns whether it has. They stay as they are if a limit
+    /// comes first, and if the target must recur.
     ///
     /// # Errors
     /// The model fails in computing what a node wins.
-    pub fn put_into_layers(&mut self, watch: &mut dyn Watch) -> Result<(), Failure> {
+    pub fn put_into_layers(&mut self, watch: &mut dyn Watch) -> Result<bool, Failure> {
         if self.sought.targets.is_some() || !self.is_won() {
-            return Ok(());
+            return Ok(false);
         }
         let before = std::mem::take(&mut self.won);
         let before_bytes = before.all_bytes();
@@ -41,7 +41,7 @@ impl Solver<'_, '_, '_> {
         if !is_layered {
             self.won = before;
         }
-        Ok(())
+        Ok(is_layered)
     }
 
     /// Whether the initial valuation is won before a limit comes.

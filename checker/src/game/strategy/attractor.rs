@@ -70,7 +70,6 @@ impl Chooser for Seeking {
         if self.is_over(solver, node) {
             return Ok(chosen);
         }
-        let moves = moves_of(solver, node)?;
         for gain in &solver.won.gains[node as usize].clone() {
             let mut rest = solver.gained_part(node, gain);
             // Where the target must recur, play continues from there into anything that is won.
@@ -84,25 +83,8 @@ impl Chooser for Seeking {
                 }
             };
             if gain.stamp > 0 || goes_on {
-                for edges in own_choices(solver, node) {
-                    let first = solver.graph.edges[edges[0] as usize];
-                    let wins = edges.iter().map(|&edge| earlier(solver, edge));
-                    let wins: Vec<Win> = wins.collect();
-                    let zones = match &wins[..] {
-                        [win] => solver.before(&first, win),
-                        wins => solver.before_all(edges.iter().copied().zip(wins)),
-                    };
-                    let zones = zones.intersection(&rest);
-                    if !zones.is_empty() {
-                        rest.subtract(&zones);
-                        chosen.decisions.push(Decision {
-                            zones,
-                            action: Some(named(solver, &moves, &first)),
-                            rank: gain.stamp,
-                        });
-                        chosen.taken.extend(edges);
-                    }
-                }
+                let part = (node, &mut rest, gain.stamp);
+                choose_moves(solver, part, (Selection::First, &earlier), &mut chosen)?;
                 if solver.seeker == Player::Environment {
                     let whole = solver.gained_part(node, gain);
                     let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
@@ -195,6 +177,44 @@ fn rank_chains(all: &mut Extracted) {
     }
 }
 
+/// Which valuations of the target of an edge are good.
+pub(super) type Good<'g> = dyn Fn(&Solver<'_, '_, '_>, u32) -> Win + 'g;
+
+/// Chooses moves of the seeker from a part of a node, all of this rank, that lead into `good`
+/// valuations of their targets: the first in each valuation, or any. Leaves of the part where there
+/// is none.
+pub(super) fn choose_moves(
+    solver: &mut Solver<'_, '_, '_>,
+    (node, part, rank): (u32, &mut Federation, u32),
+    (selection, good): (Selection, &Good<'_>),
+    chosen: &mut Choices,
+) -> Result<(), Failure> {
+    let moves = moves_of(solver, node)?;
+    let whole = part.clone();
+    for edges in own_choices(solver, node) {
+        let first = solver.graph.edges[edges[0] as usize];
+        let wins: Vec<Win> = edges.iter().map(|&edge| good(solver, edge)).collect();
+        let zones = match &wins[..] {
+            [win] => solver.before(&first, win),
+            wins => solver.before_all(edges.iter().copied().zip(wins)),
+        };
+        let zones = match selection {
+            Selection::First => zones.intersection(part),
+            Selection::Any => zones.intersection(&whole),
+        };
+        if !zones.is_empty() {
+            part.subtract(&zones);
+            chosen.decisions.push(Decision {
+                zones,
+                action: Some(named(solver, &moves, &first)),
+                rank,
+            });
+            chosen.taken.extend(edges);
+        }
+    }
+    Ok(())
+}
+
 /// The choices of the seeker in a node: edges, or all legs of an entry.
 fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
     let edges = solver.graph.edges_of(node).filter(|&edge| {
@@ -210,7 +230,7 @@ fn own_choices(solver: &Solver<'_, '_, '_>, node: u32) -> Vec<Vec<u32>> {
 }
 
 /// The valuations of a node that were won before a stamp.
-fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
+pub(super) fn won_before(solver: &Solver<'_, '_, '_>, node: u32, stamp: u32) -> Win {
     let mut won: Option<Federation> = None;
     for Gain { stamp: _, part } in solver.won.gains[node as usize]
         .iter()

@@ -16,11 +16,14 @@
 //! * The controller of a safety game may do whatever keeps it safe: its strategy allows all such
 //!   moves and all such waits. It is the most permissive strategy except for one choice: if the
 //!   safe valuations have no last moment, and a move must be made before their end, it is made in
-//!   the last stretch of time in which it is possible.
+//!   the last stretch of time in which it is possible, of less than a unit.
 //! * The environment of a game with a goal that must recur prevents it from recurring, or leads
 //!   play to where the goal recurs less often: see [`super::co_buchi`].
 //! * The environment of a reachability game that it wins moves where that leads to what the
 //!   controller does not win, and otherwise waits: it is never forced to move there.
+//!
+//! Of a reachability game that the controller wins, [`freedom`] has all moves that keep the win:
+//! what queries under the strategy follow.
 //!
 //! Source: Cassez et al., CONCUR 2005, section 5 (strategies from the order in which winning states
 //! were found).
@@ -30,6 +33,7 @@ pub(super) mod chains;
 pub mod closed_loop;
 pub mod co_buchi;
 pub(super) mod extraction;
+pub mod freedom;
 pub mod plan_list;
 pub mod plans;
 pub(super) mod safety;

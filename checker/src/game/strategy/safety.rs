@@ -5,7 +5,8 @@
 //! allows everything that stays outside.
 
 use crate::network::Failure;
-use crate::zones::{Federation, instants, past};
+use crate::zones::dbm::Constraint;
+use crate::zones::{Bound, ClockSet, Federation, instants, past};
 
 use super::chains::walk;
 use super::extraction::{Choices, Chooser, moves_of, named};
@@ -84,7 +85,10 @@ impl Chooser for Evading {
                 free.subtract(&acting);
                 free
             }
-            Player::Environment => allowed_waiting(solver, node, &free, &acting)?,
+            Player::Environment => {
+                let safe = solver.federation_of(node, &solver.won.lost(node));
+                allowed_waiting(solver, node, (&safe, &free), &acting)?
+            }
         };
         if !waiting.is_empty() {
             waiting.reduce();
@@ -135,10 +139,10 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
 
 /// Where the controller may wait and stay safe. `free` is where it is safe and play continues,
 /// `acting` where it has a safe move.
-fn allowed_waiting(
+pub(super) fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
-    free: &Federation,
+    (safe, free): (&Federation, &Federation),
     acting: &Federation,
 ) -> Result<Federation, Failure> {
     let situation = solver.situation(node)?;
@@ -149,9 +153,8 @@ fn allowed_waiting(
     if !solver.graph.nodes[node as usize].delays {
         return Ok(at_rest);
     }
-    let safe = solver.federation_of(node, &solver.won.lost(node));
     let stopped = situation.stopped;
-    let before = instants::before(&safe, &stopped);
+    let before = instants::before(safe, &stopped);
     let mut waiting = before.intersection(free);
     // Where time can pass at all, and where it must stop.
     let mut passing = safe.clone();
@@ -166,22 +169,51 @@ fn allowed_waiting(
     // The safe valuations may end in a limit that is not itself safe. Before such an end, the last
     // valuations with a move must use it.
     let mut unsafe_ones = solver.whole(node);
-    unsafe_ones.subtract(&safe);
+    unsafe_ones.subtract(safe);
     let after = instants::after(&passing, &stopped);
     let ends = unsafe_ones.intersection(&after);
     if !ends.is_empty() {
         let mut others = unsafe_ones.clone();
         others.unite(&impassable);
         others.subtract(&ends);
-        let before = past::predecessors(&ends, &others, &stopped);
-        let ending = before.intersection(&safe);
+        let ending = shortly_before(&ends, &others, &stopped).intersection(safe);
         let mut last = ending.intersection(acting);
         let mut later = ending;
         later.subtract(acting);
         let earlier = past::predecessors(&later, &unsafe_ones, &stopped);
         last.subtract(&earlier);
+        // It may wait at the first moment of the stretch: there is time left.
+        let last = last.intersection(&instants::after(&last, &stopped));
         waiting.subtract(&last);
     }
     waiting.unite(&at_rest);
     Ok(waiting)
+}
+
+/// The valuations from which time leads to one of these `ends` without meeting `others`, and in
+/// less than a unit. Each end is where some running clock shows a certain value.
+fn shortly_before(ends: &Federation, others: &Federation, stopped: &ClockSet) -> Federation {
+    let dimension = ends.dimension();
+    let mut before = Federation::empty(dimension);
+    for zone in ends.zones() {
+        let end = Federation::of_zone(dimension, zone);
+        let mut leading = past::predecessors(&end, others, stopped);
+        let mut running = (1..dimension).filter(|&clock| !stopped.contains(clock));
+        let at_value = running.find_map(|clock| {
+            let (upper, lower) = (zone[clock * dimension], zone[clock]);
+            let is_one = upper.is_finite() && upper.value() == -lower.value();
+            is_one.then_some((clock, upper.value()))
+        });
+        if let Some((clock, value)) = at_value
+            && let Some(bound) = Bound::strict(1 - value)
+        {
+            leading.constrain_all(&[Constraint {
+                left: 0,
+                right: clock,
+                bound,
+            }]);
+        }
+        before.unite(&leading);
+    }
+    before
 }

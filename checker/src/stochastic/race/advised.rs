@@ -5,6 +5,12 @@
 //! that is allowed competes. A process without a rate whose stay no invariant bounds draws
 //! uniformly among the times until then.
 //!
+//! Where the strategy also allows to wait, waiting is one choice more: a process whose delay is
+//! over and that has n allowed moves makes one of them with a chance of n / (n + 1), and else draws
+//! anew from there. So its moves come at n / (n + 1) of the rate at which they would come without a
+//! strategy, and a uniform delay with the hazard reduced in the same way. Moves of the environment
+//! are not touched.
+//!
 //! An urgent channel stops time also if the strategy forbids to use it. Then who else can move
 //! does.
 
@@ -104,6 +110,26 @@ impl<'a> Race<'a> {
     /// makes a difference.
     pub(super) fn hurry(&mut self) -> bool {
         self.advice.as_mut().is_some_and(Advice::hurry)
+    }
+
+    /// Whether the process of the movers waits instead, where the strategy leaves it both and time
+    /// can pass.
+    pub(super) fn waits_instead(&mut self, program: &Program<'a>) -> Result<bool, Failure> {
+        let may_wait = self.has_decisions()
+            && self.advice.as_ref().is_some_and(Advice::may_wait)
+            && self.committed == 0
+            && self.bounds.iter().all(|&bound| bound > TOLERANCE);
+        let mut movers = self.movers.iter().map(|&(one, _)| program.instance(one));
+        if !may_wait || movers.any(|one| !one.edge.controllable) {
+            return Ok(false);
+        }
+        let sender = program.instance(self.movers[0].0);
+        if sender.may_be_urgent && self.is_urgent(sender)? {
+            return Ok(false);
+        }
+        let choices = self.choices.iter().map(|&one| program.instance(one));
+        let moves = choices.filter(|one| one.edge.controllable).count() as u32;
+        Ok(self.machine.stream().below(moves + 1) == 0)
     }
 
     /// When the strategy demands a move.

@@ -407,6 +407,10 @@ impl<'a> Race<'a> {
                 self.add_receivers(program, sender, channel)?;
             }
         }
+        if self.waits_instead(program)? {
+            self.make_stale(process as u32);
+            return self.count_move(process, false);
+        }
         self.carry_out(program)?;
         self.has_moved = true;
         self.until_renewal -= 1;

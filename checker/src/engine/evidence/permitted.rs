@@ -1,0 +1,164 @@
+//! What a query under a strategy follows.
+//!
+//! A strategy to reach something makes one move a state when it is played, saved or written in C.
+//! A query under it asks about all that the controller may do. It may make every move, and wait
+//! wherever the win stays certain then, if the goal is still reached in every run of that closed
+//! loop. Where it could be put off for ever, only moves that come nearer to it count. So
+//! `A<> goal under S` holds in any case: the closed loop of either set is checked before it is
+//! used. All other strategies are followed as they are: those from files, and in models with
+//! stopwatches.
+//!
+//! The set is made when a query under the strategy first needs it, and kept.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use crate::diagnostics::Span;
+use crate::game::strategy::freedom::Freedom;
+use crate::game::strategy::{Strategy, Under};
+use crate::ir::{Objective, Predicate, Query, QueryKind};
+
+use crate::engine::answer::{Answer, Verdict};
+use crate::engine::limits::stop_text;
+use crate::engine::loaded_model::{LoadedModel, Permitted, Recipe};
+use crate::engine::options::{Options, TraceWanted};
+use crate::engine::rejection::Rejection;
+
+/// The sets of moves that are tried, the greatest first.
+const FREEDOMS: [Freedom; 2] = [Freedom::Winning, Freedom::Nearer];
+
+impl LoadedModel {
+    /// What a query under a strategy follows. If it is not known yet, it is made within these
+    /// limits. `span` is the query.
+    pub(crate) fn permitted_by(
+        &mut self,
+        name: &str,
+        span: Span,
+        options: &Options,
+    ) -> Result<Permitted, Rejection> {
+        let named = self.strategy(name);
+        if let Some(known) = named.and_then(|one| one.permitted.clone()) {
+            return Ok(known);
+        }
+        let recipe = named.and_then(|one| one.recipe.clone());
+        let start = Instant::now();
+        // Closed loops of models with stopwatches are not searched.
+        let is_searched = !self.network().features.stopwatches;
+        let sought = recipe.as_ref().filter(|_| is_searched).and_then(|recipe| {
+            let goal = goal_of(&recipe.query.kind)?;
+            Some((Arc::clone(recipe), goal.clone()))
+        });
+        let permitted = match sought {
+            Some((recipe, goal)) => match self.freest(name, (&recipe, &goal), span, options)? {
+                Ok(permitted) => permitted,
+                Err(reason) => return Err(self.no_strategy(name, span, &reason)),
+            },
+            None => None,
+        };
+        let permitted = match permitted {
+            Some(permitted) => permitted,
+            None => Permitted {
+                strategy: self.existing_strategy(name, span, &options.left_since(start))?,
+                freedom: None,
+            },
+        };
+        if let Some(named) = self.strategy_mut(name) {
+            named.permitted = Some(permitted.clone());
+        }
+        Ok(permitted)
+    }
+
+    /// The greatest set of moves under which the goal is reached in every run; `None` if there is
+    /// none. An error of the inner result says which limit came first.
+    fn freest(
+        &mut self,
+        name: &str,
+        (recipe, goal): (&Recipe, &Predicate),
+        span: Span,
+        options: &Options,
+    ) -> Result<Result<Option<Permitted>, String>, Rejection> {
+        let start = Instant::now();
+        for freedom in FREEDOMS {
+            let options = &options.left_since(start);
+            let strategy = match self.made_by(recipe, Some(freedom), span, options)? {
+                Ok(strategy) => strategy,
+                Err(reason) => return Ok(Err(reason)),
+            };
+            let asked = (recipe, goal);
+            let options = &options.left_since(start);
+            match self.always_reaches(name, asked, (&strategy, span), options)? {
+                Verdict::Satisfied => {
+                    let freedom = Some(freedom);
+                    return Ok(Ok(Some(Permitted { strategy, freedom })));
+                }
+                Verdict::Unknown(reason) => return Ok(Err(stop_text(reason).to_owned())),
+                Verdict::NotSatisfied | Verdict::Maybe | Verdict::Error(_) => {}
+            }
+        }
+        Ok(Ok(None))
+    }
+
+    /// Whether every run under a strategy reaches the goal.
+    fn always_reaches(
+        &mut self,
+        name: &str,
+        (recipe, goal): (&Recipe, &Predicate),
+        (strategy, span): (&Arc<Strategy>, Span),
+        options: &Options,
+    ) -> Result<Verdict, Rejection> {
+        let query = Query {
+            text: String::new(),
+            strategy: None,
+            under: Some(name.to_owned()),
+            kind: QueryKind::Eventually(goal.clone()),
+            guide: None,
+            span,
+        };
+        let plain = Options {
+            strategy: false,
+            verify: false,
+            plans: None,
+            runs: false,
+            certificate: false,
+            trace: TraceWanted::Any,
+            limits: options.limits.clone(),
+            ..recipe.options.clone()
+        };
+        let under = Arc::new(Under {
+            query: recipe.query.text.clone(),
+            strategy: Arc::clone(strategy),
+        });
+        let answer = self.within_rules_of(recipe, span, options, |model| {
+            model.answer_within(&query, &plain, Some(&under))
+        })?;
+        Ok(answer.verdict)
+    }
+
+    /// Says in the answer to a query under a strategy what the strategy leaves to choose.
+    pub(crate) fn note_freedom(&self, name: &str, answer: &mut Answer) {
+        let permitted = self.strategy(name).and_then(|one| one.permitted.as_ref());
+        match permitted.and_then(|permitted| permitted.freedom) {
+            None => {}
+            Some(Freedom::Winning) => answer.remark(format!(
+                "{name} allows all moves and waits after which the win stays certain"
+            )),
+            Some(Freedom::Nearer) => answer.remark(format!(
+                "{name} allows only moves that come nearer to the goal: with all that keep the win \
+                 it could be put off for ever"
+            )),
+        }
+    }
+}
+
+/// The goal of a game to reach something from the start, in any time.
+fn goal_of(query: &QueryKind) -> Option<&Predicate> {
+    match query {
+        QueryKind::Control {
+            objective: Objective::Reach(goal) | Objective::Until(_, goal),
+            cooperative: false,
+            time_optimal: None,
+            observations: None,
+        } => Some(goal),
+        _ => None,
+    }
+}
