@@ -108,6 +108,9 @@ class Surface:
         """
         if len(numbers) < 3:
             raise malformed(self.path, f"has a face with {len(numbers)} corners {where}")
+        strangers = [number for number in numbers if not 0 <= number < MOST_POINTS]
+        if strangers:
+            raise malformed(self.path, f"has a face with point {str(strangers[0])[:40]} {where}")
         for one, two in itertools.pairwise(numbers[1:]):
             self.corners.extend((numbers[0], one, two))
         if len(self.corners) > 3 * MOST_TRIANGLES:

@@ -489,6 +489,13 @@ MISTAKES: dict[str, tuple[Prepare, str, str, str, str]] = {
         "once more",
     ),
     "point 0 of OBJ": (text("m.obj", "v 0 0 0\nf 0 1 1\n"), MESH, "N101", "point `0`", "once"),
+    "huge point of OBJ": (
+        text("m.obj", "v 0 0 0\nf 1 1 99999999999999999999\n"),
+        MESH,
+        "N101",
+        "point 99999999999999999998 in line 2",
+        "once more",
+    ),
     "number of OBJ": (text("m.obj", "v 0 0 zero\n"), MESH, "N101", "`0 0 zero`", "once"),
     "curve of OBJ": (text("m.obj", "curv 0 1 1 2\n"), MESH, "N101", "line 1: `curv", "once"),
     "point of PLY that is not there": (
