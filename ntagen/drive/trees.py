@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -130,6 +131,8 @@ def course_from_log(text: str, tree: bytes | None) -> Course:
 
 
 def _require_lengths(segment: Segment) -> None:
+    if not math.isfinite(segment.roll_rad):
+        raise ValueError("rolls are finite")
     for branch in segment.branches:
         if not branch.length_mm > _SMALL_MM or not branch.factor > 0.0:
             raise ValueError("lengths and factors are greater than 0")

@@ -62,7 +62,8 @@ def read_experiment(path: Path, runs: int | None = None) -> Experiment:
         document = tomllib.loads(text)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: this is no text in UTF-8: {error}") from error
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
+        # Numbers of thousands of digits, and tables in tables without an end, are such errors.
         raise InputError(f"{path}: {error}\nhint: the file is written in TOML") from error
     return _checked(_Reader(path, text, runs), document)
 

@@ -222,7 +222,8 @@ class _Binary:
             raise self._cut()
         rows = np.frombuffer(self._data, dtype=kind, count=element.count, offset=self._at)
         self._at += element.count * kind.itemsize
-        columns = [rows[f"p{place}"].astype(float) for place in places]
+        with np.errstate(invalid="ignore"):  # A NaN that signals is one as well.
+            columns = [rows[f"p{place}"].astype(float) for place in places]
         surface.points.frombytes(np.stack(columns, axis=1).tobytes())
 
     def skip(self, element: _Element) -> None:
