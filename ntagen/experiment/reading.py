@@ -239,7 +239,9 @@ class _Reader:
         if found is None:
             self._note(number, "seeds", f"{value!r} is no number of runs, and no list", hint)
             return None
-        if not found or min(found) < 0 or max(found) > _MAX_SEED or len(found) > _MAX_SEEDS:
+        # The least of a range of 10^12 numbers is its first; nobody looks at all of them.
+        ends = [found[0], found[-1]] if found and isinstance(found, range) else found
+        if not ends or min(ends) < 0 or max(ends) > _MAX_SEED or len(found) > _MAX_SEEDS:
             cause = f"{value!r} is not 1 to {_MAX_SEEDS:,} seeds, each 0 or more"
             self._note(number, "seeds", cause, hint)
             return None

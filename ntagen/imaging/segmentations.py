@@ -113,7 +113,7 @@ def _mask(volume: Volume, part: Part) -> Mask:
             f"the spacing of `{path}` is {', '.join(f'{s:g}' for s in spacing)}",
             "save it with the geometry of its image: each spacing is greater than 0",
         )
-    farthest = np.abs(origin).max() + (spacing * max(volume.sizes)).max()
+    farthest = math.hypot(*map(float, origin)) + float(spacing.max()) * max(volume.sizes)
     if not farthest <= _FARTHEST:
         raise ImageError(
             "matrix-degenerate",
