@@ -100,6 +100,7 @@ def test_the_digest_tells_rows_and_scenes_apart_but_not_seeds_or_comments(tmp_pa
         (ROW + "drive = 4\n", ("4 is no table",)),
         (ROW + "drive = { pull = 1, push = 2 }\n", ("`pull` (1 mm)", "must be greater")),
         (ROW.replace("2", "0"), ("`seeds`", "0 is not 1 to 1,000,000 seeds")),
+        (ROW.replace("2", "10" * 9), ("`seeds`", "is not 1 to 1,000,000 seeds")),
         (ROW.replace("2", "-3"), ("`seeds`", "-3 is not 1 to")),
         (ROW.replace("2", "[]"), ("`seeds`", "there are no seeds")),
         (ROW.replace("2", "[1, -1]"), ("`seeds`", "each 0 or more")),
