@@ -17,6 +17,7 @@ from ntagen.needle.vectors import add, cross, scale, subtract, unit
 from ntagen.plan.actions import Roll
 from ntagen.plan.extract import leads_to_target
 from ntagen.render import render
+from ntagen.rounding import units_per_mm
 from ntagen.scene import Vector
 from ntagen.traces.grid import GRID_DEG, _nearest, frame_at
 from ntagen.traces.matching import Match, Options, match_trace
@@ -235,7 +236,7 @@ def test_the_generated_model_can_make_a_matched_plan(kind: str) -> None:
         scene = replace(BENCH, needle=found.needle, axis=axis, targets=(target,))
         walk = checker.load(render(scene.expected(), only_plans=True)).walk("interpreter")
         leads = leads_to_target(walk, found.plan, scene)
-        return leads, walk.variables["needle_progress"] / scene.resolution_per_mm
+        return leads, walk.variables["needle_progress"] / units_per_mm(scene)
 
     is_made, depth_mm = makes(end_mm)
     assert is_made
