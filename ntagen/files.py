@@ -22,7 +22,7 @@ import io
 import os
 import re
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Final, Literal
 
@@ -64,6 +64,7 @@ def write_files(contents: Mapping[Path, Content]) -> None:
     targets: list[_Target] = []
     made: list[Path] = []
     done = False
+    _half_written[id(targets)] = lambda: _remove(targets, made)
     try:
         for path, content in contents.items():
             with _naming(path):
@@ -82,14 +83,29 @@ def write_files(contents: Mapping[Path, Content]) -> None:
                     target.part.replace(target.final)
         done = True
     finally:
-        for target in targets:
-            if target.part is not None:
-                with contextlib.suppress(OSError):
-                    target.part.unlink(missing_ok=True)
-        if not done:
-            for folder in reversed(made):
-                with contextlib.suppress(OSError):
-                    folder.rmdir()
+        _remove(targets, [] if done else made)
+        del _half_written[id(targets)]
+
+
+def _remove(targets: Sequence[_Target], folders: Sequence[Path]) -> None:
+    """Removes temporary files, and folders that were made for them if they are empty."""
+    for target in targets:
+        if target.part is not None:
+            with contextlib.suppress(OSError):
+                target.part.unlink(missing_ok=True)
+    for folder in reversed(folders):
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+
+
+_half_written: Final[dict[int, Callable[[], None]]] = {}
+"""What undoes what is half written now."""
+
+
+def abandon() -> None:
+    """Undoes what is half written: for a program that ends at once."""
+    for undo in list(_half_written.values()):
+        undo()
 
 
 def require_apart(outputs: Mapping[str, str | Path | None], inputs: Mapping[str, Path]) -> None:
@@ -142,6 +158,7 @@ class GrowingFile:
             else:
                 self._descriptor = _descriptor(target)
         self.closed = False
+        _half_written[id(self)] = self.close
         try:
             if self._is_plain:
                 lock(
@@ -195,6 +212,7 @@ class GrowingFile:
         if self.closed:
             return
         self.closed = True
+        _half_written.pop(id(self), None)
         with contextlib.suppress(OSError):
             if self._is_ours:
                 os.ftruncate(self._descriptor, self._length)

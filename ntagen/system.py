@@ -5,6 +5,7 @@ It looks for what there is and not at the name of the system, so that tests can 
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import errno
 import importlib
@@ -25,6 +26,9 @@ AT_ONCE: Final[int] = getattr(os, "O_NONBLOCK", 0)
 
 KILL: Final[signal.Signals] = getattr(signal, "SIGKILL", signal.SIGTERM)
 """The signal that ends a process at once; Windows has only such ones."""
+
+ALARM: Final[signal.Signals] = getattr(signal, "SIGALRM", signal.SIGABRT)
+"""The signal that `alarm` sends; nothing else in the package uses it."""
 
 HANG_UPS: Final[tuple[signal.Signals, ...]] = tuple(
     getattr(signal, name) for name in ("SIGHUP", "SIGBREAK") if hasattr(signal, name)
@@ -82,6 +86,15 @@ def keep_access(descriptor: int, found: os.stat_result) -> None:
         with contextlib.suppress(OSError):
             os.fchown(descriptor, found.st_uid, found.st_gid)
     os.fchmod(descriptor, stat.S_IMODE(found.st_mode))
+
+
+def alarm(main_thread: int) -> None:
+    """Sends `ALARM` to the main thread, from another one; `main_thread` is its identity."""
+    if hasattr(signal, "pthread_kill"):
+        # This also ends a system call in which it waits.
+        signal.pthread_kill(main_thread, ALARM)
+    else:
+        _thread.interrupt_main(ALARM)
 
 
 def core_count() -> int:

@@ -20,16 +20,22 @@ use std::sync::Arc;
 use std::thread;
 
 /// Returns whether to end; is told how many bytes are about to be allocated beside what the account
-/// says.
+/// says, or [`OUT_OF_NUMBERS`].
 pub type Look = Arc<dyn Fn(u64) -> bool + Send + Sync>;
 
 /// Work was cut off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut;
 
+/// What a [`Look`] is told when work ends because there are too many things to number.
+pub const OUT_OF_NUMBERS: u64 = u64::MAX;
+
 /// Units of work between two looks: bounds that are read or written, of which a core does about a
 /// thousand million a second.
 const BETWEEN_LOOKS: i64 = 1 << 21;
+
+/// Bytes of something that grows between two looks.
+const BYTES_BETWEEN_LOOKS: usize = 1 << 20;
 
 thread_local! {
     /// Units of work that are left until the next look.
@@ -39,6 +45,8 @@ thread_local! {
     static DONE: Cell<u64> = const { Cell::new(0) };
     /// Bytes of the operations that run: see [`hold`].
     static HELD: Cell<u64> = const { Cell::new(0) };
+    /// How many things of a kind have numbers: see [`number`].
+    static NUMBERS: Cell<usize> = const { Cell::new(u32::MAX as usize) };
 }
 
 /// Counts units of work, and looks when they have become many.
@@ -79,9 +87,68 @@ pub fn hold(bytes: usize) -> Held {
     Held(bytes as u64)
 }
 
+/// Room that something takes which grows bit by bit.
+#[derive(Debug, Default)]
+pub struct Room {
+    bytes: usize,
+    asked: usize,
+}
+
+impl Room {
+    /// Takes these bytes more. They are asked for when they have become many.
+    pub fn take(&mut self, bytes: usize) {
+        self.bytes += bytes;
+        if self.bytes >= self.asked + BYTES_BETWEEN_LOOKS {
+            self.asked = self.bytes;
+            ask_for(self.bytes);
+        }
+    }
+}
+
 impl Drop for Held {
     fn drop(&mut self) {
         HELD.set(HELD.get() - self.0);
+    }
+}
+
+/// The number of a new thing of which there are `count`, such as a state that is stored. Numbers
+/// have 32 bits, which keeps tables small, and the last one stands for none: where there are more
+/// things, work ends as it does at a limit.
+#[inline]
+pub fn number(count: usize) -> u32 {
+    if count >= NUMBERS.get() {
+        run_out_of_numbers();
+    }
+    count as u32
+}
+
+/// The same where fewer bits are left for the number.
+#[inline]
+pub fn number_below(most: usize, count: usize) -> u32 {
+    if count >= most {
+        run_out_of_numbers();
+    }
+    number(count)
+}
+
+#[cold]
+fn run_out_of_numbers() -> ! {
+    look(OUT_OF_NUMBERS);
+    cut()
+}
+
+/// Does work as if numbers were fewer; for tests.
+pub fn with_numbers<R>(most: u32, run: impl FnOnce() -> R) -> R {
+    let _before = NumbersBefore(NUMBERS.replace(most as usize));
+    run()
+}
+
+/// Puts back how many numbers there were, also where the work is cut off.
+struct NumbersBefore(usize);
+
+impl Drop for NumbersBefore {
+    fn drop(&mut self) {
+        NUMBERS.set(self.0);
     }
 }
 
@@ -214,6 +281,21 @@ mod tests {
     }
 
     #[test]
+    fn what_grows_bit_by_bit_is_asked_for() {
+        let look: Look = Arc::new(|bytes| bytes > 5 << 20);
+        let taken = Cell::new(0);
+        let result = within(look, || {
+            let mut room = Room::default();
+            loop {
+                room.take(1000);
+                taken.set(taken.get() + 1000);
+            }
+        });
+        assert_eq!(result, Err::<(), Cut>(Cut));
+        assert!((5 << 20..7 << 20).contains(&taken.get()), "{taken:?} bytes");
+    }
+
+    #[test]
     fn what_is_held_counts_until_it_is_dropped() {
         let look: Look = Arc::new(|bytes| bytes > 1000);
         let result = within(look, || {
@@ -234,6 +316,29 @@ mod tests {
         let seen = Arc::new(AtomicU64::new(0));
         let result = within(counting(&seen, 1), || (7, unless_cut(|| ask_for(1))));
         assert_eq!(result, Ok((7, Err(Cut))));
+    }
+
+    #[test]
+    fn more_things_than_numbers_end_the_work() {
+        let told = Arc::new(AtomicU64::new(0));
+        let seen = Arc::clone(&told);
+        let look: Look = Arc::new(move |bytes| {
+            seen.store(bytes, Ordering::Relaxed);
+            false
+        });
+        let numbered = |most| with_numbers(most, || (0..10).map(number).collect::<Vec<_>>());
+        assert_eq!(
+            within(Arc::clone(&look), || numbered(10)),
+            Ok((0..10).collect())
+        );
+        assert_eq!(within(look, || numbered(9)), Err(Cut));
+        assert_eq!(told.load(Ordering::Relaxed), OUT_OF_NUMBERS);
+        assert_eq!(
+            unless_cut(|| number(u32::MAX as usize - 1)),
+            Ok(u32::MAX - 1)
+        );
+        assert_eq!(unless_cut(|| number(u32::MAX as usize)), Err(Cut));
+        assert_eq!(unless_cut(|| number_below(8, 8)), Err(Cut));
     }
 
     #[test]

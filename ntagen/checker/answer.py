@@ -122,6 +122,8 @@ class Answer:
             environment has choices, so that a strategy is not a list of plans.
         has_more_plans: Whether there are more plans, or may be.
         plans_stop: ``states``, ``memory`` or ``time`` if a limit ended the list of plans.
+        stopped: What was asked for beside the verdict and is missing (``strategy``, ``check`` or
+            ``certificate``), each with the limit that came before.
         verified: Whether the strategy and the exact runs of the traces passed their independent
             checks; ``None`` if there was no check, or one did not finish.
         verification: What these checks covered, or what is wrong, line by line.
@@ -159,6 +161,7 @@ class Answer:
         self.plan_count = raw.plan_count
         self.has_more_plans = raw.has_more_plans
         self.plans_stop = raw.plans_stop
+        self.stopped = tuple(raw.stopped)
         self.verified = raw.verified
         self.verification = tuple(raw.verification())
 

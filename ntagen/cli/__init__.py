@@ -19,13 +19,14 @@ import importlib.util
 import io
 import os
 import re
+import signal
 import sys
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NoReturn
 
 import click
 
-from ntagen.cli.signals import TERMINATED, Terminated, termination
+from ntagen.cli.signals import INTERRUPTED, TERMINATED, LimitReached, Terminated, ending
 from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError, LimitError, NtagenError
 from ntagen.version import VERSION
@@ -56,7 +57,6 @@ COMMANDS: Final = {
 """The commands in the order of the help, each with its line there."""
 
 INTERNAL_ERROR: Final = 70
-INTERRUPTED: Final = 130
 PIPE_CLOSED: Final = 141
 """The code that a shell gives a program that SIGPIPE ends."""
 
@@ -137,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # A pipe on Windows has few characters; the others are shown by their numbers.
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="backslashreplace")
-    with termination() as signalled:
+    with ending(_leave) as ended:
         try:
             code = _run(list(sys.argv[1:] if arguments is None else arguments))
             sys.stdout.flush()
@@ -145,9 +145,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise
         except BaseException as error:  # also KeyboardInterrupt and panics of the engine
             code = _report(error)
+    if arguments is None and ended.came == signal.SIGINT:
+        # Nothing is left to do but to end, which takes a moment.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     # What is interrupted, or ends with what it has until then, was ended by the signal.
     is_ended = code in (INTERRUPTED, LimitError.exit_code)
-    return TERMINATED if signalled.came and is_ended else code
+    return TERMINATED if ended.came == signal.SIGTERM and is_ended else code
+
+
+def _leave(code: int) -> NoReturn:
+    """Ends the program at once: the user has asked for its end a second time."""
+    from ntagen.files import abandon
+
+    abandon()
+    # Whatever writes to standard error now is interrupted itself.
+    with contextlib.suppress(OSError):
+        os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, b"interrupted\n")
+    os._exit(code)
 
 
 def verifyta() -> int:
@@ -188,6 +202,9 @@ def _report(error: BaseException) -> int:
         case NtagenError():
             _say(_with_severity(str(error)))
             return error.exit_code
+        case LimitReached():
+            _say(f"error: {error}")
+            return LimitError.exit_code
         case Terminated():
             _say("terminated")
             return INTERRUPTED

@@ -71,7 +71,7 @@ def _record(outcome: Outcome) -> dict[str, object]:
         "value": None if answer is None else answer.value,
         "message": outcome.refusal if answer is None else answer.message,
         "wrapped": asdict(answer.wrapped) if answer is not None and answer.wrapped else None,
-        "stop": outcome.list_stop if answer is None else answer.stop or outcome.list_stop,
+        "stop": outcome.stop if answer is None else answer.stop or outcome.stop,
         "explored": 0 if answer is None else answer.explored,
         "stored": 0 if answer is None else answer.stored,
         "seconds": 0.0 if answer is None else answer.seconds,

@@ -17,7 +17,8 @@ from ntagen.cli.answer_formats import FORMATS, Format, GitHub, JsonLines, JUnit,
 from ntagen.cli.answer_rows import Human
 from ntagen.cli.asked import is_used_by, queries_of, with_strategies
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
-from ntagen.cli.evidence import Outputs, write_evidence
+from ntagen.cli.evidence import Outputs, backed
+from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.joint import joint_answers
 from ntagen.cli.models import (
     constant_option,
@@ -33,6 +34,7 @@ from ntagen.cli.outcomes import Outcome, exit_code
 from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.run_progress import progress_of, say_interrupted
+from ntagen.cli.signals import LimitReached
 from ntagen.cli.spreading import Spreading, dask_option
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -64,8 +66,9 @@ class _CheckCommand(click.Command):
     "check",
     cls=_CheckCommand,
     epilog="Exit codes: 0 every query is satisfied (with --expect: as expected), 1 some are not, "
-    "2 the input is rejected (the other queries are still answered), 3 stopped by a limit, or the "
-    "verdict is maybe, 4 run-time error in the model, 70 internal error (also if a strategy or "
+    "2 the input is rejected (the other queries are still answered), 3 stopped by a limit (the "
+    "answer, its check, or what should be written), or the verdict is maybe, 4 run-time error in "
+    "the model, 70 internal error (also if a strategy or "
     "trace fails its check), 130 interrupted (the counters so far are printed; random runs until "
     "then are an answer, with 3), 141 nobody reads the output any more, 143 ended by SIGTERM.",
 )
@@ -170,6 +173,7 @@ class _CheckCommand(click.Command):
 @constant_option()
 @include_option()
 @external_option()
+@guarded
 def command(
     model_path: Path,
     second_path: Path | None,
@@ -254,8 +258,10 @@ def command(
     )
     shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
     outcomes: list[Outcome] = []
+    guard = current()
     with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
-        loaded = load_model(model_path, include, overflow, constants, allow_external)
+        with doing("loading the model"):
+            loaded = load_model(model_path, include, overflow, constants, allow_external)
         shown_already = len(loaded.model.warnings)
         todo = with_strategies(loaded.model, queries_of(loaded.model, asked, query_path))
         if loaded.task is not None:
@@ -271,7 +277,9 @@ def command(
     shown.loaded(model_path, loaded.model)
     together = joint_answers(loaded.model, todo, options, quiet=not is_human) if joint else {}
     for number, query in enumerate(todo):
+        guard.next_query()
         is_used = is_used_by(query, todo[number + 1 :])
+        options = replace(options, timeout_s=guard.left_s())
         outputs = replace(outputs, limits=list_limits(options, quiet=not is_human))
         wanted = replace(
             options,
@@ -287,17 +295,22 @@ def command(
                 answer, found = _unless_wrong(together[number]), None
             else:
                 with (
+                    doing(f"the search for the answer to {query.text.strip()}"),
                     spreading.source(loaded.model, query, wanted) as source,
                     progress_of(query.text, query.form, quiet=not is_human) as reports,
                 ):
                     wanted = replace(wanted, **reports, **source)
                     answer, found = answered(loaded, query, wanted, overflow)
+            guard.has_answer()
         except Interrupted as interrupted:
             # The runs until then say something, and that is what the user gets.
             outcomes.append(replace(outcome, answer=interrupted.answer))
             say_interrupted(query.text, len(todo) - number - 1)
             shown.one(outcomes[-1])
             break
+        except LimitReached as reached:
+            outcomes.append(_shown(shown, outcome.stopped(reached)))
+            continue
         except InputError as error:
             # The other queries may be right, and the user wants their answers.
             outcomes.append(replace(outcome, refusal=_with_severity(str(error))))
@@ -307,18 +320,33 @@ def command(
             echo("\n".join([query.text, *answer.verification]), err=True)
             return INTERNAL_ERROR
         show_warnings(answer.warnings)
-        covered = answer.verification if verify else ()
-        notes = [*covered, *write_evidence(answer, query, outputs, loaded)]
-        list_stop = outputs.stops.get(query.text)
+        outcome = backed(replace(outcome, answer=answer), outputs, loaded, verify=verify)
         if found is not None:
-            answer = answer_of(found)
-            notes += defence_notes(found, plans)
+            notes = (*outcome.notes, *defence_notes(found, plans))
+            outcome = replace(outcome, answer=answer_of(found), notes=notes)
             outputs.written.add("--plans")
-        outcomes.append(replace(outcome, answer=answer, notes=tuple(notes), list_stop=list_stop))
-        shown.one(outcomes[-1])
+        outcomes.append(_shown(shown, outcome))
     shown.end(outcomes)
-    say(unwritten(outputs.wanted(), outputs.written))
+    _say_unwritten(outputs, outcomes)
     return exit_code(outcomes)
+
+
+def _say_unwritten(outputs: Outputs, outcomes: Sequence[Outcome]) -> None:
+    """Says which outputs no answer gave; where a limit came first, its note has said it."""
+    if not any(one.stop for one in outcomes):
+        say(unwritten(outputs.wanted(), outputs.written))
+
+
+def _shown(shown: Format, outcome: Outcome) -> Outcome:
+    """An outcome that is shown; if a limit ends that, at least what has become of it."""
+    try:
+        with doing("printing the answer"):
+            shown.one(outcome)
+        return outcome
+    except LimitReached as reached:
+        stopped = outcome.stopped(reached)
+        shown.one(stopped)
+        return stopped
 
 
 _NOTHING_EXPECTED: Final = (
@@ -379,7 +407,7 @@ def _rejections_in(shown: Format, path: Path) -> Iterator[None]:
     """Also puts the rejection of a model or a list of queries into the output."""
     try:
         yield
-    except InputError as error:
+    except (InputError, LimitReached) as error:
         shown.refused(path, str(error))
         raise
 

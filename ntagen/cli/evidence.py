@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.asked import Asked
+from ntagen.cli.guard import doing
+from ntagen.cli.outcomes import Outcome
 from ntagen.cli.plan_lists import (
     LINES,
     ListLimits,
@@ -18,6 +20,7 @@ from ntagen.cli.plan_lists import (
     write_document,
     write_lines,
 )
+from ntagen.cli.signals import LimitReached
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 from ntagen.values import dataclass
@@ -52,6 +55,11 @@ class Outputs:
         """Whether a strategy is written in some form."""
         return self.strategy is not None or self.controller is not None
 
+    def missing(self) -> list[str]:
+        """The options whose output was asked for and has not been written."""
+        wanted = self.wanted().items()
+        return [name for name, target in wanted if target and name not in self.written]
+
     def wanted(self) -> dict[str, str | Path | None]:
         """Where the output of each option is written."""
         return {
@@ -63,31 +71,61 @@ class Outputs:
         }
 
 
-def write_evidence(answer: Answer, query: Asked, outputs: Outputs, loaded: Loaded) -> list[str]:
-    """Writes what was asked for; returns a line for the user about each output."""
+def backed(outcome: Outcome, outputs: Outputs, loaded: Loaded, *, verify: bool) -> Outcome:
+    """Writes the evidence of an answer; the outcome with notes about it, and the limit that came.
+
+    Args:
+        outcome: The answer to a query.
+        outputs: What is wanted, and where.
+        loaded: The model.
+        verify: Whether the notes begin with what checks have covered.
+    """
+    answer, query = outcome.answer, outcome.query
+    if answer is None:
+        return outcome
+    notes = list(answer.verification if verify else ())
+    stop: str | None = answer.stopped[0][1] if answer.stopped else None
+    try:
+        _write_evidence(answer, query, outputs, loaded, notes)
+    except LimitReached as reached:
+        notes.append(f"{reached}; not written: {', '.join(outputs.missing())}")
+        stop = reached.limit
+    stop = outputs.stops.get(query.text, stop)
+    return replace(outcome, notes=tuple(notes), stop=stop)
+
+
+def _write_evidence(
+    answer: Answer, query: Asked, outputs: Outputs, loaded: Loaded, notes: list[str]
+) -> None:
+    """Writes what was asked for, and adds a line for the user about each output to `notes`."""
     task = loaded.task
-    notes: list[str] = []
-    if outputs.trace and (trace := answer.trace_json()) is not None:
-        outputs.written.add("--trace")
-        notes += _write_trace(answer, query, outputs.trace, trace, loaded.model)
-    certificate = answer.certificate_text() if outputs.certificate else None
-    if outputs.certificate and certificate is not None:
-        write_files({outputs.certificate: certificate})
-        outputs.written.add("--certificate")
-        states = certificate.count("\n") - 1
-        notes.append(f"certificate of {states} states written to {outputs.certificate}")
-    if outputs.strategy and (text := _strategy_text(answer, query, outputs.strategy)) is not None:
-        outputs.written.add("--strategy")
-        notes += _write_strategy(answer, outputs.strategy, text)
-    controller = answer.controller_c() if outputs.controller else None
-    if outputs.controller and controller is not None:
-        write_files({outputs.controller: controller})
-        outputs.written.add("--controller")
-        notes.append(f"controller written to {outputs.controller}")
+    if outputs.trace:
+        with doing("writing the trace"):
+            if (trace := answer.trace_json()) is not None:
+                notes += _write_trace(answer, query, outputs.trace, trace, loaded.model)
+                outputs.written.add("--trace")
+    if outputs.certificate:
+        with doing("writing the certificate"):
+            if (certificate := answer.certificate_text()) is not None:
+                write_files({outputs.certificate: certificate})
+                outputs.written.add("--certificate")
+                states = certificate.count("\n") - 1
+                notes.append(f"certificate of {states} states written to {outputs.certificate}")
+    if outputs.strategy:
+        with doing("the strategy was found; writing it"):
+            if (text := _strategy_text(answer, query, outputs.strategy)) is not None:
+                notes += _write_strategy(answer, outputs.strategy, text)
+                outputs.written.add("--strategy")
+    if outputs.controller:
+        with doing("the strategy was found; writing its controller"):
+            if (controller := answer.controller_c()) is not None:
+                write_files({outputs.controller: controller})
+                outputs.written.add("--controller")
+                notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
-        outputs.written.add("--plans")
-        notes += _write_plans(answer, query, outputs, outputs.plans, task)
-    return notes
+        with doing("writing the plans"):
+            notes += _write_plans(answer, query, outputs, outputs.plans, task)
+            outputs.written.add("--plans")
 
 
 def _write_trace(

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.guard import doing
+from ntagen.cli.limits import bounded
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.terminal import echo, safe, table_console
 from ntagen.files import write_files
@@ -27,7 +29,7 @@ ROWS_SHOWN: Final = 40
 """A table shows at most this many rows; the JSON object has all."""
 
 
-@click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong.")
+@click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong, 3 stopped by a limit.")
 @click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
 @click.option(
@@ -38,6 +40,7 @@ ROWS_SHOWN: Final = 40
     help="Write a picture of each template to this folder; it is made if it does not exist.",
 )
 @include_option()
+@bounded
 def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path, ...]) -> None:
     """Show what is in a model: templates, processes, variables, clocks, channels, features.
 
@@ -77,7 +80,7 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
                  depth_mm (down to which it holds), circle_error_mm (the bound on a single circle,
                  down to the targets), least_margin_mm: of an environment
     """  # noqa: D301  click wants the control character
-    with pointing_to_explanations(not as_json):
+    with pointing_to_explanations(not as_json), doing("loading the model"):
         loaded = load_model(path, include)
     model, configuration = loaded.model, None
     if loaded.task is not None:

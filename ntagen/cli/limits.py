@@ -1,12 +1,14 @@
-"""The limits of a search, as options of the commands that search."""
+"""The limits of commands as options: of their searches, and of all that they do."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import click
 
+from ntagen.cli.guard import Guard
 from ntagen.cli.quantities import COUNT, SIZE, TIME
 from ntagen.cli.rules import Decorator
 
@@ -41,8 +43,8 @@ def limits(
             type=SIZE,
             callback=_whole,
             help=about(
-                "Stop a search that takes this much memory, for example 4GiB.  "
-                f"[default: {default}]"
+                "Stop what takes this much memory, for example 4GiB: a search by its states, all "
+                f"else by what the process takes.  [default: {default}]"
             ),
         ),
         "timeout_s": click.option(
@@ -51,8 +53,8 @@ def limits(
             metavar="TIME",
             type=TIME,
             help=about(
-                "Stop a search after this time, for example 60s or 2min; a number without a unit "
-                f"is in seconds.  [default: {default}]"
+                "Stop after this time, with reading, writing and drawing, for example 60s or 2min; "
+                f"a number without a unit is in seconds.  [default: {default}]"
             ),
         ),
     }
@@ -60,6 +62,20 @@ def limits(
 
 LIMITS: Final = limits()
 """The options ``--states``, ``--memory`` and ``--timeout``."""
+
+
+def bounded(command: Callable[..., int | None]) -> Callable[..., int | None]:
+    """Adds ``--timeout`` and ``--memory`` to a command without a search: all it does ends then."""
+
+    @functools.wraps(command)
+    def within(**values: Any) -> int | None:  # noqa: ANN401  click's values
+        with Guard(values.pop("timeout_s"), values.pop("memory_bytes")):
+            return command(**values)
+
+    decorated: Callable[..., int | None] = within
+    for name in ("memory_bytes", "timeout_s"):
+        decorated = LIMITS[name](decorated)
+    return decorated
 
 
 def limit_options(of: str) -> Decorator:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.asked import Asked
+from ntagen.cli.signals import LimitReached
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.values import dataclass
 
@@ -42,10 +43,11 @@ class Outcome:
 
     Attributes:
         query: The query.
-        answer: The answer; ``None`` if the query is refused.
-        refusal: Why it is refused: the diagnostics.
+        answer: The answer; ``None`` if the query is refused, or a limit came before there was any.
+        refusal: Why there is none: the diagnostics, or what the limit has stopped.
         notes: Lines for the user about the answer.
-        list_stop: ``time`` or ``memory`` if that limit ended a list of plans.
+        stop: ``time``, ``memory`` or ``states`` if that limit came before the answer, or before all
+            that was asked for beside it: its check, evidence, a list of plans.
         is_compared: Whether the answer is compared with what is expected.
         expected: What is expected; ``None`` if nothing is said about it.
     """
@@ -54,9 +56,13 @@ class Outcome:
     answer: Answer | None
     refusal: str = ""
     notes: tuple[str, ...] = ()
-    list_stop: str | None = None
+    stop: str | None = None
     is_compared: bool = False
     expected: Expected | None = None
+
+    def stopped(self, reached: LimitReached) -> Outcome:
+        """The outcome if a limit came before there was an answer that could be shown."""
+        return replace(self, answer=None, refusal=f"error: {reached}", notes=(), stop=reached.limit)
 
     @property
     def shows_runs(self) -> bool:
@@ -65,8 +71,10 @@ class Outcome:
 
     @property
     def verdict(self) -> str:
-        """The verdict of the answer, or ``refused``."""
-        return "refused" if self.answer is None else self.answer.verdict
+        """The verdict of the answer, ``refused``, or ``unknown`` if a limit came first."""
+        if self.answer is not None:
+            return self.answer.verdict
+        return "refused" if self.stop is None else "unknown"
 
     @property
     def is_as_expected(self) -> bool | None:
@@ -81,7 +89,7 @@ class Outcome:
     @property
     def code(self) -> int:
         """The exit code that this query alone would give."""
-        stopped = LimitError.exit_code if self.list_stop else 0
+        stopped = LimitError.exit_code if self.stop else 0
         code = max(_CODES[self.verdict], stopped)
         if not self.is_compared:
             return code
@@ -121,6 +129,8 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 def fault_of(outcome: Outcome) -> str:
     """Why the run fails because of a query, on one line: the verdict, and what was expected."""
     answer = outcome.answer
+    if answer is None and outcome.stop is not None:
+        return outcome.refusal.removeprefix("error: ").partition("\n")[0]
     if answer is None:
         first = next(mistakes_in(outcome.refusal), None)
         return f"refused: {outcome.refusal.partition(chr(10))[0] if first is None else first.text}"
@@ -129,8 +139,8 @@ def fault_of(outcome: Outcome) -> str:
         text = f"stopped by the {answer.limit_text}"
     elif answer.value is not None:
         text += f", value {answer.value}"
-    elif outcome.list_stop:
-        text += f", but the list of plans was stopped by the {outcome.list_stop} limit"
+    elif outcome.stop:
+        text += f", but the {outcome.stop} limit came before all that was asked for"
     if outcome.is_as_expected is False:
         text += f"; expected: {outcome.expected}"
     return text if not answer.message else f"{text}: {answer.message}"

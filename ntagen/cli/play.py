@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.guard import Guard, doing
 from ntagen.cli.limits import limit_options
 from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
@@ -118,28 +119,27 @@ def command(
     if steps is None:
         say_idle({"seed": "--seed"}, "without --auto")
     if strategy_path:
-        idle = {
-            "states": "--states",
-            "memory_bytes": "--memory",
-            "timeout_s": "--timeout",
-        }
-        say_idle(idle, "with --strategy: there is no search")
+        say_idle({"states": "--states"}, "with --strategy: there is no search")
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
-    with pointing_to_explanations(True):
-        model = load_model(model_path, include, overflow, constants).model
+    # The play itself takes as long as the user wants.
+    with pointing_to_explanations(True), Guard(timeout_s, memory_bytes) as guard:
+        with doing("loading the model"):
+            model = load_model(model_path, include, overflow, constants).model
         if strategy_path:
-            strategy = model.load_strategy(strategy_path, forced, priorities)
+            with doing("loading the strategy"):
+                strategy = model.load_strategy(strategy_path, forced, priorities)
         else:
             query = _query(model, asked)
-            with shown_progress(query, quiet=steps is not None) as report:
+            quiet = steps is not None
+            with doing("the search for a strategy"), shown_progress(query, quiet=quiet) as report:
                 strategy = model.synthesize(
                     query,
                     forced=forced,
                     priorities=priorities,
                     states=states,
                     memory_bytes=memory_bytes,
-                    timeout_s=timeout_s,
+                    timeout_s=guard.left_s(),
                     progress=report,
                 )
         session = Session(strategy)

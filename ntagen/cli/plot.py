@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.limits import limits
 from ntagen.cli.models import include_option, rank_option
 from ntagen.cli.plot_models import (
     KINDS,
-    LIMITED,
     MODELS,
     MOST_DRAWN,
     MOST_SEARCHED,
@@ -106,6 +106,7 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
 @_LIMITS["timeout_s"]
 @_LIMITS["memory_bytes"]
 @include_option()
+@guarded
 def command(
     source: Path,
     output: Path | None,
@@ -158,7 +159,7 @@ def command(
 
     if kind is not None or source.suffix.lower() in MODELS:
         _without_scene()
-        wish = Wish(kind, asked, at, clocks, most_states, timeout_s, memory_bytes)
+        wish = Wish(kind, asked, at, clocks, most_states, memory_bytes)
         path, code = plot_model(source, output, wish, include, run_wish)
         echo(f"wrote {path}")
         return code
@@ -170,20 +171,20 @@ def command(
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
         say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
-        say_idle(LIMITED, "here: nothing is searched for in the log of a run")
         say_idle({"tree_path": "--strategy"}, "here: the log of a run contains its strategy")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
-        say_idle({"ranking": "--rank", "tree_path": "--strategy"} | LIMITED, "with --plans 0")
+        say_idle({"ranking": "--rank", "tree_path": "--strategy"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     kind_of(path, PAGES)
     require_apart({"-o": path}, {"source": source})
     picture = (
         _of_run(source, shown)
         if _is_log(source)
-        else _of_scene(source, shown, criteria, include, tree_path, (timeout_s, memory_bytes))
+        else _of_scene(source, shown, criteria, include, tree_path, memory_bytes)
     )
-    write_picture(picture, path)
+    with doing("drawing the picture"):
+        write_picture(picture, path)
     echo(f"wrote {path}")
     return 0
 
@@ -218,7 +219,7 @@ def _of_scene(
     ranking: tuple[str, ...],
     include: tuple[Path, ...],
     tree_path: Path | None,
-    limits: tuple[float | None, int | None],
+    memory_bytes: int | None,
 ) -> Picture:
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
@@ -226,15 +227,16 @@ def _of_scene(
     from ntagen.plot.face import picture_with_plans
     from ntagen.plot.run import picture_of_plans
 
-    task = load_task(source, include=include)
+    with doing("loading the task"):
+        task = load_task(source, include=include)
     for warning in task.warnings:
         echo(warning.render(), err=True)
     configuration = configure(task.given, task.scene)
-    timeout_s, memory_bytes = limits
     settings = configuration.settings
+    timeout_s = current().left_s()
     settings = replace(
         settings,
-        engine_time_s=timeout_s or settings.engine_time_s,
+        engine_time_s=settings.engine_time_s if timeout_s is None else timeout_s,
         engine_memory_bytes=memory_bytes or settings.engine_memory_bytes,
     )
     configuration = replace(configuration, settings=settings)
@@ -247,7 +249,8 @@ def _of_scene(
     elif (found := _of_strategy(task.scene, configuration, tree_path)) is not None:
         say_idle({"ranking": "--rank"}, "here: a strategy against the tissue is drawn, not plans")
         return found
-    return picture_with_plans(task.scene, engine, shown)
+    with doing("the search for plans"):
+        return picture_with_plans(task.scene, engine, shown)
 
 
 def _of_strategy(

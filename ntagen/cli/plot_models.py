@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ntagen.checker.picture.page import kind_of
 from ntagen.cli.asked import Asked, queries_of
 from ntagen.cli.effects import say_idle
+from ntagen.cli.guard import current, doing
 from ntagen.cli.models import load_model, pointing_to_explanations
 from ntagen.cli.plot_runs import NAMES, RunWish, plot_runs
 from ntagen.cli.progress import shown_progress
@@ -38,9 +39,6 @@ KINDS: Final = {
     "discrete": "the same without clocks",
 }
 """The pictures of a model, each with what it shows."""
-
-LIMITED: Final = {"timeout_s": "--timeout", "memory_bytes": "--memory"}
-"""The options that limit a search."""
 
 GRAPHS: Final = ("states", "discrete")
 """Those that may be written for Graphviz, too."""
@@ -71,7 +69,6 @@ class Wish:
     most_states: int | None
     """How many states a graph may have."""
 
-    timeout_s: float | None
     memory_bytes: int | None
 
 
@@ -86,13 +83,14 @@ def plot_model(
         LimitError: The search reached a limit.
     """
     with pointing_to_explanations(True):
-        model = load_model(source, include).model
+        with doing("loading the model"):
+            model = load_model(source, include).model
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
             say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
             say_idle({"most_states": "--limit"}, "without --as states or discrete")
             path = path or Path(f"{source.stem}.svg")
             require_apart({"-o": path}, {"source": source})
-            limits = {"timeout_s": wish.timeout_s, "memory_bytes": wish.memory_bytes}
+            limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
             return path, plot_runs(model, asked, path, runs, limits)
         say_idle(NAMES, "here: no random runs are drawn")
         path = path or Path(f"{source.stem}.svg")
@@ -135,10 +133,11 @@ def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
         _plot_graph(model, path, wish)
         return
     if wish.kind == "templates":
-        say_idle(LIMITED, "with --as templates: nothing is searched for")
-        _templates(model).save(path)
+        with doing("drawing the templates"):
+            _templates(model).save(path)
         return
-    _drawn(model, wish).save(path)
+    with doing("drawing the picture"):
+        _drawn(model, wish).save(path)
 
 
 def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
@@ -151,9 +150,9 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
     given = wish.most_states
     searched = max(MOST_SEARCHED, given or 0)
     try:
-        space = model.state_space(
-            searched, timeout_s=wish.timeout_s, memory_bytes=wish.memory_bytes
-        )
+        with doing("the search for the states"):
+            left_s = current().left_s()
+            space = model.state_space(searched, timeout_s=left_s, memory_bytes=wish.memory_bytes)
     except LimitError as error:
         said = str(error).partition("\n")[0]
         if str(searched) not in said:
@@ -162,7 +161,8 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
             f"{said}\nhint: search for more (--limit), or make constants of the model smaller"
         ) from None
     clocks = wish.kind == "states"
-    space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
+    with doing("drawing the graph"):
+        space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
 
 
 def _templates(model: Model) -> Svg:
@@ -201,10 +201,10 @@ def _query(model: Model, wish: Wish) -> Asked:
 
 def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
     """The zones of the strategy of a game."""
-    with shown_progress(query.text, quiet=False) as report:
+    with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
         strategy = model.synthesize(
             query.text,
-            timeout_s=wish.timeout_s,
+            timeout_s=current().left_s(),
             memory_bytes=wish.memory_bytes,
             progress=report,
         )
@@ -256,11 +256,11 @@ def _number(word: str, value: str) -> int | float:
 
 def _trace(model: Model, query: Asked, wish: Wish) -> Run:
     """The trace of a query, with exact times."""
-    with shown_progress(query.text, quiet=False) as report:
+    with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
         answer = model.check(
             query.text,
             trace=True,
-            timeout_s=wish.timeout_s,
+            timeout_s=current().left_s(),
             memory_bytes=wish.memory_bytes,
             progress=report,
         )

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.signals import ending_at_once_next_time
 from ntagen.cli.terminal import echo, safe
 
 if TYPE_CHECKING:
@@ -36,9 +35,8 @@ def so_far(
 def progress_of(query: str, form: QueryForm | None, quiet: bool) -> Iterator[dict[str, Any]]:
     """Gives the options of `ntagen.checker.Options` by which the engine reports its progress.
 
-    A terminal shows it in one line that is overwritten. While there are random runs, the first
-    Ctrl-C ends them, and what they say until then is the answer; the second one ends the program at
-    once.
+    A terminal shows it in one line that is overwritten. While there are random runs, Ctrl-C ends
+    them, and what they say until then is the answer.
 
     Args:
         query: The query that is being answered.
@@ -50,7 +48,7 @@ def progress_of(query: str, form: QueryForm | None, quiet: bool) -> Iterator[dic
             yield {"progress": report}
         return
     start = time.monotonic()
-    with ending_at_once_next_time(), _saying_if_nothing_is_done(query):
+    with _saying_if_nothing_is_done(query):
         if quiet or not sys.stderr.isatty():
             yield {}
             return

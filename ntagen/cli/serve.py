@@ -34,7 +34,7 @@ from ntagen.files import read_file
     type=TIME,
     default="60s",
     show_default=True,
-    help="Stop a search after this time.",
+    help="Stop what is asked for after this time, with reading and drawing.",
 )
 @click.option(
     "--memory",
@@ -43,7 +43,7 @@ from ntagen.files import read_file
     type=SIZE,
     default="1GiB",
     show_default=True,
-    help="Stop a search that takes this much memory.",
+    help="Stop what takes this much memory.",
 )
 @click.option(
     "--upload",

@@ -1,8 +1,9 @@
-"""Ctrl-C and SIGTERM: both end a command in an orderly way; no file is left half written.
+"""What ends a command early: Ctrl-C, SIGTERM, and a limit. No file is left half written.
 
 By default SIGTERM ends a process at once. Here it does what Ctrl-C does, so that temporary files
 are removed, and a run that drives a needle stops it and completes its log. The exit code tells
-which of the two it was.
+which of the two it was. Ending in order may take a moment; whoever does not want to wait for it
+sends the signal once more.
 """
 
 from __future__ import annotations
@@ -12,35 +13,58 @@ import signal
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
-from typing import Any, Final
+from typing import Any, Final, Literal, NoReturn
 
+INTERRUPTED: Final = 128 + signal.SIGINT
 TERMINATED: Final = 128 + signal.SIGTERM
-"""The exit code after SIGTERM, as shells show it."""
+"""The exit codes after Ctrl-C and after SIGTERM, as shells show them."""
 
 Handler = Callable[[int, FrameType | None], None]
+Limit = Literal["time", "memory"]
 
 
 class Terminated(KeyboardInterrupt):
     """SIGTERM came."""
 
 
-class Termination:
-    """Remembers whether SIGTERM came: the exception alone may be turned into another one."""
+class LimitReached(BaseException):
+    """A limit of a command is reached; the work at hand ends. See `ntagen.cli.guard`.
 
-    def __init__(self) -> None:
-        self.came = False
+    It is no `Exception`, so that no library takes it for a failure of its own.
 
-    def handle(self, _number: int, _frame: FrameType | None) -> None:
-        """Ends the command as Ctrl-C does."""
-        self.came = True
-        raise Terminated
+    Attributes:
+        limit: Which limit; the engine reads it, too.
+    """
+
+    def __init__(self, limit: Limit, text: str) -> None:
+        super().__init__(text)
+        self.limit = limit
+
+
+class Ending:
+    """Remembers which signal came first: the exception alone may be turned into another one.
+
+    Args:
+        leave: Ends the program at once, with an exit code; half-written files are removed.
+    """
+
+    def __init__(self, leave: Callable[[int], NoReturn]) -> None:
+        self._leave = leave
+        self.came: int | None = None
+
+    def handle(self, number: int, _frame: FrameType | None) -> None:
+        """Interrupts the command; if it is being interrupted already, ends the program."""
+        if self.came is not None:
+            self._leave(128 + self.came)
+        self.came = number
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
 
 @contextlib.contextmanager
-def termination() -> Iterator[Termination]:
-    """Turns SIGTERM into an interruption, if this thread can handle signals."""
-    found = Termination()
-    with handled({signal.SIGTERM: found.handle}):
+def ending(leave: Callable[[int], NoReturn]) -> Iterator[Ending]:
+    """Handles Ctrl-C and SIGTERM, if this thread can handle signals."""
+    found = Ending(leave)
+    with handled({signal.SIGINT: found.handle, signal.SIGTERM: found.handle}):
         yield found
 
 
@@ -59,18 +83,3 @@ def handled(handlers: dict[signal.Signals, Handler]) -> Iterator[None]:
     finally:
         for number, handler in old.items():
             signal.signal(number, handler)
-
-
-@contextlib.contextmanager
-def ending_at_once_next_time() -> Iterator[None]:
-    """Lets the first Ctrl-C interrupt as always, and the second one end the program at once.
-
-    The engine ends its work in an orderly way after the first one, which may take a moment.
-    """
-
-    def interrupt(_number: int, _frame: FrameType | None) -> None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        raise KeyboardInterrupt
-
-    with handled({signal.SIGINT: interrupt}):
-        yield

@@ -9,6 +9,8 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.guard import doing
+from ntagen.cli.limits import bounded
 from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import echo
@@ -28,7 +30,7 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
 @click.command(
     "verify",
     epilog="Exit codes: 0 the evidence holds, 1 it does not, 2 the input is rejected, 3 the check "
-    "does not cover the model or the query.",
+    "does not cover the model or the query, or a limit came first.",
 )
 @click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
@@ -43,6 +45,7 @@ _WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certi
 @constant_option()
 @include_option()
 @overflow_rule()
+@bounded
 def command(
     model_path: Path,
     file: Path,
@@ -78,9 +81,11 @@ def command(
       ntagen verify game.xml win.json
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(True):
-        loaded = load_model(model_path, include, overflow, constants)
-        text = _read(file)
-        checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
+        with doing("loading the model"):
+            loaded = load_model(model_path, include, overflow, constants)
+        with doing(f"checking {file}"):
+            text = _read(file)
+            checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
     kind = _WITHOUT_RULES.match(text)
     if kind:
         idle = {"forced": "--forced", "priorities": "--priorities"}

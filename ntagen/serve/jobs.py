@@ -1,9 +1,9 @@
 """The workers of `ntagen serve`: each job is a process of its own, which can be cancelled.
 
 A worker is `ntagen check`, `ntagen info` or `ntagen plot` in a folder of its own, so the page says
-what the command line says. It has the limits of the server: the search stops by itself, and a
-worker that does not end is killed. Where the system can, a worker may not take much more memory
-than its search, nor write large files.
+what the command line says. It has the limits of the server, which hold in all that it does; a
+worker that does not end by itself is killed. Where the system can, a worker may not take much more
+address space, nor write large files.
 """
 
 from __future__ import annotations
@@ -39,8 +39,10 @@ PICTURES: Final = {
 }
 """The pictures, each with the kind of its file."""
 
-_GRACE_S: Final = 15.0
-"""A worker may take so much longer than its search: it loads, writes and draws."""
+_LATE_S: Final = 3.0
+_LATE: Final = 0.1
+"""A worker ends by itself when its time is over. One that has not even then is killed this much
+later, in seconds or in parts of its time, whichever is more."""
 
 _MEMORY_BESIDE: Final = 4 << 30
 """A worker may have so much address space beside the memory of its search."""
@@ -90,7 +92,8 @@ class Job:
                 start_new_session=True,
             )
         _restrict(self._process.pid, limits)
-        self._timer = threading.Timer(limits.timeout_s + _GRACE_S, self._kill_late)
+        late_s = max(_LATE_S, _LATE * limits.timeout_s)
+        self._timer = threading.Timer(limits.timeout_s + late_s, self._kill_late)
         self._timer.daemon = True
         self._timer.start()
 
@@ -269,7 +272,7 @@ def arguments_for(file: File, wish: dict[str, Any], limits: Limits) -> list[str]
     limited = [f"--timeout={limits.timeout_s}s", f"--memory={limits.memory_bytes}B"]
     path = str(file.path)
     if action == "info" and file.kind != "run":
-        return ["info", path, "--json"]
+        return ["info", path, "--json", *limited]
     if action == "check" and file.kind != "run":
         evidence = []
         if query is not None:
@@ -281,11 +284,10 @@ def arguments_for(file: File, wish: dict[str, Any], limits: Limits) -> list[str]
         if isinstance(picture, str) and picture in PICTURES and _can_be(picture, file):
             output = ["-o", f"picture.{PICTURES[picture]}"]
             if picture == "scene":
-                return ["plot", path, *output, *(limited if file.kind != "run" else ())]
+                return ["plot", path, *output, *limited]
             at = wish.get("at")
             place = [f"--at={at}"] if picture == "zones" and isinstance(at, str) and at else []
             asked = [] if picture in ("templates", "states", "discrete") else asked
-            limited = [] if picture == "templates" else limited
             return ["plot", path, "--as", picture, *asked, *place, *limited, *output]
     raise Refusal(400, f"{file.name} has no such answer or picture")
 

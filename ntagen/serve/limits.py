@@ -10,8 +10,8 @@ class Limits:
     """What one server allows.
 
     Attributes:
-        timeout_s: A search stops after this time; its worker is killed a little later.
-        memory_bytes: A search stops when its states take this much.
+        timeout_s: A worker ends after this time; one that does not is killed a little later.
+        memory_bytes: A worker ends when it takes this much.
         upload_bytes: The greatest size of a file.
         jobs: At most so many workers at a time.
         files: At most so many files are kept; the oldest goes first.

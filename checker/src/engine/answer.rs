@@ -51,6 +51,28 @@ pub struct Evidence {
     pub has_more_plans: bool,
     /// What ended the list of plans, if a limit did.
     pub plans_stop: Option<StopReason>,
+    /// What was wanted beside the verdict and is missing because a limit came before.
+    pub stopped: Vec<Stopped>,
+}
+
+/// Work after the verdict that a limit or the user ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped {
+    /// What is missing.
+    pub what: Wanted,
+    /// What ended the work.
+    pub reason: StopReason,
+}
+
+/// What is made after the verdict where it is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// The strategy of the player who wins.
+    Strategy,
+    /// The check of the strategy.
+    Check,
+    /// The certificate of a verdict that nothing is reached.
+    Certificate,
 }
 
 impl Evidence {
@@ -169,6 +191,11 @@ impl Answer {
             other => other,
         };
         Answer { verdict, ..self }
+    }
+
+    /// Notes that a limit came before this was made.
+    pub(crate) fn lacks(&mut self, what: Wanted, reason: StopReason) {
+        self.evidence.stopped.push(Stopped { what, reason });
     }
 
     /// Adds a remark for the user after the existing ones.

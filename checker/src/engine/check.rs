@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::answer::{Answer, Verdict};
 use super::codes;
 use super::evidence::named_strategies::StrategyFile;
+use super::limits::LimitWatch;
 use super::loaded_model::{LoadedModel, NamedStrategy, Recipe};
 use super::options::Options;
 use super::query_form::unnamed;
@@ -46,7 +47,16 @@ impl LoadedModel {
         }
         let start = Instant::now();
         self.refuse_unsupported(&query, options.priorities)?;
-        self.prepare_code(options.code, options.tuning, query.span)?;
+        let mut watch = LimitWatch::new(options.limits.clone());
+        let prepared = watch.bound(|_| self.prepare_code(options.code, options.tuning, query.span));
+        match prepared {
+            Ok(prepared) => prepared?,
+            Err((reason, counters)) => {
+                // What is half made is made anew when it is needed.
+                self.forget_code();
+                return Ok(Answer::new(Verdict::Unknown(reason), counters));
+            }
+        }
         self.executor().wraps().clear();
         self.load_seconds += start.elapsed().as_secs_f64();
         let mut answer = match (&query.kind, self.constant_failure()) {

@@ -4,12 +4,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use crate::cancellation::{self, Cut, Look};
+use crate::cancellation::{self, Cut, Look, OUT_OF_NUMBERS};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
 
-/// Is shown the counters now and then; true ends the search.
-pub type Observer = Arc<dyn Fn(&Counters) -> bool + Send + Sync>;
+/// Is shown the counters now and then; a reason ends the search. It may watch limits of its own,
+/// such as the memory of the whole process.
+pub type Observer = Arc<dyn Fn(&Counters) -> Option<StopReason> + Send + Sync>;
 
 /// When to give up; `None` is never.
 #[derive(Clone, Default)]
@@ -52,8 +53,9 @@ impl std::fmt::Debug for Limits {
     }
 }
 
-/// How often the observer is shown the counters.
-const SHOW_EVERY: Duration = Duration::from_millis(50);
+/// How often the observer is shown the counters: a process that takes a gigabyte a second takes ten
+/// megabytes meanwhile.
+const SHOW_EVERY: Duration = Duration::from_millis(10);
 
 /// Watches a search for the limits.
 #[derive(Debug)]
@@ -85,6 +87,8 @@ struct Seen {
     shown: Instant,
     /// Why an end was called for.
     stop: Option<StopReason>,
+    /// Whether that was because there are more states than numbers for them.
+    is_out_of_numbers: bool,
 }
 
 impl Seen {
@@ -100,6 +104,11 @@ impl SharedLimits {
     /// Looks, when so many bytes are about to be allocated beside those that were counted last.
     fn look_beside(&self, bytes: u64) -> Option<StopReason> {
         let mut seen = self.seen();
+        if bytes == OUT_OF_NUMBERS {
+            seen.is_out_of_numbers = true;
+            seen.stop = Some(StopReason::States);
+            return seen.stop;
+        }
         let memory = seen.memory_with(bytes).saturating_add(self.at_hand_bytes);
         let now = Instant::now();
         if self.timeout.is_some_and(|limit| now - self.start >= limit) {
@@ -111,11 +120,9 @@ impl SharedLimits {
             let counters = seen.counters;
             // Others that look meanwhile need not wait for what is shown.
             drop(seen);
-            let ends = self.observer.as_ref().is_some_and(|show| show(&counters));
+            let reason = self.observer.as_ref().and_then(|show| show(&counters));
             seen = self.seen();
-            if ends {
-                seen.stop = Some(StopReason::Interrupted);
-            }
+            seen.stop = seen.stop.or(reason);
         }
         seen.stop
     }
@@ -148,6 +155,7 @@ impl LimitWatch {
             peak_bytes: 0,
             shown: now,
             stop: None,
+            is_out_of_numbers: false,
         };
         LimitWatch {
             shared: Arc::new(SharedLimits {
@@ -197,6 +205,11 @@ impl LimitWatch {
         self.last_stop() == Some(StopReason::Interrupted)
     }
 
+    /// Whether there are more states than numbers for them.
+    pub(super) fn is_out_of_numbers(&self) -> bool {
+        self.shared.seen().is_out_of_numbers
+    }
+
     fn last_stop(&self) -> Option<StopReason> {
         self.shared.seen().stop
     }
@@ -205,6 +218,20 @@ impl LimitWatch {
 /// What becomes of a search in zones whose bounds are too great.
 pub(crate) const CLOCKS_GREW: &str =
     "differences of clocks grow beyond what zones can hold: no abstraction keeps them small here";
+
+/// What is said where there are more states than numbers for them.
+pub(crate) const OUT_OF_STATES: &str = "there are more than 4,294,967,295 states or moves between them, as many as a search has numbers for";
+
+/// What ended work after the verdict.
+pub(crate) fn ended_text(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::States => "stopped by the state limit",
+        StopReason::Memory => "stopped by the memory limit",
+        StopReason::Time => "stopped by the time limit",
+        StopReason::Interrupted => "interrupted",
+        StopReason::Clocks => CLOCKS_GREW,
+    }
+}
 
 /// Why a search was stopped.
 pub(crate) fn stop_text(reason: StopReason) -> &'static str {

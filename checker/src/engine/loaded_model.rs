@@ -221,6 +221,11 @@ impl LoadedModel {
         })
     }
 
+    /// Forgets the code of the model, which may be half made.
+    pub(super) fn forget_code(&mut self) {
+        self.code = None;
+    }
+
     /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
     /// text.
     pub fn compile(&mut self, span: Span) -> Result<(Query, Vec<String>), Rejection> {

@@ -20,7 +20,7 @@ pub mod session;
 mod unsupported;
 
 pub use crate::search::reachability::report::MOST_THREADS;
-pub use answer::{Answer, Evidence, Verdict, Verification};
+pub use answer::{Answer, Evidence, Stopped, Verdict, Verification, Wanted};
 pub use limits::Limits;
 pub use loaded_model::{LoadedModel, NamedStrategy};
 pub use options::{CodeEngine, Options, RareEvent, Reductions, Rules, StrategyWanted, TraceWanted};

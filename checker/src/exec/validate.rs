@@ -19,6 +19,7 @@ use std::fmt;
 
 use super::libraries;
 use crate::builtins::MOST_PARAMETERS;
+use crate::cancellation;
 use crate::ir::{
     Access, Address, Base, Block, BlockId, ClockOperand, ExternalArgument, ExternalId,
     ExternalParameter, ExternalType, Function, FunctionId, Instruction, Operand, Register,
@@ -49,11 +50,16 @@ impl fmt::Display for Flaw {
     }
 }
 
+/// What it takes to check a function, as a rule, and to make it ready to run: see
+/// [`cancellation::work`].
+const UNITS_FOR_FUNCTION: usize = 1 << 12;
+
 /// Checks the functions from `first` on, which may call earlier ones; returns how many words of
 /// state they reach.
 pub fn validate(functions: &[Function], first: usize, constants: usize) -> Result<usize, Flaw> {
     let mut state_words = 0;
     for (index, function) in functions.iter().enumerate().skip(first) {
+        cancellation::work(UNITS_FOR_FUNCTION);
         let mut check = FunctionCheck {
             functions,
             function,

@@ -16,7 +16,7 @@ use crate::engine::format::{
     strategy_text, text,
 };
 use crate::engine::session::plan_texts::PlanTexts;
-use crate::engine::{self, LoadedModel, Options, Rejection, Verdict};
+use crate::engine::{self, LoadedModel, Options, Rejection, Verdict, Wanted};
 use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
 use crate::stochastic::Precision;
@@ -308,6 +308,23 @@ impl Answer {
         self.inner.evidence.plans_stop.and_then(stop_name)
     }
 
+    /// What was wanted beside the verdict and is missing, each with the limit that came before:
+    /// "states", "memory" or "time".
+    #[getter]
+    fn stopped(&self) -> Vec<(&'static str, Option<&'static str>)> {
+        let stopped = self.inner.evidence.stopped.iter();
+        stopped
+            .map(|one| {
+                let what = match one.what {
+                    Wanted::Strategy => "strategy",
+                    Wanted::Check => "check",
+                    Wanted::Certificate => "certificate",
+                };
+                (what, stop_name(one.reason))
+            })
+            .collect()
+    }
+
     /// The plans, one after the other; `None` without plans.
     fn plans(&self, py: Python<'_>) -> Option<Plans> {
         let list = self.inner.evidence.plans.as_ref()?;
@@ -367,11 +384,12 @@ impl Answer {
         let runs = evidence.witnesses.iter().filter_map(|one| one.run.as_ref());
         let mut lines: Vec<String> = runs.flat_map(text::proof_lines).collect();
         if let Some(result) = &evidence.verification {
-            lines.extend(
-                self.model
-                    .get()
-                    .with(|model| strategy_check::describe(model.network(), result)),
-            );
+            let stopped = &mut evidence.stopped.iter();
+            let stop = stopped.find(|one| one.what == Wanted::Check);
+            let stop = stop.map(|one| one.reason);
+            let describe =
+                |model: &mut LoadedModel| strategy_check::describe(model.network(), result, stop);
+            lines.extend(self.model.get().with(describe));
         }
         lines
     }
@@ -430,9 +448,9 @@ impl Answer {
             return None;
         }
         Some(
-            self.model
-                .get()
-                .with(|model| json::witnesses(model.network(), witnesses, &self.query).to_string()),
+            self.model.get().with(|model| {
+                json::written(&json::witnesses(model.network(), witnesses, &self.query))
+            }),
         )
     }
 
@@ -448,7 +466,7 @@ impl Answer {
     fn strategy_json_or_none(&self) -> Option<String> {
         if let Some(machine) = &self.inner.evidence.machine {
             let write = |model: &mut LoadedModel| {
-                machine_json::write(model.network(), machine, &self.query).to_string()
+                json::written(&machine_json::write(model.network(), machine, &self.query))
             };
             return Some(self.model.get().with(write));
         }

@@ -97,34 +97,58 @@ pub(super) fn rejected(rejection: Rejection) -> PyErr {
     RejectedError::new_err((rejection.rendered,))
 }
 
+/// How often the counters are shown to Python.
+const SHOW_EVERY: Duration = Duration::from_millis(50);
+
 /// Shows the counters to a Python function, and ends the search if it raises or a signal came.
 pub(super) fn observer(progress: Option<Py<PyAny>>) -> Observer {
+    let shown = Mutex::new(None::<Instant>);
     Arc::new(move |counters| {
+        let mut shown = shown.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_shown = shown.is_none_or(|shown| shown.elapsed() >= SHOW_EVERY);
+        let progress = progress.as_ref().filter(|_| is_shown);
         Python::attach(|py| {
-            let shown = match &progress {
-                Some(progress) => progress.call1(
-                    py,
-                    (
+            let result = match progress {
+                Some(progress) => {
+                    *shown = Some(Instant::now());
+                    let counters = (
                         counters.explored,
                         counters.stored,
                         counters.waiting,
                         counters.bytes,
-                    ),
-                ),
-                None => Ok(py.None()),
+                    );
+                    progress.call1(py, counters).map(drop)
+                }
+                None => Ok(()),
             };
-            shown.and_then(|_| py.check_signals()).is_err()
+            let result = result.and_then(|()| py.check_signals());
+            result.err().map(|raised| reason_of(py, &raised))
         })
     })
 }
 
-/// How often signals are looked for.
-const LOOK_FOR_SIGNALS_EVERY: Duration = Duration::from_millis(50);
+/// Why a signal, or a function that was called, ends the work: an exception whose attribute `limit`
+/// is "time" or "memory" tells of a limit that Python watches; any other one is the user.
+pub(super) fn reason_of(py: Python<'_>, raised: &PyErr) -> StopReason {
+    let limit = raised.value(py).getattr("limit");
+    let limit = limit.and_then(|limit| limit.extract::<String>());
+    match limit.as_deref() {
+        Ok("time") => StopReason::Time,
+        Ok("memory") => StopReason::Memory,
+        _ => StopReason::Interrupted,
+    }
+}
 
-/// Does work without the interpreter, which a signal (Ctrl-C) ends.
+/// How often signals are looked for: see the observer of `engine::limits`.
+const LOOK_FOR_SIGNALS_EVERY: Duration = Duration::from_millis(10);
+
+/// Does work without the interpreter, which a signal ends: Ctrl-C, or a limit that Python watches.
+/// The error is what the handler of the signal raised.
 pub(super) fn until_signal<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Send) -> PyResult<T> {
     let owner = thread::current().id();
     let looked = Mutex::new(Instant::now());
+    let raised = Arc::new(Mutex::new(None));
+    let raised_here = Arc::clone(&raised);
     let look: Look = Arc::new(move |_| {
         if thread::current().id() != owner {
             return false;
@@ -134,10 +158,20 @@ pub(super) fn until_signal<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Se
             return false;
         }
         *looked = Instant::now();
-        Python::attach(|py| py.check_signals().is_err())
+        let error = Python::attach(|py| py.check_signals().err());
+        let is_raised = error.is_some();
+        if is_raised {
+            *raised_here.lock().unwrap_or_else(PoisonError::into_inner) = error;
+        }
+        is_raised
     });
     let result = py.detach(|| cancellation::within(look, run));
-    result.map_err(|Cut| PyKeyboardInterrupt::new_err(()))
+    // Code that cannot unwind ends with some result, which counts for nothing.
+    let raised = raised.lock().unwrap_or_else(PoisonError::into_inner).take();
+    match raised {
+        Some(error) => Err(error),
+        None => result.map_err(|Cut| PyKeyboardInterrupt::new_err(())),
+    }
 }
 
 /// The rules of a game, by their names.

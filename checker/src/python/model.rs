@@ -10,6 +10,7 @@ use super::convert::{
     FailedError, StepEntry, code_engine, observer, overflow_rule, rejected, rules, step_entry,
     stop_name, time_limit, until_signal,
 };
+use crate::cancellation;
 use crate::engine::format::{json, model_json, network_json, text};
 use crate::engine::{Limits, LoadedModel};
 use crate::ir::{Network, Overflow};
@@ -65,6 +66,9 @@ pub(super) fn bound_rows(zone: &Zone) -> Vec<BoundRow> {
     let row = |left: usize| clocks.clone().map(|right| bound(left, right)).collect();
     clocks.clone().map(row).collect()
 }
+
+/// What it takes to hand a move between states on: see [`cancellation::work`].
+const UNITS_FOR_LINK: usize = 200;
 
 fn reached_entry(network: &Network, met: Met) -> ReachedEntry {
     (
@@ -129,13 +133,19 @@ impl Model {
     }
 
     /// What is in the model, as JSON; see `engine::facts`.
-    fn facts_json(&self) -> String {
-        self.with(|model| model_json::facts(model).to_string())
+    fn facts_json(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let model = slf.get();
+        until_signal(slf.py(), || {
+            model.with(|model| json::written(&model_json::facts(model)))
+        })
     }
 
     /// The network, as JSON; see `engine::format::network_json`.
-    fn network_json(&self) -> String {
-        self.with(|model| network_json::network(model).to_string())
+    fn network_json(slf: &Bound<'_, Self>) -> PyResult<String> {
+        let model = slf.get();
+        until_signal(slf.py(), || {
+            model.with(|model| json::written(&network_json::network(model)))
+        })
     }
 
     /// The queries of the file, as JSON.
@@ -194,7 +204,7 @@ impl Model {
             observer: Some(observer(None)),
         };
         let model = slf.get();
-        let found = slf.py().detach(|| {
+        let found = until_signal(slf.py(), || {
             model.with(|model| {
                 model.prepare_simulation(code).map_err(rejected)?;
                 let space = model
@@ -204,12 +214,13 @@ impl Model {
                 let met = space.states.into_iter();
                 let states = met.map(|one| reached_entry(network, one)).collect();
                 let links = space.links.iter().map(|link| {
+                    cancellation::work(UNITS_FOR_LINK);
                     let step = step_entry(network, &link.parts);
                     (link.source, step, link.target)
                 });
                 Ok::<_, PyErr>((states, links.collect(), space.stop))
             })
-        });
+        })?;
         let (states, links, stop): (_, _, Option<StopReason>) = found?;
         match stop {
             Some(StopReason::Interrupted) => Err(PyKeyboardInterrupt::new_err(())),

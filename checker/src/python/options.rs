@@ -1,7 +1,6 @@
 //! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -11,13 +10,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::convert::{
-    code_engine, forced_rule, observer, priority_rule, thread_count, time_limit, unknown,
+    code_engine, forced_rule, observer, priority_rule, reason_of, thread_count, time_limit, unknown,
 };
 use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
 use crate::engine::{
     Limits, LoadedModel, Options, RareEvent, Reductions, StrategyWanted, TraceWanted,
 };
+use crate::search::limits::StopReason;
 use crate::search::reachability::report::Order;
 use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
@@ -30,26 +30,32 @@ pub(super) fn by_rule_of(model: &LoadedModel, options: Options) -> Options {
     }
 }
 
+/// What ends the work, and what is to be raised in the end unless it is the user or a limit.
+type Cause = (StopReason, Option<PyErr>);
+
 /// What a function has raised that the engine has called: it ends the work.
 #[derive(Clone, Default)]
-pub(super) struct Raised {
-    is_raised: Arc<AtomicBool>,
-    error: Arc<Mutex<Option<PyErr>>>,
-}
+pub(super) struct Raised(Arc<Mutex<Option<Cause>>>);
 
 impl Raised {
-    fn note(&self, error: PyErr) {
-        let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
-        first.get_or_insert(error);
-        self.is_raised.store(true, Ordering::Relaxed);
+    fn note(&self, reason: StopReason, error: Option<PyErr>) {
+        self.first().get_or_insert((reason, error));
     }
 
-    /// What ended the work, if it is something else than the user.
+    fn first(&self) -> MutexGuard<'_, Option<Cause>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Why the work ends, if something was raised.
+    fn reason(&self) -> Option<StopReason> {
+        self.first().as_ref().map(|first| first.0)
+    }
+
+    /// What ended the work, if it is neither the user nor a limit.
     pub(super) fn failure(&self, py: Python<'_>) -> Option<PyErr> {
-        let mut first = self.error.lock().unwrap_or_else(PoisonError::into_inner);
-        first
-            .take()
-            .filter(|error| !error.is_instance_of::<PyKeyboardInterrupt>(py))
+        let (reason, error) = self.first().take()?;
+        let is_user = |error: &PyErr| error.is_instance_of::<PyKeyboardInterrupt>(py);
+        error.filter(|error| reason == StopReason::Interrupted && !is_user(error))
     }
 }
 
@@ -57,7 +63,6 @@ impl Raised {
 pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
     let text = |name| field::<String>(given, name);
     let raised = Raised::default();
-    let is_raised = Arc::clone(&raised.is_raised);
     let options = Options {
         order: order(&text("search")?, field(given, "seed")?)?,
         guide: field(given, "guide")?,
@@ -71,7 +76,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
             timeout: time_limit(field(given, "timeout_s")?)?,
             observer: Some(or_raised(
                 observer(field(given, "progress")?),
-                Arc::clone(&is_raised),
+                raised.clone(),
             )),
         },
         plans: plans(&text("plans")?, field(given, "max_plans")?)?,
@@ -87,7 +92,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
         allow_write: field(given, "allow_write")?,
         precision: precision(given)?,
         under_choice: under_choice(&text("under_choice")?)?,
-        run_observer: run_observer(field(given, "run_progress")?, is_raised),
+        run_observer: run_observer(field(given, "run_progress")?, raised.clone()),
         run_source: run_source(field(given, "run_source")?, &raised),
         rare: rare_event(given)?,
         ..Options::default()
@@ -103,24 +108,25 @@ fn run_source(source: Option<Py<PyAny>>, raised: &Raised) -> Option<RunSource> {
     let source = source?;
     let raised = raised.clone();
     Some(RunSource(Arc::new(move |first, most| {
-        if raised.is_raised.load(Ordering::Relaxed) {
+        if raised.reason().is_some() {
             thread::sleep(PAUSE);
             return Vec::new();
         }
-        let block = Python::attach(|py| {
-            let block = source.call1(py, (first, most))?;
-            PyResult::Ok(block.bind(py).cast::<PyBytes>()?.as_bytes().to_vec())
-        });
-        block.unwrap_or_else(|error| {
-            raised.note(error);
-            Vec::new()
+        Python::attach(|py| {
+            let block = source.call1(py, (first, most)).and_then(|block| {
+                PyResult::Ok(block.bind(py).cast::<PyBytes>()?.as_bytes().to_vec())
+            });
+            block.unwrap_or_else(|error| {
+                raised.note(reason_of(py, &error), Some(error));
+                Vec::new()
+            })
         })
     })))
 }
 
-/// Shows what runs say until now to a Python function, and notes in `is_raised` if it raises: what
-/// a signal raises comes out of whatever Python code runs then.
-fn run_observer(progress: Option<Py<PyAny>>, is_raised: Arc<AtomicBool>) -> Option<RunObserver> {
+/// Shows what runs say until now to a Python function, and notes that it raises: what a signal
+/// raises comes out of whatever Python code runs then.
+fn run_observer(progress: Option<Py<PyAny>>, raised: Raised) -> Option<RunObserver> {
     let progress = progress?;
     Some(RunObserver(Arc::new(move |so_far| {
         let known = |value: f64| value.is_finite().then_some(value);
@@ -130,15 +136,17 @@ fn run_observer(progress: Option<Py<PyAny>>, is_raised: Arc<AtomicBool>) -> Opti
             known(so_far.interval.lower),
             known(so_far.interval.upper),
         );
-        if Python::attach(|py| progress.call1(py, shown).is_err()) {
-            is_raised.store(true, Ordering::Relaxed);
-        }
+        Python::attach(|py| {
+            if let Err(error) = progress.call1(py, shown) {
+                raised.note(reason_of(py, &error), None);
+            }
+        });
     })))
 }
 
 /// What an observer says, or whether something was raised elsewhere.
-fn or_raised(observer: Observer, is_raised: Arc<AtomicBool>) -> Observer {
-    Arc::new(move |counters| is_raised.load(Ordering::Relaxed) || observer(counters))
+fn or_raised(observer: Observer, raised: Raised) -> Observer {
+    Arc::new(move |counters| raised.reason().or_else(|| observer(counters)))
 }
 
 /// What statistical queries promise.

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::answer::Answer;
-use super::convert::{FailedError, priority_rule, rejected, rules};
+use super::convert::{FailedError, priority_rule, rejected, rules, until_signal};
 use super::model::Model;
 use super::options;
 use crate::engine::evidence::strategy_check;
@@ -215,20 +215,11 @@ impl Strategy {
         let most = states.unwrap_or(strategy_check::MOST_REGIONS);
         let model = self.model.get();
         let inner = &self.inner;
-        let (result, interrupted) = py.detach(|| {
-            let mut interrupted = None;
-            let mut ends = || {
-                interrupted = Python::attach(|py| py.check_signals().err());
-                interrupted.is_some()
-            };
-            let effort = &mut Effort::up_to(most).unless(&mut ends);
-            let result = model.with(|model| inner.verify(model, rules, effort));
-            (result, interrupted)
-        });
-        match interrupted {
-            Some(interrupted) => Err(interrupted),
-            None => result.map_err(rejected),
-        }
+        let result = until_signal(py, || {
+            let effort = &mut Effort::up_to(most);
+            model.with(|model| inner.verify(model, rules, effort))
+        })?;
+        result.map_err(rejected)
     }
 
     /// Lets queries of the model be asked under it by a name.

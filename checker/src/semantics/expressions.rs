@@ -8,9 +8,13 @@ use super::operators::{is_clock_term, to_double};
 use super::scope::Entity;
 use super::typed::{Expr, Kind, Place, Root};
 use super::types::{Class, Index, Memory, Size, Type};
+use crate::cancellation;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
 use crate::syntax::ast::{self, BinaryOp, ExprKind, Name, UnaryOp};
+
+/// What it takes to check a node of an expression: see [`cancellation::work`].
+const UNITS_FOR_EXPRESSION: usize = 256;
 
 impl Checker<'_> {
     /// Checks an expression that stands for a value.
@@ -20,6 +24,7 @@ impl Checker<'_> {
 
     /// Checks an expression that may stand for a place: a real clock is not read.
     pub(super) fn place(&mut self, expr: &ast::Expr) -> Expr {
+        cancellation::work(UNITS_FOR_EXPRESSION);
         let span = expr.span;
         match &expr.kind {
             ExprKind::Int(value) => self.integer_literal(*value, span),

@@ -12,12 +12,16 @@ use super::operators::is_clock_term;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
 use super::types::{Class, Size, Type};
+use crate::cancellation;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationChances, LocationId, Urgency};
 use crate::syntax::ast;
 
 /// The most branches that the select bindings of one leg may stand for.
 const BRANCH_LIMIT: u64 = 1 << 16;
+
+/// What it takes to check a location or an edge, without its labels: see [`cancellation::work`].
+const UNITS_FOR_EDGE: usize = 1 << 12;
 
 /// The most edges that the select bindings of one may stand for.
 const SELECT_LIMIT: u64 = 1 << 20;
@@ -134,6 +138,7 @@ impl Checker<'_> {
     }
 
     fn location(&mut self, template: &ast::Template, location: &ast::Location) -> ir::Location {
+        cancellation::work(UNITS_FOR_EDGE);
         let name = match &location.name {
             Some(name) => name.text.clone(),
             None => format!("_{}", location.id),
@@ -258,6 +263,7 @@ impl Checker<'_> {
         nodes: &FxHashMap<&str, Endpoint>,
         source: LocationId,
     ) -> ir::Edge {
+        cancellation::work(UNITS_FOR_EDGE);
         self.locals.clear();
         let place = format!(
             "template {}, edge {} → {}",

@@ -113,7 +113,7 @@ struct Lexer<'a> {
     tables: Finder,
 }
 
-/// What it takes to read a token, and to parse it later: see [`cancellation::work`].
+/// What it takes to read a token: see [`cancellation::work`].
 const UNITS_FOR_TOKEN: usize = 64;
 
 impl Lexer<'_> {

@@ -13,6 +13,7 @@ use super::ast::{Expr, ExprKind, Name, Unsupported};
 use super::codes;
 use super::keywords::{self, Dialect};
 use super::lexer::{Token, TokenKind, lex};
+use crate::cancellation;
 use crate::diagnostics::{Code, Diagnostic, SourceId, SourceMap, Span};
 
 /// How deep brackets, blocks, types and prefix operators may be nested.
@@ -20,6 +21,9 @@ pub(super) const MAX_NESTING: u32 = 256;
 
 /// How many levels an expression's tree may have, chains of operators included.
 pub(super) const MAX_HEIGHT: u32 = 500;
+
+/// What it takes to parse a token: see [`cancellation::work`].
+const UNITS_FOR_TOKEN: usize = 128;
 
 /// The state of reading one text.
 pub(super) struct Parser<'a> {
@@ -136,6 +140,7 @@ impl<'a> Parser<'a> {
 
     /// Steps over the current token and returns it; the end is never left.
     pub(super) fn bump(&mut self) -> Token {
+        cancellation::work(UNITS_FOR_TOKEN);
         let token = self.token();
         if token.kind != TokenKind::End {
             self.position += 1;

@@ -1,9 +1,12 @@
 //! The effort that a check may take before it gives up.
 
+use crate::cancellation;
+
 /// Regions between two questions whether somebody wants the check to end.
 const BETWEEN_QUESTIONS: u64 = 256;
 
-/// A bound on the regions of a check, and what may end it before.
+/// A bound on the regions of a check, and what may end it before, beside what ends all work of the
+/// thread.
 pub struct Effort<'a> {
     most: u64,
     ends: Option<&'a mut dyn FnMut() -> bool>,
@@ -52,7 +55,7 @@ impl<'a> Effort<'a> {
             return None;
         }
         self.next_question = regions + BETWEEN_QUESTIONS;
-        let is_ended = self.ends.as_mut().is_some_and(|ends| ends());
+        let is_ended = self.ends.as_mut().is_some_and(|ends| ends()) || cancellation::is_due();
         is_ended.then_some(GivenUp::Ended)
     }
 }

@@ -78,7 +78,9 @@ fn limits_stop_all_threads() {
         });
         assert_eq!(by_memory, Verdict::Unknown(StopReason::Memory));
         let interrupted = limited(Limits {
-            observer: Some(Arc::new(|counters| counters.explored > 1000)),
+            observer: Some(Arc::new(|counters| {
+                (counters.explored > 1000).then_some(StopReason::Interrupted)
+            })),
             ..Limits::default()
         });
         assert_eq!(interrupted, Verdict::Unknown(StopReason::Interrupted));

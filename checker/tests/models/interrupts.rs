@@ -65,7 +65,7 @@ fn limits_of(stop: StopReason) -> Limits {
             ..Limits::default()
         },
         _ => Limits {
-            observer: Some(Arc::new(|_| true)),
+            observer: Some(Arc::new(|_| Some(StopReason::Interrupted))),
             ..Limits::default()
         },
     }
@@ -187,7 +187,8 @@ fn counters_go_on_being_shown_during_a_call() {
     let options = Options {
         limits: Limits {
             observer: Some(Arc::new(move |_| {
-                seen.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 2
+                let is_third = seen.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 2;
+                is_third.then_some(StopReason::Interrupted)
             })),
             ..Limits::default()
         },
@@ -218,5 +219,19 @@ fn an_alarm_of_one_query_is_none_of_the_next() {
             ..interpreted()
         };
         assert_eq!(ask(&mut model, query, &options).verdict, verdict);
+    }
+}
+
+#[test]
+fn who_watches_says_which_limit_it_was() {
+    for reason in [StopReason::Memory, StopReason::Time] {
+        let options = Options {
+            limits: Limits {
+                observer: Some(Arc::new(move |_| Some(reason))),
+                ..Limits::default()
+            },
+            ..interpreted()
+        };
+        expect(BUSY, "E<> P.T", &options, Verdict::Unknown(reason));
     }
 }

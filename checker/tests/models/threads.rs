@@ -192,7 +192,7 @@ fn limits_stop_all_threads() {
         });
         assert_eq!(by_time.verdict, Verdict::Unknown(StopReason::Time));
         let interrupted = limited(Limits {
-            observer: Some(Arc::new(|_| true)),
+            observer: Some(Arc::new(|_| Some(StopReason::Interrupted))),
             timeout: Some(Duration::from_mins(5)),
             ..Limits::default()
         });

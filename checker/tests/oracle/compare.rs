@@ -248,7 +248,7 @@ pub(crate) fn check_strategy(
             Ok(())
         }
         Some(verification) => {
-            let lines = strategy_check::describe(model.network(), verification).join("\n");
+            let lines = strategy_check::describe(model.network(), verification, None).join("\n");
             let strategy = evidence.strategy.as_ref();
             let strategy = strategy.map(|one| strategy_check::decisions(model.network(), one));
             Err(TestCaseError::fail(format!(

@@ -16,7 +16,6 @@ from ntagen import checker
 from ntagen.cli import main
 from ntagen.cli.run_progress import so_far
 from ntagen.cli.run_rows import bars
-from ntagen.cli.signals import ending_at_once_next_time
 
 MODEL = """
 clock x; int n;
@@ -160,15 +159,6 @@ def test_ctrl_c_gives_the_result_so_far_in_verifyta_too(
     # Clients look for these words.
     assert "satisfied" not in said.out
     assert "is answered by the runs until now, and 1 query is not asked" in said.err
-
-
-def test_the_second_ctrl_c_ends_at_once() -> None:
-    before = signal.getsignal(signal.SIGINT)
-    with ending_at_once_next_time():
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
-    assert signal.getsignal(signal.SIGINT) == before
 
 
 def test_ctrl_c_before_the_first_result_is_an_interruption(

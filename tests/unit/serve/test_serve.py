@@ -363,7 +363,8 @@ def test_a_search_has_limits() -> None:
 
 
 def test_a_worker_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jobs, "_GRACE_S", -18.0)
+    monkeypatch.setattr(jobs, "_LATE_S", -18.0)
+    monkeypatch.setattr(jobs, "_LATE", -1.0)
     with running(Limits(timeout_s=20.0)) as server:
         number = dropped(server, "endless.xta", ENDLESS)
         report = ended(server, started(server, number, action="check", query="A[] a <= 90"))

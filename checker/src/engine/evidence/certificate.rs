@@ -10,7 +10,7 @@
 
 use serde_json::{Value as Json, json};
 
-use crate::cancellation::{self, Cut};
+use crate::cancellation::{self, Cut, Room};
 use crate::ir::{Network, Predicate, QueryKind};
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::{Counters, Watch};
@@ -23,15 +23,13 @@ use crate::verify::strategy::Constraint;
 use super::checked::{Checked, Unreadable};
 use super::strategy_check;
 use crate::engine::answer::Certificate;
+use crate::engine::format::json::written;
 use crate::engine::format::json_reader::{integer, only};
 use crate::engine::format::text;
 use crate::engine::limits::{cut_as_interrupted, stop_text};
 
 /// What a file with a certificate says that it is.
 pub const FORMAT: &str = "ntagen-certificate";
-
-/// Bytes of a certificate between two checks of the memory that it takes.
-const BYTES_BETWEEN_LOOKS: usize = 1 << 20;
 
 /// The network with `meta` variables as ordinary ones: whether states that differ in them alone are
 /// the same decides which of them a search meets, but not what it claims of those that it meets.
@@ -41,6 +39,9 @@ pub(crate) fn with_all_words(network: &Network) -> Network {
     whole
 }
 
+/// Why there is no certificate, and what stopped the search for it, if something did.
+pub(crate) type NoCertificate = (&'static str, Option<StopReason>);
+
 /// Searches again without short cuts for a state that satisfies the predicate, of which there is
 /// none; what was reached. `symbolic` is about a network [`with_all_words`].
 pub(crate) fn reached(
@@ -48,7 +49,7 @@ pub(crate) fn reached(
     avoided: &Predicate,
     before: Counters,
     watch: &mut dyn Watch,
-) -> Result<Certificate, String> {
+) -> Result<Certificate, NoCertificate> {
     let dimension = symbolic.dimension();
     let variables = &symbolic.stepper.network().layout.variables;
     let has_meta = variables.iter().any(|variable| variable.meta);
@@ -57,34 +58,37 @@ pub(crate) fn reached(
         Ok(Outcome::Exhausted) => {}
         Ok(Outcome::Found(_)) if has_meta => {
             let why = "a search for it, in which states that differ in meta variables alone are not the same, finds a state";
-            return Err(why.to_owned());
+            return Err((why, None));
         }
-        Ok(Outcome::Found(_)) => return Err("a search without short cuts finds a state".to_owned()),
-        Ok(Outcome::Stopped(reason)) => return Err(stop_text(reason).to_owned()),
+        Ok(Outcome::Found(_)) => return Err(("a search without short cuts finds a state", None)),
+        Ok(Outcome::Stopped(reason)) => return Err((stop_text(reason), Some(reason))),
         Err(Failure::Interrupted) => {
             let reason = watch.look(&search.counters());
-            return Err(stop_text(reason.unwrap_or(StopReason::Interrupted)).to_owned());
+            let reason = reason.unwrap_or(StopReason::Interrupted);
+            return Err((stop_text(reason), Some(reason)));
         }
-        Err(_) => return Err("the model fails".to_owned()),
+        Err(_) => return Err(("the model fails", None)),
     }
-    let mut bytes = 0;
-    let states = search.into_reached().into_iter().map(|(words, zones)| {
-        let zones = zones.iter();
-        let zones = zones.map(|zone| strategy_check::constraints(zone.bounds(), dimension));
-        let zones: Vec<_> = zones.collect();
-        // The zones that these are made of count still.
-        let constraints = zones.iter().map(|zone| size_of_val(&**zone));
-        let before = bytes;
-        bytes += size_of::<States>() + size_of_val(&*words) + constraints.sum::<usize>();
-        if bytes / BYTES_BETWEEN_LOOKS > before / BYTES_BETWEEN_LOOKS {
-            cancellation::ask_for(bytes);
+    let counters = search.counters();
+    let certificate = cancellation::unless_cut(|| {
+        let mut room = Room::default();
+        let states = search.into_reached().into_iter().map(|(words, zones)| {
+            let zones = zones.iter();
+            let zones = zones.map(|zone| strategy_check::constraints(zone.bounds(), dimension));
+            let zones: Vec<_> = zones.collect();
+            // The zones that these are made of count still.
+            let constraints = zones.iter().map(|zone| size_of_val(&**zone));
+            room.take(size_of::<States>() + size_of_val(&*words) + constraints.sum::<usize>());
+            States { words, zones }
+        });
+        Certificate {
+            states: states.collect(),
         }
-        States { words, zones }
     });
-    let certificate = cancellation::unless_cut(|| Certificate {
-        states: states.collect(),
-    });
-    certificate.map_err(|Cut| "writing it was stopped by a limit".to_owned())
+    certificate.map_err(|Cut| {
+        let reason = watch.look(&counters).unwrap_or(StopReason::Interrupted);
+        ("gathering its states was stopped by a limit", Some(reason))
+    })
 }
 
 impl Certificate {
@@ -114,7 +118,7 @@ impl Certificate {
             });
             let line = json!({ "words": state.words, "zones": zones.collect::<Vec<_>>() });
             text.push('\n');
-            text.push_str(&line.to_string());
+            text.push_str(&written(&line));
         }
         text.push('\n');
         text

@@ -24,7 +24,7 @@ impl Checked {
                 Ok(StrategyOutcome::Violated(..)) => Some(false),
                 Ok(StrategyOutcome::GivenUp(..)) | Err(_) => None,
             },
-            lines: strategy_check::describe(network, result),
+            lines: strategy_check::describe(network, result, None),
         }
     }
 

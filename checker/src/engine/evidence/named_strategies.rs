@@ -18,7 +18,7 @@ use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
 use crate::engine::format::strategy_json;
-use crate::engine::limits::stop_text;
+use crate::engine::limits::{LimitWatch, ended_text, stop_text};
 use crate::engine::loaded_model::{LoadedModel, NamedStrategy, Recipe};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
@@ -139,7 +139,18 @@ impl LoadedModel {
         let StrategyFile { file, name, span } = asked;
         let strategy = self.existing_strategy(name, span, options)?;
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
-        let text = strategy_json::text(self.network(), &strategy, query);
+        let mut watch = LimitWatch::new(options.limits.clone());
+        let text = match watch.bound(|_| strategy_json::text(self.network(), &strategy, query)) {
+            Ok(text) => text,
+            Err((reason, counters)) => {
+                let mut answer = Answer::new(Verdict::Unknown(reason), counters);
+                answer.remark(format!(
+                    "writing strategy {name} was {}",
+                    ended_text(reason)
+                ));
+                return Ok(answer);
+            }
+        };
         let path = self.strategy_path(file, options);
         strategy_place::save(&path, &(text + "\n"), &options.allow_write).map_err(|refusal| {
             let Refusal { message, help } = refusal;

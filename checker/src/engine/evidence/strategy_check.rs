@@ -6,6 +6,7 @@ use crate::game::{Forced, Player, Priorities};
 use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
 use crate::network::Part;
 use crate::network::symbolic::predicate;
+use crate::search::StopReason;
 use crate::verify::replay::{self, End, Moment, Run};
 use crate::verify::strategy::{
     self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Origin, Owner, Step,
@@ -17,6 +18,7 @@ use crate::zones::{Bound, Federation, minimal};
 
 use crate::engine::answer::Verification;
 use crate::engine::format::text;
+use crate::engine::limits::ended_text;
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Rules;
 use crate::engine::query::time_clock;
@@ -369,8 +371,13 @@ pub(super) fn constraints(zone: &[Bound], dimension: usize) -> Vec<Constraint> {
     constraints
 }
 
-/// What a check covered, or what is wrong, for the user: one line, then those of the run.
-pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
+/// What a check covered, or what is wrong, for the user: one line, then those of the run. `stop` is
+/// what ended it, if that is known.
+pub fn describe(
+    network: &Network,
+    verification: &Verification,
+    stop: Option<StopReason>,
+) -> Vec<String> {
     match verification {
         Ok(strategy::Outcome::Verified(coverage)) => vec![format!(
             "strategy verified: {} regions, {} moves of its own, {} of the opponent, {} ends that are won",
@@ -381,7 +388,8 @@ pub fn describe(network: &Network, verification: &Verification) -> Vec<String> {
             coverage.regions
         )],
         Ok(strategy::Outcome::GivenUp(GivenUp::Ended, coverage)) => vec![format!(
-            "strategy not verified: stopped by the time limit after {} regions",
+            "strategy not verified: it was found, and checking it was {} after {} regions",
+            ended_text(stop.unwrap_or(StopReason::Interrupted)),
             coverage.regions
         )],
         Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),

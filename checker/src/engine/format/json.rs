@@ -1,6 +1,8 @@
 //! Answers as JSON: traces, values and plans in the words of the model. Strategies are in
 //! [`super::strategy_json`].
 
+use std::io;
+
 use serde_json::{Map, Value as Json, json};
 
 use crate::cancellation;
@@ -40,6 +42,31 @@ pub fn part(network: &Network, part: Part) -> Json {
         "controllable": edge.controllable,
     })
 }
+
+/// The text of a value. Large ones take long, so that their bytes are counted.
+pub fn written(json: &Json) -> String {
+    let mut text = Counted(Vec::new());
+    serde_json::to_writer(&mut text, json).expect("memory can be written to");
+    String::from_utf8(text.0).expect("JSON is UTF-8")
+}
+
+/// Bytes whose writing is work: see [`cancellation::work`].
+struct Counted(Vec<u8>);
+
+impl io::Write for Counted {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        cancellation::work(UNITS_FOR_BYTE * bytes.len());
+        self.0.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// What it takes to write a byte of a value, and to give back what it was made of.
+const UNITS_FOR_BYTE: usize = 8;
 
 /// The edges of a move.
 pub fn parts(network: &Network, list: &[Part]) -> Json {

@@ -63,7 +63,7 @@ pub fn text(network: &Network, strategy: &Strategy, query: &str) -> String {
         if index > 0 {
             text.push(',');
         }
-        text.push_str(&state(network, one).to_string());
+        text.push_str(&json::written(&state(network, one)));
     }
     text.push(']');
     match (&strategy.under, after.split_once(NO_UNDER)) {

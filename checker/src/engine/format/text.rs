@@ -5,6 +5,7 @@
 
 use std::fmt::Write as _;
 
+use crate::cancellation;
 use crate::engine::evidence::witness::{Missing, Proof, Witness};
 use crate::engine::loaded_model::LoadedModel;
 use crate::ir::{Branch, Edge, EdgeLabels, Network, RunTimeErrorKind, Shape};
@@ -58,6 +59,10 @@ pub enum Value {
     Double(f64),
 }
 
+/// What it takes to write the name of a place or a location, and what is there: see
+/// [`cancellation::work`].
+const UNITS_FOR_NAME: usize = 128;
+
 /// Calls `visit` with the name and the place of every scalar part of a variable.
 pub(super) fn visit_shape<'n>(
     shape: &'n Shape,
@@ -67,6 +72,7 @@ pub(super) fn visit_shape<'n>(
 ) {
     match shape {
         Shape::Integer { .. } | Shape::Bool | Shape::Scalar { .. } | Shape::Double => {
+            cancellation::work(UNITS_FOR_NAME);
             visit(name, ValuePlace { shape, offset });
         }
         Shape::Array {
@@ -268,6 +274,7 @@ pub fn trace_text(network: &Network, trace: &Trace) -> String {
             }
             text.push('\n');
         }
+        cancellation::work(UNITS_FOR_NAME * network.processes.len());
         text.push_str("State:\n(");
         for process in 0..network.processes.len() {
             let _ = write!(
@@ -364,6 +371,7 @@ pub fn state_line(network: &Network, state: &State, ticks_per_unit: i64) -> Stri
 
 /// Locations and variables in one line.
 pub fn words_line(network: &Network, words: &[i32]) -> String {
+    cancellation::work(UNITS_FOR_NAME * network.processes.len());
     let mut parts = vec!["(".to_owned()];
     for (index, process) in network.processes.iter().enumerate() {
         let location = location_name(network, index, words);

@@ -23,7 +23,7 @@ use super::time_optimal::{Race, fastest};
 use super::{game, partial_observation, time_clock};
 use crate::engine::answer::{Answer, Verdict};
 use crate::engine::evidence::strategy_check::Asked;
-use crate::engine::limits::{CLOCKS_GREW, LimitWatch};
+use crate::engine::limits::{CLOCKS_GREW, LimitWatch, OUT_OF_STATES};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 
@@ -92,6 +92,9 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
         let verdict = Verdict::Unknown(StopReason::Clocks);
         answer = Answer::new(verdict, answer.counters);
         answer.message = Some(CLOCKS_GREW.to_owned());
+    }
+    if watch.is_out_of_numbers() {
+        answer.remark(OUT_OF_STATES);
     }
     if options.plans.is_some() {
         game::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());

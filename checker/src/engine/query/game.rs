@@ -29,10 +29,12 @@ use super::budgets::{
     WITHOUT_ABSTRACTION,
 };
 use super::cooperative::{self, Solved};
-use super::game_zones::{IGNORED_PRIORITIES, can_be_discrete, objective_atoms, verified, zones_of};
+use super::game_zones::{
+    IGNORED_PRIORITIES, add_check, can_be_discrete, objective_atoms, zones_of,
+};
 use super::plans::add_plans;
 use super::subject::{Subject, has_differences};
-use crate::engine::answer::{Answer, Verdict};
+use crate::engine::answer::{Answer, Verdict, Wanted};
 use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 
@@ -327,13 +329,19 @@ impl<'a> Game<'a> {
         };
         match strategy {
             Ok(Ok(strategy)) => self.add_strategy(answer, strategy, watch),
-            Ok(Err(reason)) => answer.remark(format!("no strategy: {reason}")),
+            Ok(Err(reason)) => {
+                answer.remark(format!("no strategy: {reason}"));
+                if let Some(reason) = watch.look(&solver.counters()) {
+                    answer.lacks(Wanted::Strategy, reason);
+                }
+            }
             // The winner is known, so the answer stays even if the search for the strategy ends
             // early.
             Err(Failure::Interrupted) => {
                 let reason = watch.look(&solver.counters());
-                let reason = stop_text(reason.unwrap_or(StopReason::Interrupted));
-                answer.remark(format!("no strategy: {reason}"));
+                let reason = reason.unwrap_or(StopReason::Interrupted);
+                answer.lacks(Wanted::Strategy, reason);
+                answer.remark(format!("no strategy: {}", stop_text(reason)));
             }
             Err(failure) => answer.verdict = Verdict::Error(failure),
         }
@@ -410,8 +418,7 @@ impl<'a> Game<'a> {
     fn add_strategy(&self, answer: &mut Answer, mut strategy: Strategy, watch: &mut dyn Watch) {
         strategy.under = self.subject.under.map(|under| Arc::clone(under.strategy));
         if self.subject.options.verify {
-            let verification = verified(self.subject, self.asked, &strategy, watch);
-            answer.evidence.verification = Some(verification);
+            add_check(answer, self.subject, self.asked, &strategy, watch);
         }
         answer.evidence.strategy = Some(Arc::new(strategy));
     }

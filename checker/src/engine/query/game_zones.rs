@@ -1,16 +1,18 @@
 //! What all games share: their zones, the comparisons that these keep, and the check of strategies.
 
 use crate::analysis::{Abstraction, ClockBounds};
+use crate::cancellation::{self, Cut};
 use crate::game::Priorities;
 use crate::game::strategy::Strategy;
 use crate::ir::{ClockAtom, Network, Objective};
 use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic};
-use crate::search::limits::{Counters, Watch};
-use crate::verify::Effort;
+use crate::search::limits::{Counters, StopReason, Watch};
+use crate::verify::strategy::{Coverage, Outcome};
+use crate::verify::{Effort, GivenUp};
 
 use super::subject::Subject;
-use crate::engine::answer::Verification;
+use crate::engine::answer::{Answer, Verification, Wanted};
 use crate::engine::evidence::strategy_check::{self, Asked, Played};
 use crate::engine::options::Options;
 
@@ -60,27 +62,103 @@ pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
     both.flat_map(predicate::atoms).collect()
 }
 
-/// Checks a strategy in closed loop, until the watch wants it to end.
-pub(super) fn verified(
+/// Checks a strategy in closed loop, and adds how that ended.
+pub(super) fn add_check(
+    answer: &mut Answer,
     subject: Subject<'_>,
     asked: Asked<'_>,
     strategy: &Strategy,
     watch: &mut dyn Watch,
-) -> Verification {
+) {
+    add_check_by(answer, subject.options, watch, |effort| {
+        let decisions = strategy_check::decisions(subject.network, strategy);
+        let played = Played::new(strategy, &decisions);
+        let rules = subject.options.rules();
+        strategy_check::verify(subject.network, asked, played, rules, effort)
+    });
+}
+
+/// Adds how a check ends that the watch may end between regions, and limits inside them.
+pub(super) fn add_check_by(
+    answer: &mut Answer,
+    options: &Options,
+    watch: &mut dyn Watch,
+    check: impl FnOnce(&mut Effort<'_>) -> Verification,
+) {
     let mut ends = || watch.look(&Counters::default()).is_some();
-    let decisions = strategy_check::decisions(subject.network, strategy);
-    let played = Played::new(strategy, &decisions);
-    let effort = &mut effort_of(subject.options).unless(&mut ends);
-    let rules = subject.options.rules();
-    strategy_check::verify(subject.network, asked, played, rules, effort)
+    let effort = &mut effort_of(options).unless(&mut ends);
+    let result = cancellation::unless_cut(|| check(effort));
+    let result =
+        result.unwrap_or_else(|Cut| Ok(Outcome::GivenUp(GivenUp::Ended, Coverage::default())));
+    if let Ok(Outcome::GivenUp(why, _)) = &result {
+        let reason = match why {
+            GivenUp::TooLarge => StopReason::States,
+            GivenUp::Ended => watch
+                .look(&Counters::default())
+                .unwrap_or(StopReason::Interrupted),
+        };
+        answer.lacks(Wanted::Check, reason);
+    }
+    answer.evidence.verification = Some(result);
 }
 
 /// The effort that a check may take.
-pub(super) fn effort_of<'a>(options: &Options) -> Effort<'a> {
+fn effort_of<'a>(options: &Options) -> Effort<'a> {
     Effort::up_to(
         options
             .limits
             .states
             .unwrap_or(strategy_check::MOST_REGIONS),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::answer::{Stopped, Verdict};
+    use crate::ir::Network;
+
+    /// Wants work to end for this reason.
+    struct Ends(Option<StopReason>);
+
+    impl Watch for Ends {
+        fn look(&mut self, _: &Counters) -> Option<StopReason> {
+            self.0
+        }
+    }
+
+    /// The check ends in this way; the verdict stays, and the answer says what was wanted.
+    fn check_ends(
+        reason: Option<StopReason>,
+        check: impl FnOnce(&mut Effort<'_>) -> Verification,
+        stop: StopReason,
+        said: &str,
+    ) {
+        let mut answer = Answer::new(Verdict::Satisfied, Counters::default());
+        add_check_by(&mut answer, &Options::default(), &mut Ends(reason), check);
+        assert_eq!(answer.verdict, Verdict::Satisfied);
+        let what = Wanted::Check;
+        let stopped = [Stopped { what, reason: stop }];
+        assert_eq!(answer.evidence.stopped, stopped);
+        assert_eq!(answer.evidence.is_verified(), None);
+        let result = answer.evidence.verification.expect("there was a check");
+        let lines = strategy_check::describe(&Network::default(), &result, Some(stop));
+        assert!(lines[0].contains(said), "{lines:?}");
+    }
+
+    #[test]
+    fn a_check_that_is_ended_leaves_the_verdict() {
+        let ended = || Ok(Outcome::GivenUp(GivenUp::Ended, Coverage::default()));
+        let time = "it was found, and checking it was stopped by the time limit";
+        let memory = "it was found, and checking it was stopped by the memory limit";
+        check_ends(Some(StopReason::Time), |_| ended(), StopReason::Time, time);
+        check_ends(
+            Some(StopReason::Memory),
+            |_| cancellation::cut(),
+            StopReason::Memory,
+            memory,
+        );
+        let large = Outcome::GivenUp(GivenUp::TooLarge, Coverage::default());
+        check_ends(None, |_| Ok(large), StopReason::States, "--states");
+    }
 }

@@ -8,11 +8,10 @@ use crate::game::strategy::Selection;
 use crate::game::{Player, Priorities};
 use crate::ir::{ClockAtom, Network, Objective, Predicate};
 use crate::network::symbolic::predicate;
-use crate::search::limits::{Counters, Watch};
 use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
-use super::game_zones::{IGNORED_PRIORITIES, effort_of, objective_atoms, zones_of};
+use super::game_zones::{IGNORED_PRIORITIES, add_check_by, objective_atoms, zones_of};
 use super::subject::{Subject, has_differences};
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check;
@@ -95,10 +94,9 @@ pub(super) fn game(
             if options.verify {
                 let machine = machine_json::to_check(&machine);
                 let rules = options.rules();
-                let mut ends = || watch.look(&Counters::default()).is_some();
-                let effort = &mut effort_of(options).unless(&mut ends);
-                let result = verify(network, asked, &machine, rules, effort);
-                answer.evidence.verification = Some(result);
+                add_check_by(&mut answer, options, watch, |effort| {
+                    verify(network, asked, &machine, rules, effort)
+                });
             }
             answer.evidence.machine = Some(Arc::new(machine));
         }

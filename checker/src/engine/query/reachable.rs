@@ -15,7 +15,7 @@ use super::attempts::{Accuracy, first_of_use};
 use super::optimal_trace::{Sought, best, not_the_best};
 use super::subject::{Subject, can_be_coarse, coarse, live_variables, symbolic};
 use super::witnesses::Witnesses;
-use crate::engine::answer::{Answer, Evidence, Verdict};
+use crate::engine::answer::{Answer, Evidence, Verdict, Wanted};
 use crate::engine::evidence::certificate;
 use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::LimitWatch;
@@ -99,7 +99,7 @@ fn conclude(
     } = searched;
     let counters = report.counters;
     let mut witnesses = Witnesses::new(&mut symbolic, options);
-    let mut certificate = None;
+    let (mut certificate, mut stop) = (None, None);
     let mut message = None;
     let verdict = match report.outcome {
         Ok(Outcome::Found(trace)) => {
@@ -131,7 +131,10 @@ fn conclude(
                 let mut zones = self::symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
                 match certificate::reached(&mut zones, goal, counters, watch) {
                     Ok(reached) => certificate = Some(reached),
-                    Err(reason) => message = Some(format!("no certificate: {reason}")),
+                    Err((why, reason)) => {
+                        message = Some(format!("no certificate: {why}"));
+                        stop = reason;
+                    }
                 }
             }
             Verdict::NotSatisfied
@@ -146,9 +149,13 @@ fn conclude(
         certificate,
         ..witnesses.into_evidence()
     };
-    Answer {
+    let mut answer = Answer {
         message,
         evidence,
         ..Answer::new(verdict, counters)
+    };
+    if let Some(reason) = stop {
+        answer.lacks(Wanted::Certificate, reason);
     }
+    answer
 }

@@ -35,10 +35,10 @@ use crate::zones::{Bound, Zone};
 use super::attempts::first_of_use;
 use super::budgets::{CROWD_IN_RACES, RACE_IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
 use super::game;
-use super::game_zones::{self, objective_atoms, verified, zones_of};
+use super::game_zones::{self, add_check, objective_atoms, zones_of};
 use super::subject::{Subject, has_differences};
 use super::time_clock::{TIME, with_time};
-use crate::engine::answer::{Answer, Values, Verdict};
+use crate::engine::answer::{Answer, Values, Verdict, Wanted};
 use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::options::Options;
@@ -285,11 +285,9 @@ impl ClockedGame<'_, '_> {
         let strategy = match cut_as_interrupted(|| self.strategy(limit, watch)) {
             Ok(Ok(strategy)) => strategy,
             Ok(Err(reason)) => {
-                return answer.remark(format!("no strategy: {}", stop_text(reason)));
+                return Self::lacks_strategy(answer, reason);
             }
-            Err(Failure::Interrupted) => {
-                return answer.remark(format!("no strategy: {}", stop_text(watch.stop())));
-            }
+            Err(Failure::Interrupted) => return Self::lacks_strategy(answer, watch.stop()),
             Err(failure) => {
                 answer.verdict = Verdict::Error(failure);
                 return;
@@ -301,8 +299,7 @@ impl ClockedGame<'_, '_> {
                 is_cooperative: false,
                 time_optimal: Some((self.race.limit, self.race.rest)),
             };
-            let verification = verified(subject, asked, &strategy, watch);
-            answer.evidence.verification = Some(verification);
+            add_check(answer, subject, asked, &strategy, watch);
         }
         answer.remark(match strategy.owner {
             Player::Controller => format!("the strategy gets there within {TIME} <= {limit}"),
@@ -311,6 +308,11 @@ impl ClockedGame<'_, '_> {
             }
         });
         answer.evidence.strategy = Some(Arc::new(strategy));
+    }
+
+    fn lacks_strategy(answer: &mut Answer, reason: StopReason) {
+        answer.lacks(Wanted::Strategy, reason);
+        answer.remark(format!("no strategy: {}", stop_text(reason)));
     }
 
     /// The strategy of the player who wins with this limit.

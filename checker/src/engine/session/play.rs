@@ -215,7 +215,8 @@ impl Follower {
             Ok(Outcome::Violated(..)) => Some(false),
             Ok(Outcome::GivenUp(..)) | Err(_) => None,
         };
-        Ok((holds, strategy_check::describe(model.network(), &result)))
+        let lines = strategy_check::describe(model.network(), &result, None);
+        Ok((holds, lines))
     }
 }
 

@@ -6,6 +6,7 @@
 //! allowed. Where a strategy has no decision, and where play has ended, everything is allowed. So
 //! the closed loop contains every run of every player that follows the strategy.
 
+use crate::cancellation;
 use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
 use crate::search::StateStore;
@@ -82,11 +83,15 @@ pub struct Joined<'s> {
     pub legs: Vec<&'s Decision>,
 }
 
+/// What it takes to find a state among others, without its words: see [`cancellation::work`].
+const UNITS_FOR_STATE: usize = 256;
+
 /// A strategy by words.
 pub fn joined<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Joined<'s>> {
     let mut store = StateStore::new(network);
     let mut joined: Vec<Joined<'_>> = Vec::new();
     for state in &strategy.states {
+        cancellation::work(UNITS_FOR_STATE + state.words.len());
         let (id, is_new) = store.intern(&state.words);
         if is_new {
             joined.push(Joined {
