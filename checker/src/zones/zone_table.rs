@@ -6,6 +6,7 @@
 use hashbrown::HashTable;
 
 use super::{Bound, dbm};
+use crate::cancellation;
 
 /// The index of a stored zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -52,7 +53,7 @@ impl ZoneTable {
         if let Some(&id) = self.table.find(hash, |&id| dbm::is_equal(of(id), zone)) {
             return ZoneId(id);
         }
-        let id = self.count;
+        let id = cancellation::number(self.count as usize);
         self.count += 1;
         self.table.insert_unique(hash, id, |&id| dbm::hash(of(id)));
         self.bounds.extend_from_slice(zone);

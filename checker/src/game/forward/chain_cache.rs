@@ -15,6 +15,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::cancellation;
 use crate::ir::Predicate;
 use crate::network::{FixedMove, Moves, OfferId, VectorId};
 use crate::zones::federation::block_bytes;
@@ -135,7 +136,7 @@ impl ChainCache {
             }
             std::collections::hash_map::Entry::Occupied(mut entry) => {
                 let first = *entry.get_mut().get_or_insert_with(|| {
-                    let first = self.first.len() as u32;
+                    let first = cancellation::number(self.first.len());
                     self.first
                         .resize(self.first.len() + moves.len(), Onward::Unknown);
                     self.bytes += moves.len() * size_of::<Onward>();
@@ -152,7 +153,7 @@ impl ChainCache {
         self.bytes += size_of::<Trail>() + 2 * block_bytes(size_of::<Bound>() * dimension.pow(2));
         self.bytes += steps_bytes(&trail.steps) + trail.last.heap_bytes();
         self.points.push(trail);
-        Onward::To(self.points.len() as u32 - 1)
+        Onward::To(cancellation::number(self.points.len()) - 1)
     }
 }
 

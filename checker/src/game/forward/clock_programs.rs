@@ -5,6 +5,7 @@
 
 use rustc_hash::FxHashMap;
 
+use crate::cancellation;
 use crate::network::ClockEffect;
 use crate::zones::dbm::Constraint;
 use crate::zones::federation::{block_bytes, table_bytes};
@@ -59,7 +60,7 @@ impl Programs {
             self.last = id;
             return ProgramId(id);
         }
-        let id = self.steps.len() as u32;
+        let id = cancellation::number(self.steps.len());
         self.last = id;
         self.step_bytes += 2 * steps_bytes(steps);
         self.steps.push(steps.to_vec());

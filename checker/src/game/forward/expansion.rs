@@ -287,7 +287,7 @@ impl Graph<'_, '_> {
             controllable,
             movers,
         } = origin;
-        let edge = self.edges.len() as u32;
+        let edge = cancellation::number(self.edges.len());
         let next_in = std::mem::replace(&mut self.nodes[target as usize].first_in, edge);
         self.edges.push(Edge {
             source,

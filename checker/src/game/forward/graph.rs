@@ -27,6 +27,7 @@
 //! exactly. If the model compares two clocks, zones are cut along the comparisons, and a move has
 //! an edge for each piece; there are no chains then.
 
+use crate::cancellation;
 use crate::network::{ClockEffect, Failure, Moves, Symbolic};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 use crate::zones::dbm::{self, Constraint};
@@ -303,7 +304,7 @@ impl<'s, 'a> Graph<'s, 'a> {
             }
             node = next;
         }
-        let made = self.nodes.len() as u32;
+        let made = cancellation::number(self.nodes.len());
         let standing = self.standing(made, words, zone, urgent.as_ref())?;
         self.push_node(discrete, id, standing);
         let head = &mut self.heads[discrete.0 as usize];
@@ -331,6 +332,7 @@ impl<'s, 'a> Graph<'s, 'a> {
         zone: ZoneId,
         standing: Standing,
     ) -> u32 {
+        let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,
             zone,
@@ -341,6 +343,6 @@ impl<'s, 'a> Graph<'s, 'a> {
             delays: false,
             standing,
         });
-        self.nodes.len() as u32 - 1
+        node
     }
 }

@@ -23,6 +23,7 @@
 //! Abstraction", CAV 2013 (which inclusions are sound). Where we differ: with stopped clocks the
 //! cut is left out and every doubt counts as a run, so that only the absence of one is certain.
 
+use crate::cancellation;
 use crate::ir::Predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::Zone;
@@ -325,7 +326,7 @@ impl<'p> Liveness<'p> {
         if is_new {
             self.heads.push(NONE);
         }
-        let node = self.nodes.len() as u32;
+        let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,
             zone: self.zones.intern(zone.bounds()),

@@ -21,6 +21,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
+use crate::cancellation::{self, Room};
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone, dbm};
 
@@ -284,6 +285,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         if is_new {
             self.lists.push(Vec::new());
         }
+        let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,
             zone,
@@ -291,7 +293,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
             step,
             cost,
         });
-        self.nodes.len() as u32 - 1
+        node
     }
 
     fn moves_after(&self, parent: u32) -> Cost {
@@ -333,11 +335,14 @@ impl<'s, 'a> BestFirst<'s, 'a> {
     pub fn into_reached(self) -> Reached {
         let initial = &self.symbolic.stepper.network().initial;
         let mut reached = Reached::new();
+        let mut room = Room::default();
         for (index, list) in self.lists.iter().enumerate() {
             let mut words = initial.clone();
             self.store.load(DiscreteId(index as u32), &mut words);
             let zones = list.iter();
             let zones = zones.map(|&node| self.nodes[node as usize].zone.clone());
+            let zone_bytes = (self.symbolic.dimension().pow(2)) * size_of::<Bound>();
+            room.take(size_of_val(&*words) + list.len() * (size_of::<Zone>() + zone_bytes));
             reached.push((words, zones.collect()));
         }
         reached

@@ -1,5 +1,6 @@
 //! Computes the states of a path from its moves: the moves are taken again, without extrapolation.
 
+use crate::cancellation::Room;
 use crate::network::{Failure, Moves, Part, Permutation, Symbolic};
 use crate::zones::Zone;
 
@@ -13,6 +14,9 @@ type Taken = (Step, Option<Permutation>);
 
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
+
+/// A state is in the trace, and among those from which other ways are open.
+const STATES_AT_HAND: usize = 2;
 
 /// Takes the steps from the initial state. If a state has several zones, it takes the first one
 /// from which the rest of the path is possible, up to a state that the goal confirms if there is
@@ -48,12 +52,14 @@ fn take_all(
     symbolic.let_time_pass(&mut words, &invariant, &mut zones)?;
     zones.reverse();
     let mut open = vec![(words, zones)];
+    let mut room = Room::default();
     while let Some((words, zones)) = open.last_mut() {
         let Some(zone) = zones.pop() else {
             open.pop();
             continue;
         };
         let mut words = words.clone();
+        room.take(STATES_AT_HAND * (size_of_val(&*words) + size_of_val(zone.bounds())));
         trace.states.truncate(open.len() - 1);
         trace.states.push((words.clone(), zone.clone()));
         let Some(step) = steps.get(open.len() - 1) else {

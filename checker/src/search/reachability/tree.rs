@@ -6,6 +6,7 @@
 //! Cost: eight bytes for each state. A path of more than one move takes four bytes for each move
 //! and four more.
 
+use crate::cancellation;
 use crate::network::Symbolic;
 
 use crate::search::outcome::Step;
@@ -113,8 +114,8 @@ impl Tree {
             self.paths.push(0);
             packed_paths::pack(path, &mut self.paths);
             let words = self.paths.len() - first - 1;
-            self.paths[first] = words as u32 | shard;
-            first as u32 | MANY_STEPS
+            self.paths[first] = cancellation::number_below(1 << SHARD_SHIFT, words) | shard;
+            cancellation::number_below(MANY_STEPS as usize, first) | MANY_STEPS
         };
         self.nodes.push(Node {
             parent: origin.node,

@@ -13,6 +13,7 @@
 //! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up
 //! hashes the bytes once and compares them once, on a match of 32 bits of the hash.
 
+use crate::cancellation;
 use crate::ir::{Network, Shape};
 
 use super::segmented_table::PiecedTable;
@@ -243,7 +244,7 @@ impl StateStore {
         if let Some(entry) = self.table.find(spread(hash), is_same) {
             return (DiscreteId(entry.id), false);
         }
-        let id = self.count;
+        let id = cancellation::number(self.count as usize);
         self.count += 1;
         if id as usize >> self.block_bits == self.blocks.len() {
             self.blocks

@@ -44,7 +44,7 @@ impl Matrices {
     }
 
     pub(super) fn push(&mut self, matrix: &[u8]) -> u32 {
-        let id = self.count;
+        let id = cancellation::number(self.count as usize);
         self.count += 1;
         if id as usize >> self.block_bits == self.blocks.len() {
             self.blocks

@@ -12,6 +12,7 @@
 //! Cost: one look-up of the words, one or two comparisons of zones for each zone stored with the
 //! same words, and a look-up of the zone if it is to be stored.
 
+use crate::cancellation;
 use crate::network::Symbolic;
 use crate::zones::Bound;
 use crate::zones::zone_table::ZoneId;
@@ -147,7 +148,7 @@ impl PassedList {
     }
 
     fn stored(&mut self, discrete: DiscreteId, zone: ZoneId) -> Stored {
-        let node = self.nodes;
+        let node = cancellation::number(self.nodes as usize);
         self.nodes += 1;
         Stored {
             node,

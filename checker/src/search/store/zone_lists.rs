@@ -10,6 +10,7 @@
 //! Cost: a search in a list that is not split takes less than a nanosecond for each entry. In a
 //! list that is split, it visits about (3/4)^8 of the parts, if the eight numbers are independent.
 
+use crate::cancellation;
 use crate::zones::zone_table::ZoneId;
 
 use super::discrete_states::DiscreteId;
@@ -223,7 +224,7 @@ impl Lists {
         let Some(mean) = Signature::mean(&signatures.map(|entry| entry.signature)) else {
             return false;
         };
-        let number = self.splits.len() as u32;
+        let number = cancellation::number(self.splits.len());
         self.splits.push(Split {
             mean,
             parts: Vec::new(),
@@ -297,7 +298,8 @@ impl Lists {
         let free = self.free.get_mut(exponent).and_then(Vec::pop);
         free.unwrap_or_else(|| {
             let first = self.entries.len();
-            self.entries.resize(first + (1 << exponent), filler);
+            let end = cancellation::number(first + (1 << exponent));
+            self.entries.resize(end as usize, filler);
             first as u32
         })
     }
