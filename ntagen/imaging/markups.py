@@ -57,7 +57,9 @@ def read_marks(path: str, radius_mm: float | None, point: str | None = None) -> 
         marks = [mark for one in lists for mark in _marks(path, one, radius_mm, point)]
     except ImageError:
         raise
-    except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except (
+        *(ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError),
+    ) as error:
         raise ImageError(
             "image-malformed",
             f"`{path}` is no file of markups: {type(error).__name__} {error}"[:160],

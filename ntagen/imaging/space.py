@@ -101,7 +101,9 @@ def rigid(rows: Sequence[Sequence[float]], what: str) -> Rigid:
     # Squares of very large and very small numbers do not fit.
     most = float(np.abs(matrix).max()) or 1.0
     seen = np.linalg.norm(matrix / most, axis=0)
-    if abs(np.linalg.det(matrix / most)) < RIGID_TOLERANCE * max(1e-300, seen.prod()):
+    with np.errstate(all="ignore"):
+        volume = abs(float(np.linalg.det(matrix / most)))
+    if not volume >= RIGID_TOLERANCE * max(1e-300, seen.prod()):
         raise ImageError("matrix-degenerate", f"{what} makes space flat", hint)
     lengths = [most * float(length) for length in seen]
     if max(abs(length - 1.0) for length in lengths) > RIGID_TOLERANCE:
