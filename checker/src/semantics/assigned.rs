@@ -88,9 +88,11 @@ fn each_expr(statement: &Statement, visit: &mut dyn FnMut(&Expr)) {
             visit(condition);
             each_expr(body, visit);
         }
-        Statement::If(condition, then, otherwise) => {
-            visit(condition);
-            each_expr(then, visit);
+        Statement::If(branches, otherwise) => {
+            for (condition, then) in branches {
+                visit(condition);
+                each_expr(then, visit);
+            }
             if let Some(otherwise) = otherwise {
                 each_expr(otherwise, visit);
             }
@@ -106,8 +108,10 @@ fn each_block(statement: &Statement, visit: &mut dyn FnMut(&Block)) {
         | Statement::Iterate { body, .. }
         | Statement::While(_, body)
         | Statement::DoWhile(body, _) => each_block(body, visit),
-        Statement::If(_, then, otherwise) => {
-            each_block(then, visit);
+        Statement::If(branches, otherwise) => {
+            for (_, then) in branches {
+                each_block(then, visit);
+            }
             if let Some(otherwise) = otherwise {
                 each_block(otherwise, visit);
             }

@@ -364,13 +364,15 @@ impl Checker<'_> {
                 }
             }
             ast::Statement::Iterate { name, ty, body } => self.iterate(name, ty, body, result),
-            ast::Statement::If(condition, then, otherwise) => Statement::If(
-                self.condition(condition),
-                Box::new(self.statement(then, result)),
-                otherwise
-                    .as_ref()
-                    .map(|otherwise| Box::new(self.statement(otherwise, result))),
-            ),
+            ast::Statement::If(branches, otherwise) => {
+                let branch = |(condition, then): &(ast::Expr, ast::Statement)| {
+                    (self.condition(condition), self.statement(then, result))
+                };
+                let branches = branches.iter().map(branch).collect();
+                let otherwise = otherwise.as_ref();
+                let otherwise = otherwise.map(|one| Box::new(self.statement(one, result)));
+                Statement::If(branches, otherwise)
+            }
             ast::Statement::Return(value, span) => {
                 self.return_statement(value.as_ref(), *span, result)
             }
@@ -544,7 +546,9 @@ fn initial_assignment(root: Root, offset: Size, ty: Type, value: Expr) -> Expr {
 fn returns(statement: &Statement) -> bool {
     match statement {
         Statement::Block(statements) => statements.iter().any(returns),
-        Statement::If(_, then, Some(otherwise)) => returns(then) && returns(otherwise),
+        Statement::If(branches, Some(otherwise)) => {
+            branches.iter().all(|(_, then)| returns(then)) && returns(otherwise)
+        }
         Statement::Return(..) => true,
         Statement::Loop {
             body, tested_first, ..

@@ -197,9 +197,11 @@ impl Body {
             }
             Statement::Expr(expr) => self.effect(expr),
             Statement::Iterate { body, .. } => self.statement(body),
-            Statement::If(condition, then, otherwise) => {
-                self.reading(condition);
-                self.statement(then);
+            Statement::If(branches, otherwise) => {
+                for (condition, then) in branches {
+                    self.reading(condition);
+                    self.statement(then);
+                }
                 if let Some(otherwise) = otherwise {
                     self.statement(otherwise);
                 }

@@ -285,8 +285,8 @@ pub(super) enum Statement {
         range: (i32, i32),
         body: Box<Statement>,
     },
-    /// `if`
-    If(Expr, Box<Statement>, Option<Box<Statement>>),
+    /// `if`, with all its `else if`
+    If(Vec<(Expr, Statement)>, Option<Box<Statement>>),
     /// `return`
     Return(Option<Expr>),
     /// `assert`
@@ -611,9 +611,10 @@ impl Statement {
                 ..
             } => holds(head) || holds(step) || body.any(condition),
             Statement::Iterate { body, .. } => body.any(condition),
-            Statement::If(head, then, otherwise) => {
-                let mut branches = [Some(then), otherwise.as_ref()].into_iter().flatten();
-                head.any(condition) || branches.any(|branch| branch.any(condition))
+            Statement::If(branches, otherwise) => {
+                let mut branches = branches.iter();
+                branches.any(|(head, then)| head.any(condition) || then.any(condition))
+                    || otherwise.as_ref().is_some_and(|one| one.any(condition))
             }
             Statement::Return(value) => holds(value),
         }

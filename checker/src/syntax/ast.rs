@@ -325,8 +325,9 @@ pub enum Statement {
     While(Expr, Box<Statement>),
     /// `do body while (condition);`
     DoWhile(Box<Statement>, Expr),
-    /// `if (condition) then else otherwise`
-    If(Expr, Box<Statement>, Option<Box<Statement>>),
+    /// `if (condition) then else if (condition) then … else otherwise`: a chain of any length, so
+    /// that nothing recurses along it.
+    If(Vec<(Expr, Statement)>, Option<Box<Statement>>),
     /// `return expression;`
     Return(Option<Expr>, Span),
     /// `assert expression;`

@@ -186,11 +186,18 @@ impl Parser<'_> {
     }
 
     fn if_statement(&mut self) -> Statement {
-        self.bump();
-        let condition = self.condition();
-        let then = Box::new(self.statement());
-        let otherwise = self.eat_word("else").then(|| Box::new(self.statement()));
-        Statement::If(condition, then, otherwise)
+        let mut branches = Vec::new();
+        loop {
+            self.bump();
+            let condition = self.condition();
+            branches.push((condition, self.statement()));
+            if !self.eat_word("else") {
+                return Statement::If(branches, None);
+            }
+            if self.word() != "if" {
+                return Statement::If(branches, Some(Box::new(self.statement())));
+            }
+        }
     }
 }
 

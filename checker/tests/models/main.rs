@@ -12,6 +12,7 @@ mod corpus;
 mod great_differences;
 mod interrupts;
 mod live_variables;
+mod long_chains;
 mod numbers;
 mod option_sets;
 mod partial_order;

@@ -23,9 +23,7 @@ impl Builder<'_> {
                     builder.statement(body);
                 });
             }
-            Statement::If(condition, then, otherwise) => {
-                self.choose(condition, then, otherwise.as_deref());
-            }
+            Statement::If(branches, otherwise) => self.choose(branches, otherwise.as_deref()),
             Statement::Return(value) => self.give_back(value.as_ref()),
             Statement::Assert(condition, span) => {
                 let condition = self.value(condition);
@@ -99,13 +97,16 @@ impl Builder<'_> {
         self.switch(end);
     }
 
-    fn choose(&mut self, condition: &Expr, then: &Statement, otherwise: Option<&Statement>) {
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(condition, yes, no);
-        self.switch(yes);
-        self.statement(then);
-        self.jump(end);
-        self.switch(no);
+    fn choose(&mut self, branches: &[(Expr, Statement)], otherwise: Option<&Statement>) {
+        let end = self.new_block();
+        for (condition, then) in branches {
+            let (yes, no) = (self.new_block(), self.new_block());
+            self.condition(condition, yes, no);
+            self.switch(yes);
+            self.statement(then);
+            self.jump(end);
+            self.switch(no);
+        }
         if let Some(otherwise) = otherwise {
             self.statement(otherwise);
         }

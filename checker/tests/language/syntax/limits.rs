@@ -86,6 +86,16 @@ fn deep_declarations_are_refused() {
 }
 
 #[test]
+fn long_chains_of_else_if_are_read_and_blocks_in_them_are_counted() {
+    let chain = "if (a) ; else ".repeat(DEEP);
+    let text = format!("void f() {{ {chain} a = 1; }}");
+    let found = mistakes(text.as_bytes());
+    assert!(!found.iter().any(|one| one.contains("E0106")), "{found:?}");
+    let deep = "if (a) { if (a) ; else ".repeat(DEEP);
+    check(&format!("void f() {{ {deep}"), "E0106");
+}
+
+#[test]
 fn deep_queries_are_refused() {
     for opening in ["E<> ", "A[] (", "control: A[] (", "control: A[ ", "{ "] {
         let (found, diagnostics) = query(&opening.repeat(DEEP));
