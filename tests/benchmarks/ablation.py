@@ -161,7 +161,7 @@ HOME = "control: A[] (true && A<> Guard.Home)"
 PLANS = "control: A<> Checker.Final_TR_Reached"
 
 
-def _searches() -> Iterator[Member]:
+def searches() -> Iterator[Member]:
     def of(name: str, text: str, query: str = "E<> false", **options: object) -> Member:
         return Member(name, "search", text, query, options)
 
@@ -198,7 +198,7 @@ def _searches() -> Iterator[Member]:
     yield of("needle, reachable", _needle(2), "E<> Checker.Final_TR_Reached && false")
 
 
-def _games() -> Iterator[Member]:
+def games_of_set() -> Iterator[Member]:
     def of(name: str, text: str, query: str, **options: object) -> Member:
         return Member(name, "game", text, query, options)
 
@@ -238,7 +238,7 @@ def _games() -> Iterator[Member]:
     yield of("trains 3, differences", apart.replace("N = 4", "N = 3"), bridge)
 
 
-def _random_runs() -> Iterator[Member]:
+def random_runs() -> Iterator[Member]:
     def of(name: str, text: str, query: str) -> Member:
         return Member(name, "runs", text, query, {"runs": 100_000})
 
@@ -253,7 +253,7 @@ def _of_folder(folder: Path) -> Iterator[Member]:
         yield Member(path.stem, "search", text, options={"states": MOST_STATES})
 
 
-def _answered(member: Member, without: str, most_seconds: float) -> Measured:
+def answered(member: Member, without: str, most_seconds: float) -> Measured:
     """What the answer to a member's question takes in this process."""
     name = "model.xml" if member.text.lstrip().startswith("<") else "model.xta"
     model = checker.load(member.text, name)
@@ -291,7 +291,7 @@ class Bench:
             os.close(other)
             return child, own
         try:
-            measured = _answered(*question, self._most_seconds(question[0]))
+            measured = answered(*question, self._most_seconds(question[0]))
             os.write(other, json.dumps(astuple(measured)).encode())
             os._exit(0)
         except BaseException as error:
@@ -343,7 +343,7 @@ def _row(bench: Bench, member: Member, part: str, runs: int) -> Row:
     is_known = "unknown" not in (before.verdict, after.verdict)
     is_same = not is_known or (after.verdict, after.value) == (before.verdict, before.value)
     times = [(before.seconds, after.seconds)]
-    if abs(_ratio(after.seconds, before.seconds) - 1.0) > UNCERTAIN:
+    if abs(ratio(after.seconds, before.seconds) - 1.0) > UNCERTAIN:
         answers = bench.ask([(member, ""), (member, part)] * (runs - 1))
         times += [
             (one.seconds, other.seconds)
@@ -351,10 +351,10 @@ def _row(bench: Bench, member: Member, part: str, runs: int) -> Row:
         ]
     # What else the machine does can only add to a time.
     least_before, least_after = (min(column) for column in zip(*times, strict=True))
-    return Row(member, _ratio(least_after, least_before), states, is_same)
+    return Row(member, ratio(least_after, least_before), states, is_same)
 
 
-def _ratio(after: float, before: float) -> float:
+def ratio(after: float, before: float) -> float:
     return 1.0 if max(after, before) < LEAST_SECONDS else after / max(before, 0.001)
 
 
@@ -406,7 +406,7 @@ def main() -> None:
     arguments = parser.parse_args()
     if unknown := set(PARTS) ^ set(checker.HEURISTICS):
         raise SystemExit(f"not in both tables: {', '.join(sorted(unknown))}")
-    members = [*_searches(), *_games(), *_random_runs()]
+    members = [*searches(), *games_of_set(), *random_runs()]
     if arguments.models:
         members += _of_folder(arguments.models)
     if arguments.member:
