@@ -16,7 +16,7 @@ from ntagen.explanations import explanations
 from ntagen.nsl.diagnostics import KINDS
 
 WITHOUT_EXAMPLE = {"N001", "N002", "N006", "N007"} | {
-    *("N100", "N101", "N102", "N103", "N104", "N105", "N106", "N107", "N109"),
+    *("N100", "N101", "N102", "N103", "N104", "N105", "N106", "N107", "N109", "N111"),
 }
 """Codes about files that are not there, cannot be read or are too large to be shown."""
 
