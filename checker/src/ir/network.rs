@@ -61,6 +61,25 @@ impl Network {
     }
 }
 
+impl Process {
+    /// The edges that have the same entry as an edge, in order: all legs of its branch point if
+    /// each makes an edge, and else the edge alone.
+    pub fn edges_of_entry(&self, EdgeId(edge): EdgeId) -> impl Iterator<Item = &Edge> {
+        let first = |edge: &Edge| edge.leg.as_ref().map(|leg| leg.first);
+        let entry = first(&self.edges[edge as usize]);
+        let start = entry.map_or(edge, |EdgeId(first)| first) as usize;
+        let rest = self.edges[start..].iter().enumerate();
+        let same = rest.take_while(move |(place, edge)| {
+            if entry.is_some() {
+                first(edge) == entry
+            } else {
+                *place == 0
+            }
+        });
+        same.map(|(_, edge)| edge)
+    }
+}
+
 /// A scalar set: numbers that are only compared for equality and used as indices, so that they can
 /// be exchanged.
 #[derive(Clone, Debug)]
@@ -138,7 +157,7 @@ pub struct Location {
     pub span: Span,
 }
 
-/// An edge; with a branch point, the entry together with its legs.
+/// An edge; with a branch point, the entry together with its legs, or with one of them.
 #[derive(Clone, Debug)]
 pub struct Edge {
     /// The location it leaves.
@@ -155,6 +174,9 @@ pub struct Edge {
     /// The branches; only one without a branch point. Each is a separate move of the owner of the
     /// edge.
     pub branches: Vec<Branch>,
+    /// Which leg of a branch point it is, where some leg has a guard or synchronises: then each leg
+    /// makes an edge, together with the entry.
+    pub leg: Option<Box<Leg>>,
     /// Whether the controller owns it.
     pub controllable: bool,
     /// What was written: for traces.
@@ -176,6 +198,25 @@ pub struct Select {
     pub high: i32,
     /// The scalar set, if it ranges over one.
     pub set: Option<u32>,
+}
+
+/// The part of a leg in an edge that an entry and a leg make.
+///
+/// Edges of the same entry are one for whoever chooses: the controller in a game, and a process
+/// among its outputs in a random run, choose an entry. The leg is chance, among those possible.
+#[derive(Clone, Debug)]
+pub struct Leg {
+    /// The first edge of the process that has the same entry.
+    pub first: EdgeId,
+    /// How many of the `select` bindings the entry has; those of the leg come behind them.
+    pub bindings: usize,
+    /// How many combinations of values the bindings of the leg have.
+    pub combinations: u32,
+    /// Whether the entry synchronises: then its partners are chosen with it, and otherwise with the
+    /// leg.
+    pub follows_sync: bool,
+    /// The labels of the entry alone.
+    pub entry: EdgeLabels,
 }
 
 /// One way an edge can end.
@@ -339,6 +380,8 @@ pub struct Features {
     pub hybrid_clocks: bool,
     /// Edges that the environment owns.
     pub uncontrollable: bool,
+    /// Legs of branch points that are edges: see [`Edge::leg`].
+    pub legs: bool,
 }
 
 /// Where a run-time error can come from.

@@ -109,8 +109,6 @@ codes! {
     LOCATION_UNKNOWN = "E0254" "location-unknown";
     /// An initial location that does not exist.
     INITIAL_LOCATION = "E0256" "initial-location";
-    /// A branch point or a leg of one that breaks the rules.
-    BRANCH_REFUSED = "E0257" "branch-refused";
     /// A name that is not a template where one is needed.
     TEMPLATE_EXPECTED = "E0258" "template-expected";
     /// A process in the system line with a parameter that has no value and no bounds.
@@ -173,6 +171,10 @@ codes! {
     DYNAMIC_MISUSED = "E0297" "dynamic-misused";
     /// A dynamic template, which symbolic queries do not know.
     DYNAMIC_SYMBOLIC = "E0298" "dynamic-symbolic";
+    /// A branch point that has no leg, or one that does not end in a location.
+    BRANCH_POINT_OPEN = "E0287" "branch-point-open";
+    /// An edge to a branch point and a leg of it that both synchronise.
+    SYNCHRONISES_TWICE = "E0288" "synchronises-twice";
     /// An expression whose value is dropped and that changes nothing.
     EFFECT_MISSING = "W0201" "effect-missing";
     /// An invariant with a strict upper bound.

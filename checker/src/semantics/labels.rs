@@ -5,7 +5,6 @@ use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::merge_ranges;
-use super::legs::SYNCHRONISES;
 use super::lower::clocks::{bound_range, comparisons};
 use super::lower::horizons::curved;
 use super::offsets::known_offset;
@@ -27,11 +26,19 @@ pub(super) struct Select {
 impl Checker<'_> {
     /// Checks and lowers a guard.
     pub(super) fn guard(&mut self, guard: &ast::Expr, locals: &[LocalId], place: &str) -> Guard {
+        match self.conditions(guard) {
+            Some(parts) => self.make_guard(&parts, locals, place),
+            None => Guard::default(),
+        }
+    }
+
+    /// The conditions whose conjunction a guard is; `None` if it is none.
+    pub(super) fn conditions(&mut self, guard: &ast::Expr) -> Option<Vec<Expr>> {
         let before = self.unknowns.len();
         let guard = self.expression(guard);
         if !self.expect_pure(&guard, "a guard") || !self.expect_condition(&guard) {
             self.unknowns.truncate(before);
-            return Guard::default();
+            return None;
         }
         let sets_rates = guard.any(&|e| matches!(e.kind, Kind::Rate { .. }))
             || guard.ty == Type::Constraint(Class::InvariantWithRate);
@@ -42,11 +49,11 @@ impl Checker<'_> {
                 "this cannot be a guard: inequalities, negations and disjunctions of clock conditions, and rates, are not guards",
                 "split the edge into one for each case",
             );
-            return Guard::default();
+            return None;
         }
         let mut parts = Vec::new();
         conjuncts(guard, &mut parts);
-        self.make_guard(&parts, locals, place)
+        Some(parts)
     }
 
     /// Lowers a conjunction of conditions.
@@ -242,11 +249,10 @@ impl Checker<'_> {
         Some((clock, function))
     }
 
-    /// Checks and lowers a synchronisation; that of a leg must send on a broadcast channel.
+    /// Checks and lowers a synchronisation.
     pub(super) fn synchronisation(
         &mut self,
         sync: &ast::Sync,
-        is_of_leg: bool,
         locals: &[LocalId],
         place: &str,
     ) -> Option<ir::Sync> {
@@ -278,18 +284,6 @@ impl Checker<'_> {
             );
             return None;
         }
-        if is_of_leg
-            && !matches!(
-                channel.ty,
-                Type::Channel {
-                    broadcast: true,
-                    ..
-                }
-            )
-        {
-            self.leg_refused(sync.span, SYNCHRONISES);
-            return None;
-        }
         if !self.can_lower() {
             return None;
         }
@@ -317,6 +311,12 @@ impl Checker<'_> {
         locals: &[LocalId],
         place: &str,
     ) -> Update {
+        let checked = self.effects(exprs);
+        self.make_update(&checked, locals, place)
+    }
+
+    /// The expressions of an update that have effects.
+    pub(super) fn effects(&mut self, exprs: &[ast::Expr]) -> Vec<Expr> {
         let mut checked = Vec::new();
         for expr in exprs {
             let expr = if matches!(expr.kind, ast::ExprKind::Exit) {
@@ -328,14 +328,19 @@ impl Checker<'_> {
                 checked.push(expr);
             }
         }
-        if !self.can_lower() || checked.is_empty() {
-            return Update::default();
-        }
-        self.make_update(&checked, locals, place)
+        checked
     }
 
     /// Lowers an update. Resets to constants are taken out if nothing else sets or reads clocks.
-    fn make_update(&mut self, exprs: &[Expr], locals: &[LocalId], place: &str) -> Update {
+    pub(super) fn make_update(
+        &mut self,
+        exprs: &[Expr],
+        locals: &[LocalId],
+        place: &str,
+    ) -> Update {
+        if !self.can_lower() || exprs.is_empty() {
+            return Update::default();
+        }
         let mut update = Update::default();
         let (resets, others): (Vec<Expr>, Vec<Expr>) = exprs
             .iter()

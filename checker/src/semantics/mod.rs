@@ -90,6 +90,7 @@ mod hooks;
 mod system;
 
 mod members;
+mod nodes;
 
 mod queries;
 

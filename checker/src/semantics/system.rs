@@ -5,7 +5,6 @@ use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::{Relocation, chance_words};
-use super::legs::without_sending_legs;
 use super::offsets::known_offset;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Root};
@@ -17,7 +16,6 @@ use crate::syntax::ast::{Declaration, Document, SystemItem, UnsupportedPart};
 impl Checker<'_> {
     /// Checks and lowers a model. Returns what its provisional offsets of words stand for.
     pub(super) fn document(&mut self, document: &Document, prelude: &[Declaration]) -> Relocation {
-        let document = &*without_sending_legs(document);
         self.world.network.clocks.push(Clock {
             name: String::from("0"),
             owner: None,
@@ -276,6 +274,7 @@ fn features(network: &Network) -> Features {
             .any(|variable| has_double(&variable.shape)),
         hybrid_clocks: network.clocks.iter().any(|clock| clock.hybrid),
         uncontrollable: edges().any(|edge| !edge.controllable),
+        legs: edges().any(|edge| edge.leg.is_some()),
     }
 }
 

@@ -5,9 +5,9 @@ use rustc_hash::FxHashMap;
 use super::Reading;
 use super::checker::Checker;
 use super::codes;
-use super::dynamic::exits;
 use super::labels::Select;
-use super::legs::{SYNCHRONISES, leads_on};
+use super::legs::legs_apart;
+use super::nodes::{Endpoint, Ends, SELECT_LIMIT, has_instances, node_name, nodes};
 use super::operators::is_clock_term;
 use super::scope::{Entity, Scope};
 use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
@@ -17,25 +17,12 @@ use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationChances, LocationId, Urgency};
 use crate::syntax::ast;
 
-/// The most branches that the select bindings of one leg may stand for.
-const BRANCH_LIMIT: u64 = 1 << 16;
-
 /// What it takes to check a location or an edge, without its labels: see [`cancellation::work`].
 const UNITS_FOR_EDGE: usize = 1 << 12;
-
-/// The most edges that the select bindings of one may stand for.
-const SELECT_LIMIT: u64 = 1 << 20;
 
 /// The rates of clocks that an invariant sets: in the symbolic reading by clock, and in the
 /// stochastic one.
 type Rates = (Vec<(ClockId, FunctionId)>, LocationChances);
-
-/// What an edge can lead to.
-#[derive(Clone, Copy, Debug)]
-enum Endpoint {
-    Location(u32),
-    Branchpoint(usize),
-}
 
 impl Checker<'_> {
     /// Checks a template whose parameters are declared in the innermost scope, and makes a process
@@ -59,15 +46,25 @@ impl Checker<'_> {
             let Some(Endpoint::Location(source)) = self.node(&nodes, &edge.source) else {
                 continue;
             };
-            let edge = self.edge(template, edge, &nodes, LocationId(source));
-            if edge.select.iter().any(|select| select.low > select.high) {
-                // It stands for no edge at all.
-                continue;
+            let first = EdgeId(edges.len() as u32);
+            let made = match legs_apart(template, edge, &nodes) {
+                Some(legs) => {
+                    let ends = Ends {
+                        template,
+                        nodes: &nodes,
+                        source: LocationId(source),
+                    };
+                    self.edges_of_legs(&ends, edge, &legs, first)
+                }
+                None => vec![self.edge(template, edge, &nodes, LocationId(source))],
+            };
+            // One of which a binding has no value stands for no edge at all.
+            for edge in made.into_iter().filter(has_instances) {
+                locations[source as usize]
+                    .edges
+                    .push(EdgeId(edges.len() as u32));
+                edges.push(edge);
             }
-            locations[source as usize]
-                .edges
-                .push(EdgeId(edges.len() as u32));
-            edges.push(edge);
         }
         let initial = template
             .initial
@@ -124,7 +121,11 @@ impl Checker<'_> {
         }
     }
 
-    fn node(&mut self, nodes: &FxHashMap<&str, Endpoint>, name: &ast::Name) -> Option<Endpoint> {
+    pub(super) fn node(
+        &mut self,
+        nodes: &FxHashMap<&str, Endpoint>,
+        name: &ast::Name,
+    ) -> Option<Endpoint> {
         let node = nodes.get(name.text.as_str()).copied();
         if node.is_none() {
             self.error(
@@ -187,7 +188,7 @@ impl Checker<'_> {
         }
     }
 
-    fn expect_number(&mut self, expr: &Expr, what: &str) {
+    pub(super) fn expect_number(&mut self, expr: &Expr, what: &str) {
         if expr.is_error() {
             return;
         }
@@ -280,7 +281,7 @@ impl Checker<'_> {
         };
         let sync = edge.sync.as_ref().and_then(|sync| {
             let place = format!("{place}, synchronisation");
-            self.synchronisation(sync, leads_on(edge), &locals, &place)
+            self.synchronisation(sync, &locals, &place)
         });
         let update = self.update(&edge.update, &locals, &format!("{place}, update"));
         self.scopes.pop();
@@ -295,6 +296,7 @@ impl Checker<'_> {
             sync,
             update,
             branches,
+            leg: None,
             controllable: edge.controllable,
             labels: self.edge_labels(edge),
             nails: edge.nails.iter().map(|point| (point.x, point.y)).collect(),
@@ -302,7 +304,7 @@ impl Checker<'_> {
         }
     }
 
-    fn selects(&mut self, bindings: &[(ast::Name, ast::TypeExpr)]) -> Vec<Select> {
+    pub(super) fn selects(&mut self, bindings: &[(ast::Name, ast::TypeExpr)]) -> Vec<Select> {
         let mut selects = Vec::new();
         for (name, ty) in bindings {
             let outer = std::mem::take(&mut self.free_parameter_seen);
@@ -350,176 +352,6 @@ impl Checker<'_> {
         }
         selects
     }
-
-    fn branches(
-        &mut self,
-        template: &ast::Template,
-        edge: &ast::Edge,
-        nodes: &FxHashMap<&str, Endpoint>,
-        parameters: usize,
-        place: &str,
-    ) -> Vec<ir::Branch> {
-        let branchpoint = match self.node(nodes, &edge.target) {
-            None => return Vec::new(),
-            Some(Endpoint::Location(target)) => {
-                return vec![ir::Branch {
-                    target: LocationId(target),
-                    update: ir::Update::default(),
-                    weight: None,
-                }];
-            }
-            Some(Endpoint::Branchpoint(i)) => &template.branchpoints[i],
-        };
-        let mut branches = Vec::new();
-        for leg in template
-            .edges
-            .iter()
-            .filter(|leg| leg.source.text == branchpoint.id)
-        {
-            let Some(Endpoint::Location(target)) = self.node(nodes, &leg.target) else {
-                self.leg_refused(
-                    leg.target.span,
-                    "a leg of a branch point must end in a location",
-                );
-                continue;
-            };
-            let updates = self.leg(leg, parameters, place);
-            let others = exits(&edge.update);
-            let target = self.unless_exit(template, &leg.update, others, LocationId(target));
-            branches.extend(updates.into_iter().map(|(update, weight)| ir::Branch {
-                target,
-                update,
-                weight,
-            }));
-        }
-        if branches.is_empty() {
-            self.leg_refused(branchpoint.span, "the branch point leads nowhere");
-        }
-        branches
-    }
-
-    pub(super) fn leg_refused(&mut self, span: Span, message: &str) {
-        self.error(
-            codes::BRANCH_REFUSED,
-            span,
-            message,
-            "legs have updates and weights, may send on broadcast channels, and end in locations: guard and synchronise on the edge before or behind",
-        );
-    }
-
-    /// The updates and weights of a leg: one for each combination of the values of its `select`
-    /// bindings.
-    fn leg(
-        &mut self,
-        leg: &ast::Edge,
-        parameters: usize,
-        place: &str,
-    ) -> Vec<(ir::Update, Option<FunctionId>)> {
-        if let Some(guard) = &leg.guard {
-            let message = "guards on the legs of branch points are not supported";
-            self.leg_refused(guard.span, message);
-        }
-        if let Some(sync) = &leg.sync {
-            self.leg_refused(sync.span, SYNCHRONISES);
-        }
-        let mut ranges = Vec::new();
-        for (name, ty) in &leg.select {
-            let span = ty.span;
-            let Some((ty, _)) = self.iterated(ty) else {
-                return Vec::new();
-            };
-            // Each value is a branch of its own, which exchanging members would renumber.
-            self.distinguish_members(&ty, span);
-            ranges.push((name, ty));
-        }
-        let types: Vec<Type> = ranges.iter().map(|(_, ty)| ty.clone()).collect();
-        let counts = types.iter().map(|ty| {
-            let (low, high) = ty.bounds();
-            u64::try_from(i64::from(high) - i64::from(low) + 1).unwrap_or(0)
-        });
-        if counts.fold(1, u64::saturating_mul) > BRANCH_LIMIT {
-            self.error(
-                codes::RANGE_TOO_LARGE,
-                leg.span,
-                "the select of this leg ranges over too many values",
-                "use smaller ranges",
-            );
-            return Vec::new();
-        }
-        let mut updates = Vec::new();
-        for values in super::instantiate::combinations(&types) {
-            self.scopes.push(Scope::default());
-            for ((name, ty), value) in ranges.iter().zip(values) {
-                let value = Expr::int(value, ty.clone(), name.span);
-                self.declare(name, Entity::Constant { value, free: false });
-            }
-            updates.push(self.leg_update(leg, parameters, place));
-            self.scopes.pop();
-        }
-        updates
-    }
-
-    fn leg_update(
-        &mut self,
-        leg: &ast::Edge,
-        parameters: usize,
-        place: &str,
-    ) -> (ir::Update, Option<FunctionId>) {
-        // The functions of a leg take the values of the entry's select bindings too, but its
-        // expressions do not see them.
-        self.locals.clear();
-        let unseen: Vec<LocalId> = (0..parameters)
-            .map(|_| self.new_local(Type::ANY_INT))
-            .collect();
-        let mut given = None;
-        if let Some(weight) = &leg.probability {
-            let before = self.unknowns.len();
-            let weight = self.expression(weight);
-            self.expect_number(&weight, "a weight");
-            if weight.ty == Type::Bool {
-                self.error(
-                    codes::NUMBER_EXPECTED,
-                    weight.span,
-                    "a weight must be a number, but this is a truth value",
-                    "write the weight as an integer or a double",
-                );
-            }
-            self.unknowns.truncate(before);
-            if self.reading == Reading::Stochastic {
-                let place = format!("{place}, weight of a branch");
-                given = self.make_real(weight, &unseen, place);
-            }
-        }
-        let place = format!("{place}, update of a branch");
-        (self.update(&leg.update, &unseen, &place), given)
-    }
-}
-
-fn nodes(template: &ast::Template) -> FxHashMap<&str, Endpoint> {
-    let mut nodes = FxHashMap::default();
-    for (i, location) in template.locations.iter().enumerate() {
-        nodes
-            .entry(location.id.as_str())
-            .or_insert(Endpoint::Location(i as u32));
-    }
-    for (i, branchpoint) in template.branchpoints.iter().enumerate() {
-        nodes
-            .entry(branchpoint.id.as_str())
-            .or_insert(Endpoint::Branchpoint(i));
-    }
-    nodes
-}
-
-fn node_name<'t>(
-    template: &'t ast::Template,
-    nodes: &FxHashMap<&str, Endpoint>,
-    id: &'t str,
-) -> &'t str {
-    let name = match nodes.get(id) {
-        Some(&Endpoint::Location(i)) => template.locations[i as usize].name.as_ref(),
-        _ => None,
-    };
-    name.map_or(id, |name| name.text.as_str())
 }
 
 /// Whether a comparison bounds a clock, or a difference of clocks, strictly from above.

@@ -197,10 +197,10 @@ impl<'a> Advice<'a> {
     }
 
     /// When a controllable sender of a broadcast and those who can receive make a move that is
-    /// allowed, or one of the environment.
+    /// allowed, or one of the environment. The strategy may name moves by the sender alone.
     pub(super) fn allows_broadcast(
         &self,
-        sender: Entry,
+        (sender, is_alone): (Entry, bool),
         receivers: &[Ready],
         ahead: f64,
         view: View,
@@ -216,6 +216,9 @@ impl<'a> Advice<'a> {
             let [first, others @ ..] = action else {
                 return false;
             };
+            if is_alone {
+                return *first == sender;
+            }
             let mut ready = receivers.iter().filter(|one| is_ready(one, behind));
             let takes_part = |one: &Ready| others.contains(&one.entry);
             let has_part = |one: &Ready| {

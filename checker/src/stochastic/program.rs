@@ -47,6 +47,9 @@ pub(super) struct Instance<'a> {
     pub(super) may_be_urgent: bool,
     /// The number of its first branch among those of all edges.
     branches: u32,
+    /// The number of the first instance of the same process with the same entry: of the legs that
+    /// are edges, the first; else its own.
+    pub(super) entry: u32,
 }
 
 /// A process in a location.
@@ -101,6 +104,8 @@ pub(super) struct Program<'a> {
     pub(super) rated: Vec<u32>,
     /// Whether the rate of some clock may change as time passes.
     pub(super) has_flows: bool,
+    /// Whether legs of branch points are edges, so that several instances may have one entry.
+    pub(super) has_legs: bool,
 }
 
 impl<'a> Program<'a> {
@@ -121,6 +126,7 @@ impl<'a> Program<'a> {
             followers: Vec::new(),
             rated: Vec::new(),
             has_flows: false,
+            has_legs: network.features.legs,
         };
         for process in 0..network.processes.len() {
             program.add_process(process, &mut machine);
@@ -172,6 +178,7 @@ impl<'a> Program<'a> {
     ) -> (u32, u32) {
         let first = self.instances.len() as u32;
         let network = self.network;
+        let mut entries: FxHashMap<(EdgeId, Box<[i32]>), u32> = FxHashMap::default();
         for &id in edges {
             let edge = &network.processes[process].edges[id.0 as usize];
             let is_output = edge.sync.is_none_or(|sync| sync.send);
@@ -185,6 +192,11 @@ impl<'a> Program<'a> {
             each_selection(edge, &mut |values| {
                 let guard = self.condition(&edge.guard, values, machine);
                 if guard != Condition::Never {
+                    let number = self.instances.len() as u32;
+                    let entry = edge.leg.as_ref().map_or(number, |leg| {
+                        let values = values[..leg.bindings].into();
+                        *entries.entry((leg.first, values)).or_insert(number)
+                    });
                     self.instances.push(Instance {
                         process: process as u32,
                         id,
@@ -195,6 +207,7 @@ impl<'a> Program<'a> {
                         is_binary,
                         may_be_urgent,
                         branches: 0,
+                        entry,
                     });
                 }
             });

@@ -17,7 +17,7 @@ use crate::game::Player;
 use crate::game::strategy::closed_loop::{self, Joined};
 use crate::game::strategy::{Decision, Selection, Strategy};
 use crate::ir::Network;
-use crate::network::Part;
+use crate::network::{Part, entry_of};
 use crate::zones::Bound;
 
 /// When the controller moves where a strategy lets it choose.
@@ -111,16 +111,21 @@ impl Restriction {
         };
         let mut known = FxHashMap::default();
         for one in closed_loop::joined(symbolic, strategy) {
-            restriction.add(&one, &mut known);
+            restriction.add(symbolic, &one, &mut known);
         }
         Ok(restriction)
     }
 
-    fn add(&mut self, joined: &Joined<'_>, known: &mut FxHashMap<Vec<Entry>, u32>) {
+    fn add(
+        &mut self,
+        symbolic: &Network,
+        joined: &Joined<'_>,
+        known: &mut FxHashMap<Vec<Entry>, u32>,
+    ) {
         let first = self.cases.len() as u32;
         let decisions = joined.decisions.iter().filter(|_| !joined.is_goal);
         for decision in decisions {
-            self.add_decision(decision, known);
+            self.add_decision(symbolic, decision, known);
         }
         let state = self.states.len() as u32;
         self.states.push(first..self.cases.len() as u32);
@@ -132,9 +137,14 @@ impl Restriction {
         self.table.insert_unique(hash_of(state), state, add);
     }
 
-    fn add_decision(&mut self, decision: &Decision, known: &mut FxHashMap<Vec<Entry>, u32>) {
+    fn add_decision(
+        &mut self,
+        symbolic: &Network,
+        decision: &Decision,
+        known: &mut FxHashMap<Vec<Entry>, u32>,
+    ) {
         let action = decision.action.as_ref().map(|parts| {
-            let entries = entries(parts);
+            let entries = entries(&entry_of(symbolic, parts));
             *known.entry(entries).or_insert_with_key(|entries| {
                 self.actions.push(entries.clone());
                 self.actions.len() as u32 - 1

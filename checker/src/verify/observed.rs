@@ -23,9 +23,9 @@ use std::collections::HashMap;
 use crate::ir::{Network, Predicate};
 
 use super::effort::Effort;
-use super::moves::{Error, Move, State};
+use super::moves::{Error, Move, Part, State};
 use super::regions::Regions;
-use super::rules::{Aim, Claim, Owner, Rest, Rules};
+use super::rules::{Aim, Claim, Owner, Rest, Rules, entry};
 use super::strategy::{Coverage, Defect, Outcome, Step, Violation};
 
 /// What the controller proposes.
@@ -198,7 +198,7 @@ impl Play<'_> {
         let mut steps = Vec::new();
         let mut is_possible = false;
         for (one, target) in &possible {
-            let is_own = proposes(action, one);
+            let is_own = proposes(self.rules.semantics.network(), action, one);
             if is_own {
                 self.coverage.own_moves += 1;
                 is_possible = true;
@@ -252,19 +252,30 @@ impl Play<'_> {
 }
 
 /// Whether an action proposes a move.
-fn proposes(action: Action, one: &Move) -> bool {
+fn proposes(network: &Network, action: Action, one: &Move) -> bool {
+    let part = one.parts[0];
+    let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+    // Legs with channels are proposed by their entry.
+    let is_edge = match &edge.leg {
+        Some(leg) if !leg.follows_sync => true,
+        _ => one.channel.is_none(),
+    };
     one.controllable
         && match action {
             Action::Wait => false,
-            Action::Channel(channel) => one.channel == Some(channel),
+            Action::Channel(channel) => !is_edge && one.channel == Some(channel),
             Action::Edge {
                 process,
                 edge,
                 select,
             } => {
-                let part = one.parts[0];
-                one.channel.is_none()
-                    && (part.process, part.edge, part.select) == (process, edge, select)
+                let proposed = Part {
+                    process,
+                    edge,
+                    branch: 0,
+                    select,
+                };
+                is_edge && entry(network, &[part]) == entry(network, &[proposed])
             }
         }
 }

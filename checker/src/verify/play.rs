@@ -366,11 +366,12 @@ impl View<'_> {
             };
         }
         if self.rules.claim.is_permissive {
+            let network = self.rules.semantics.network();
             let actions = decisions.iter().filter_map(|one| one.action.as_ref());
             let actions: Vec<&Vec<Part>> = actions.collect();
             for (index, action) in actions.iter().enumerate() {
                 let mut before = actions[..index].iter();
-                if before.all(|one| !is_same_entry(one, action)) {
+                if before.all(|one| !is_same_entry(network, one, action)) {
                     for (one, _) in self.rules.moves_of_action(action, &possible) {
                         add(&mut self.situation.allowed, &one.parts, window);
                     }

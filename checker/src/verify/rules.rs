@@ -43,13 +43,29 @@ impl Decision {
     }
 }
 
-/// Whether two moves take the same edges with the same `select` values, so that they differ in
-/// branches only.
-pub(super) fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
-    let is_same = |(one, other): (&Part, &Part)| {
-        (one.process, one.edge, one.select) == (other.process, other.edge, other.select)
-    };
-    one.len() == other.len() && one.iter().zip(other).all(is_same)
+/// What is chosen of a move, where the rest is chance: its edges with their `select` values,
+/// without the branches; of legs that are edges the entry. If the sender's leg has the
+/// synchronisation, it says who takes part.
+pub(super) fn entry(network: &Network, parts: &[Part]) -> Vec<(u32, u32, u32)> {
+    let mut entry = Vec::with_capacity(parts.len());
+    for part in parts {
+        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        let Some(leg) = &edge.leg else {
+            entry.push((part.process, part.edge, part.select));
+            continue;
+        };
+        let is_first = entry.is_empty();
+        entry.push((part.process, leg.first.0, part.select / leg.combinations));
+        if is_first && !leg.follows_sync {
+            break;
+        }
+    }
+    entry
+}
+
+/// Whether the same is chosen of two moves.
+pub(super) fn is_same_entry(network: &Network, one: &[Part], other: &[Part]) -> bool {
+    entry(network, one) == entry(network, other)
 }
 
 /// The decisions of the states with some words, in order: the first whose zones contain the clock
@@ -225,11 +241,12 @@ impl<'a> Rules<'a> {
         }
         let allowed = self.allowed(state);
         if !allowed.is_empty() {
+            let network = self.semantics.network();
             let is_allowed = |one: &Move| {
                 allowed
                     .iter()
                     .filter_map(|decision| decision.action.as_ref())
-                    .any(|action| is_same_entry(action, &one.parts))
+                    .any(|action| is_same_entry(network, action, &one.parts))
             };
             possible.retain(|(one, _)| !one.controllable || is_allowed(one));
         }
@@ -274,7 +291,7 @@ impl<'a> Rules<'a> {
         possible: &'p [(&'m Move, State)],
     ) -> Vec<&'p (&'m Move, State)> {
         let is_meant = |one: &Move| match self.claim.owner {
-            Owner::Controller => is_same_entry(action, &one.parts),
+            Owner::Controller => is_same_entry(self.semantics.network(), action, &one.parts),
             Owner::Environment => action == one.parts,
         };
         let own = possible.iter().filter(|(one, _)| self.is_own(one));
@@ -300,8 +317,8 @@ impl<'a> Rules<'a> {
         let picked = |one: &Move| {
             let mut legs = legs.iter().filter_map(|leg| {
                 let action = leg.action.as_ref()?;
-                let is_meant =
-                    is_same_entry(action, &one.parts) && leg.applies(&state.clocks, unit);
+                let is_meant = leg.applies(&state.clocks, unit)
+                    && is_same_entry(self.semantics.network(), action, &one.parts);
                 is_meant.then_some(action)
             });
             legs.next()

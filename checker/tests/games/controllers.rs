@@ -134,7 +134,9 @@ impl Case {
         for leg in legs {
             let parts = leg.action.as_deref().expect("a leg is a move");
             if leg.zones.contains(&values, TICKS_PER_UNIT)
-                && !picked.iter().any(|one| is_same_entry(one, parts))
+                && !picked
+                    .iter()
+                    .any(|one| is_same_entry(&self.network, one, parts))
             {
                 picked.push(parts);
             }

@@ -11,9 +11,10 @@ use checker::engine::format::strategy_json;
 use checker::engine::{NamedStrategy, Verdict};
 use checker::game::Player;
 use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyState};
+use checker::ir;
 use checker::network::Part;
 use checker::verify::regions::Bounding;
-use checker::verify::{Regions, Semantics, State};
+use checker::verify::{self, Regions, Semantics, State};
 use checker::zones::dbm::Constraint;
 use checker::zones::{Bound, Federation, Zone};
 use proptest::prop_assert_eq;
@@ -33,6 +34,7 @@ const SHAPE: Shape = Shape {
     deadlock: true,
     priorities: false,
     guarded_urgency: false,
+    legs: false,
 };
 
 /// Regions that brute force explores before it gives a case up.
@@ -139,26 +141,28 @@ impl Random {
     }
 }
 
-/// The edges of a move, with their select values.
-fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
-    let parts = parts.iter();
-    parts
-        .map(|part| (part.process, part.edge, part.select))
-        .collect()
-}
-
 /// What the strategy says in a state: the decisions that count; `None` is nothing, so that
 /// everything is allowed. Then whose strategy it is, and the legs that apply, in order.
-pub(crate) struct Said<'s>(Option<Vec<Counting<'s>>>, Player, Vec<&'s [Part]>);
+pub(crate) struct Said<'s>(
+    Option<Vec<Counting<'s>>>,
+    Player,
+    Vec<&'s [Part]>,
+    &'s ir::Network,
+);
 
 /// A decision by its index, with what it does.
 type Counting<'s> = (usize, &'s Option<Vec<Part>>);
 
 impl<'s> Said<'s> {
-    pub(crate) fn new(strategy: &'s Strategy, state: &State, ticks: i64) -> Said<'s> {
+    pub(crate) fn new(
+        network: &'s ir::Network,
+        strategy: &'s Strategy,
+        state: &State,
+        ticks: i64,
+    ) -> Said<'s> {
         let same = |one: &&StrategyState| one.words == state.words;
         let Some(known) = strategy.states.iter().find(same).filter(|one| !one.is_goal) else {
-            return Said(None, strategy.owner, Vec::new());
+            return Said(None, strategy.owner, Vec::new(), network);
         };
         let legs = known.legs.iter();
         let legs = legs.filter(|one| one.zones.contains(&state.clocks, ticks));
@@ -171,7 +175,12 @@ impl<'s> Said<'s> {
             Selection::Any => counting.collect(),
         };
         let counting = (!counting.is_empty()).then_some(counting);
-        Said(counting, strategy.owner, legs)
+        Said(counting, strategy.owner, legs, network)
+    }
+
+    fn entry(&self, parts: &[Part]) -> explicit::Entry {
+        let parts: Vec<verify::Part> = parts.iter().map(|&part| part.into()).collect();
+        explicit::entry(self.3, &parts)
     }
 
     pub(crate) fn allows_waiting(&self) -> bool {
@@ -182,7 +191,7 @@ impl<'s> Said<'s> {
     pub(crate) fn allows(&self, parts: &[Part]) -> bool {
         let mut counting = self.0.iter().flatten();
         let is_it = |action: &[Part]| match self.1 {
-            Player::Controller => entry(action) == entry(parts),
+            Player::Controller => self.entry(action) == self.entry(parts),
             Player::Environment => action == parts,
         };
         self.0.is_none() || counting.any(|one| one.1.as_deref().is_some_and(is_it))
@@ -191,7 +200,7 @@ impl<'s> Said<'s> {
     /// Whether a move of the other player is the one that is picked of those with the same edges.
     fn picks(&self, parts: &[Part]) -> bool {
         let mut legs = self.2.iter();
-        legs.find(|leg| entry(leg) == entry(parts))
+        legs.find(|leg| self.entry(leg) == self.entry(parts))
             .is_none_or(|leg| *leg == parts)
     }
 
@@ -265,7 +274,7 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
             return None;
         }
         let (state, running) = known.states[nodes.len()].clone();
-        let now = Said::new(strategy, &state, ticks);
+        let now = Said::new(semantics.network(), strategy, &state, ticks);
         let moves = semantics.moves(&state).ok()?;
         let mut steps = Vec::new();
         for one in &moves {
@@ -287,7 +296,7 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
         let has_next = regions.pass(&mut next.clocks);
         let is_stopped =
             semantics.is_time_stopped(&state, &moves) || !semantics.invariants_hold(&next).ok()?;
-        let then = Said::new(strategy, &next, ticks);
+        let then = Said::new(semantics.network(), strategy, &next, ticks);
         let later = if is_stopped {
             None
         } else if now.allows_waiting() {

@@ -26,6 +26,7 @@ const LIVENESS: Shape = Shape {
     deadlock: false,
     priorities: true,
     guarded_urgency: false,
+    legs: false,
 };
 
 /// Values are compared up to [`TOP`], which takes many regions.

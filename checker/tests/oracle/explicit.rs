@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use checker::verify::{Error, Part, Regions, Semantics, State};
+use checker::ir::Network;
+use checker::verify::{Error, Move, Part, Regions, Semantics, State};
 
 /// A move, as far as games need it.
 #[derive(Clone, Debug)]
@@ -10,25 +11,35 @@ pub(crate) struct Step {
     pub target: usize,
     pub controllable: bool,
     pub parts: Vec<Part>,
+    /// The edges that it takes, without the branches: the controller chooses among these only.
+    pub entry: Entry,
     pub label: Label,
 }
+
+/// What is chosen of a move, as numbers.
+pub(crate) type Entry = Vec<(u32, u32, u32)>;
 
 impl Step {
     fn takes_part(&self, process: u32) -> bool {
         self.parts.iter().any(|part| part.process == process)
     }
-
-    /// The edges that it takes, without the branches: the controller chooses among these only.
-    pub(crate) fn entry(&self) -> Vec<(u32, u32, u32)> {
-        entry(&self.parts)
-    }
 }
 
-/// The edges of a move, with their select values.
-pub(crate) fn entry(parts: &[Part]) -> Vec<(u32, u32, u32)> {
-    let parts = parts.iter();
-    parts
-        .map(|part| (part.process, part.edge, part.select))
+/// What is chosen of a move: the edges with their select values. Of legs that are edges it is what
+/// they have of their branch point's edge, and if that does not synchronise, the leg says with
+/// whom.
+pub(crate) fn entry(network: &Network, parts: &[Part]) -> Entry {
+    let leg = |part: &Part| {
+        let process = &network.processes[part.process as usize];
+        process.edges[part.edge as usize].leg.as_ref()
+    };
+    let is_alone = leg(&parts[0]).is_some_and(|leg| !leg.follows_sync);
+    let named = parts.iter().take(if is_alone { 1 } else { parts.len() });
+    named
+        .map(|part| match leg(part) {
+            Some(leg) => (part.process, leg.first.0, part.select / leg.combinations),
+            None => (part.process, part.edge, part.select),
+        })
         .collect()
 }
 
@@ -66,6 +77,7 @@ pub(crate) struct Node {
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
     pub ticks: i64,
+    pub network: Network,
 }
 
 /// Why there is no graph.
@@ -121,6 +133,7 @@ pub(crate) fn explore(
     Ok(Graph {
         nodes,
         ticks: semantics.ticks_per_unit(),
+        network: semantics.network().clone(),
     })
 }
 
@@ -149,10 +162,8 @@ fn successors(
             target: known.id(target),
             controllable: one.controllable,
             parts: one.parts.clone(),
-            label: match (one.channel, one.parts[0]) {
-                (Some(channel), _) => Label::Channel(channel),
-                (None, part) => Label::Edge(part.process, part.edge, part.select),
-            },
+            label: label(semantics.network(), one),
+            entry: entry(semantics.network(), &one.parts),
         });
     }
     let mut next = state.clone();
@@ -179,6 +190,24 @@ fn successors(
         stoppers,
         is_obliged: false,
     })
+}
+
+fn label(network: &Network, one: &Move) -> Label {
+    let first = one.parts[0];
+    let edges = &network.processes[first.process as usize].edges;
+    let leg = edges[first.edge as usize].leg.as_ref();
+    match one.channel {
+        Some(channel) if leg.is_none_or(|leg| leg.follows_sync) => Label::Channel(channel),
+        _ => {
+            let (process, edge, select) = entry(network, &one.parts)[0];
+            let named = edges[edge as usize].leg.as_ref();
+            Label::Edge(
+                process,
+                edge,
+                select * named.map_or(1, |leg| leg.combinations),
+            )
+        }
+    }
 }
 
 impl Graph {
@@ -286,9 +315,9 @@ pub(crate) fn is_won(
         return false;
     }
     // The environment picks the branch.
-    let mut entries: BTreeMap<Vec<(u32, u32, u32)>, bool> = BTreeMap::new();
+    let mut entries: BTreeMap<Entry, bool> = BTreeMap::new();
     for step in &own {
-        *entries.entry(step.entry()).or_insert(true) &= win[step.target];
+        *entries.entry(step.entry.clone()).or_insert(true) &= win[step.target];
     }
     let wins_by_moving = entries.values().any(|wins| *wins);
     if node.is_obliged {

@@ -32,6 +32,7 @@ const SHAPE: Shape = Shape {
     deadlock: false,
     priorities: true,
     guarded_urgency: false,
+    legs: false,
 };
 
 /// A decision to act: the rank and the edges of its moves.
@@ -78,13 +79,13 @@ fn allowed(
         // The environment picks the branch.
         let mut entries: BTreeMap<Vec<(u32, u32, u32)>, bool> = BTreeMap::new();
         for step in node.steps.iter().filter(|step| step.controllable) {
-            *entries.entry(step.entry()).or_insert(true) &= good(index, step.target);
+            *entries.entry(step.entry.clone()).or_insert(true) &= good(index, step.target);
         }
         let steps = node.steps.iter();
         let acts = entries.values().any(|good| *good);
         Some(Allowed {
             steps: steps
-                .map(|step| !step.controllable || entries[&step.entry()])
+                .map(|step| !step.controllable || entries[&step.entry])
                 .collect(),
             waits: may_wait(index, acts),
             acting: entries

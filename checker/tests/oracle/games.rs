@@ -25,6 +25,7 @@ pub(crate) const SHAPE: Shape = Shape {
     deadlock: false,
     priorities: true,
     guarded_urgency: true,
+    legs: false,
 };
 
 /// The rules for forced moves: those of brute force, and those of the engine.

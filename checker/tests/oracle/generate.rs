@@ -3,6 +3,8 @@
 //! Numbers are taken modulo what there is (clocks, locations, …) when the text is written, so every
 //! tree is a model.
 
+pub(crate) mod explorer;
+
 use std::fmt::Write as _;
 
 use proptest::collection::vec;
@@ -76,15 +78,29 @@ enum Invariant {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Edge {
-    source: usize,
-    target: usize,
-    /// A second target behind a branch point, with the updates of that leg.
-    branch: Option<(usize, Vec<Update>)>,
+    pub(crate) source: usize,
+    /// Where it leads if it has no legs.
+    pub(crate) target: usize,
+    /// The legs of its branch point, if it leads to one.
+    pub(crate) legs: Vec<Leg>,
+    /// If a leg synchronises, the edge does not.
+    labels: Labels,
+    pub(crate) controllable: bool,
+}
+
+/// A leg of a branch point.
+#[derive(Clone, Debug)]
+pub(crate) struct Leg {
+    pub(crate) target: usize,
+    labels: Labels,
+}
+
+#[derive(Clone, Debug)]
+struct Labels {
     select: bool,
     sync: Sync,
     guards: Vec<Atom>,
     updates: Vec<Update>,
-    controllable: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -234,6 +250,8 @@ pub(crate) struct Shape {
     pub deadlock: bool,
     pub priorities: bool,
     pub guarded_urgency: bool,
+    /// Whether most networks have legs with labels.
+    pub legs: bool,
 }
 
 fn any_index() -> impl Strategy<Value = usize> {
@@ -331,29 +349,56 @@ fn sync() -> impl Strategy<Value = Sync> {
     ]
 }
 
-fn edge(shape: Shape) -> impl Strategy<Value = Edge> {
-    let owner = if shape.uncontrollable { 0.5 } else { 1.0 };
+fn labels(shape: Shape) -> impl Strategy<Value = Labels> {
     (
-        (any_index(), any_index()),
-        prop::option::weighted(0.15, (any_index(), vec(update(shape), 0..=1))),
         prop::bool::weighted(0.1),
         sync(),
         vec(atom(shape), 0..=2),
         vec(update(shape), 0..=2),
+    )
+        .prop_map(|(select, sync, guards, updates)| Labels {
+            select,
+            sync,
+            guards,
+            updates,
+        })
+}
+
+/// Legs that only lead on and update; those of every second branch point may have all labels.
+fn legs(shape: Shape) -> impl Strategy<Value = Vec<Leg>> {
+    let plain = (any_index(), vec(update(shape), 0..=1)).prop_map(|(target, updates)| Leg {
+        target,
+        labels: Labels {
+            select: false,
+            sync: Sync::None,
+            guards: Vec::new(),
+            updates,
+        },
+    });
+    let any = (any_index(), labels(shape)).prop_map(|(target, labels)| Leg { target, labels });
+    let (without, with) = if shape.legs { (4, 5) } else { (12, 2) };
+    prop_oneof![
+        without => Just(Vec::new()),
+        1 => vec(plain, 1..=3),
+        with => vec(any, 1..=3),
+    ]
+}
+
+fn edge(shape: Shape) -> impl Strategy<Value = Edge> {
+    let owner = if shape.uncontrollable { 0.5 } else { 1.0 };
+    (
+        (any_index(), any_index()),
+        legs(shape),
+        labels(shape),
         prop::bool::weighted(owner),
     )
-        .prop_map(
-            |((source, target), branch, select, sync, guards, updates, controllable)| Edge {
-                source,
-                target,
-                branch,
-                select,
-                sync,
-                guards,
-                updates,
-                controllable,
-            },
-        )
+        .prop_map(|((source, target), legs, labels, controllable)| Edge {
+            source,
+            target,
+            legs,
+            labels,
+            controllable,
+        })
 }
 
 fn process(shape: Shape) -> impl Strategy<Value = Process> {
@@ -440,6 +485,17 @@ pub(crate) fn observation(shape: Shape) -> impl Strategy<Value = Formula> {
 }
 
 impl Network {
+    /// The same with comparisons of one clock in the place of those of differences.
+    pub(crate) fn without_differences(mut self) -> Network {
+        for edge in self.processes.iter_mut().flat_map(|one| &mut one.edges) {
+            let legs = edge.legs.iter_mut().map(|leg| &mut leg.labels);
+            for labels in legs.chain([&mut edge.labels]) {
+                labels.guards.iter_mut().for_each(Atom::compare_one_clock);
+            }
+        }
+        self
+    }
+
     /// The same with all clock values multiplied.
     pub(crate) fn scaled(&self, scale: i32) -> Network {
         let mut network = self.clone();
@@ -503,7 +559,7 @@ impl Network {
         let mut lines = vec![format!("state {};", states.join(", "))];
         let branches = process.edges.iter().enumerate();
         let points: Vec<String> = branches
-            .filter(|(_, edge)| edge.branch.is_some())
+            .filter(|(_, edge)| !edge.legs.is_empty())
             .map(|(index, _)| format!("B{index}"))
             .collect();
         if !points.is_empty() {
@@ -525,20 +581,15 @@ impl Network {
             let arrow = if edge.controllable { "->" } else { "-u->" };
             let source = format!("L{}", edge.source % count);
             let target = format!("L{}", edge.target % count);
-            let labels = self.labels(edge);
-            if let Some((branch, updates)) = &edge.branch {
-                edges.push(format!("{source} {arrow} B{index} {{ {labels} }}"));
-                edges.push(format!("B{index} -> {target} {{ }}"));
-                let updates = updates.iter().map(|update| self.update(update, false));
-                let updates: Vec<String> = updates.collect();
-                let label = if updates.is_empty() {
-                    String::new()
-                } else {
-                    format!("assign {}; ", updates.join(", "))
-                };
-                edges.push(format!("B{index} -> L{} {{ {label}}}", branch % count));
-            } else {
+            let labels = self.labels(edge, None);
+            if edge.legs.is_empty() {
                 edges.push(format!("{source} {arrow} {target} {{ {labels} }}"));
+                continue;
+            }
+            edges.push(format!("{source} {arrow} B{index} {{ {labels} }}"));
+            for leg in &edge.legs {
+                let (target, labels) = (leg.target % count, self.labels(edge, Some(leg)));
+                edges.push(format!("B{index} -> L{target} {{ {labels} }}"));
             }
         }
         if !edges.is_empty() {
@@ -548,60 +599,65 @@ impl Network {
             .expect("strings take everything");
     }
 
-    fn labels(&self, edge: &Edge) -> String {
+    /// The labels of an edge, or of one of its legs.
+    fn labels(&self, edge: &Edge, leg: Option<&Leg>) -> String {
+        let (own, sync) = match leg {
+            Some(leg) => (&leg.labels, leg.labels.sync),
+            None => (&edge.labels, edge.own_sync()),
+        };
         let mut labels = Vec::new();
-        if edge.select {
+        if own.select {
             labels.push(format!("select s : int[0,{}];", VALUES - 1));
         }
-        let (sync, is_urgent) = match edge.sync {
-            Sync::None => (None, false),
-            Sync::Channel { channel, send } => {
-                let (name, declaration) = CHANNELS[channel];
-                (
-                    Some((name.to_owned(), send)),
-                    declaration.starts_with("urgent"),
-                )
-            }
-            Sync::Indexed { variable, send } => {
-                let index = if edge.select {
-                    "s".to_owned()
-                } else {
-                    self.variable(variable)
-                };
-                (Some((format!("d[{index}]"), send)), false)
-            }
-        };
-        let guards: Vec<String> = edge
-            .guards
-            .iter()
-            .filter(|atom| {
-                let is_free = (!is_urgent || self.guards_urgency)
-                    && !(self.is_observable && edge.receives_broadcast());
-                is_free || matches!(atom, Atom::Variable { .. })
-            })
-            .map(|atom| {
-                if self.is_observable && edge.controllable {
-                    self.atom(&atom.with_first_moment())
-                } else {
-                    self.atom(atom)
-                }
-            })
-            .collect();
+        let guards = self.guards(edge, leg);
+        let guards: Vec<String> = guards.iter().map(|atom| self.atom(atom)).collect();
         if !guards.is_empty() {
             labels.push(format!("guard {};", guards.join(" && ")));
         }
-        if let Some((name, send)) = sync {
+        let (name, send) = match sync {
+            Sync::None => (String::new(), false),
+            Sync::Channel { channel, send } => (CHANNELS[channel].0.to_owned(), send),
+            Sync::Indexed { send, .. } if own.select => ("d[s]".to_owned(), send),
+            Sync::Indexed { variable, send } => (format!("d[{}]", self.variable(variable)), send),
+        };
+        if !name.is_empty() {
             labels.push(format!("sync {name}{};", if send { "!" } else { "?" }));
         }
-        let updates: Vec<String> = edge
+        let updates: Vec<String> = own
             .updates
             .iter()
-            .map(|update| self.update(update, edge.select))
+            .map(|update| self.update(update, own.select))
             .collect();
         if !updates.is_empty() {
             labels.push(format!("assign {};", updates.join(", ")));
         }
         labels.join(" ")
+    }
+
+    /// The guards of an edge, or of one of its legs, without those that it must not have.
+    fn guards(&self, edge: &Edge, leg: Option<&Leg>) -> Vec<Atom> {
+        let own = leg.map_or(&edge.labels, |leg| &leg.labels);
+        let mut syncs = vec![edge.own_sync()];
+        match leg {
+            Some(leg) => syncs.push(leg.labels.sync),
+            None => syncs.extend(edge.legs.iter().map(|leg| leg.labels.sync)),
+        }
+        let is_free = syncs.iter().all(|sync| {
+            (!sync.is_urgent() || self.guards_urgency)
+                && !(self.is_observable && sync.receives_broadcast())
+        });
+        let kept = own
+            .guards
+            .iter()
+            .filter(|atom| is_free || matches!(atom, Atom::Variable { .. }));
+        kept.map(|atom| {
+            if self.is_observable && edge.controllable {
+                atom.with_first_moment()
+            } else {
+                atom.clone()
+            }
+        })
+        .collect()
     }
 
     pub(crate) fn clock(&self, clock: usize) -> String {
@@ -795,15 +851,66 @@ impl Network {
 }
 
 impl Edge {
-    fn receives_broadcast(&self) -> bool {
-        match self.sync {
+    /// Its synchronisation if no leg has one.
+    fn own_sync(&self) -> Sync {
+        let mut legs = self.legs.iter();
+        if legs.any(|leg| leg.labels.sync != Sync::None) {
+            Sync::None
+        } else {
+            self.labels.sync
+        }
+    }
+}
+
+impl Sync {
+    fn is_urgent(self) -> bool {
+        matches!(self, Sync::Channel { channel, .. } if CHANNELS[channel].1.starts_with("urgent"))
+    }
+
+    fn receives_broadcast(self) -> bool {
+        match self {
             Sync::Channel { channel, send } => !send && CHANNELS[channel].1.contains("broadcast"),
             _ => false,
         }
     }
 }
 
+impl Formula {
+    /// The same with comparisons of one clock in the place of those of differences.
+    pub(crate) fn without_differences(mut self) -> Formula {
+        self.compare_one_clock();
+        self
+    }
+
+    fn compare_one_clock(&mut self) {
+        match self {
+            Formula::Atom(atom) => atom.compare_one_clock(),
+            Formula::Not(inner) => inner.compare_one_clock(),
+            Formula::And(parts) | Formula::Or(parts) => {
+                parts.iter_mut().for_each(Formula::compare_one_clock);
+            }
+            Formula::Location { .. } | Formula::Deadlock => {}
+        }
+    }
+}
+
 impl Atom {
+    fn compare_one_clock(&mut self) {
+        if let Atom::Difference {
+            left,
+            relation,
+            bound,
+            ..
+        } = *self
+        {
+            *self = Atom::Clock {
+                clock: left,
+                relation,
+                bound,
+            };
+        }
+    }
+
     /// The same with a weak lower bound of a clock in the place of a strict one.
     fn with_first_moment(&self) -> Atom {
         let mut atom = self.clone();

@@ -18,6 +18,7 @@ mod explicit;
 mod freedom;
 mod games;
 mod generate;
+mod legs;
 mod mutations;
 mod observed;
 #[path = "../common/random.rs"]

@@ -36,6 +36,7 @@ const SHAPE: Shape = Shape {
     deadlock: false,
     priorities: false,
     guarded_urgency: false,
+    legs: false,
 };
 
 /// Knowledge sets that brute force explores before it gives a case up.

@@ -71,7 +71,7 @@ impl Closed<'_> {
         let mut legs = self.known(node).into_iter().flat_map(|one| &one.legs);
         let leg = legs.find(|leg| {
             let parts = leg.action.as_deref().unwrap_or_default();
-            entry(parts) == step.entry() && self.applies(node, leg)
+            entry(&self.graph.network, parts) == step.entry && self.applies(node, leg)
         });
         leg.and_then(|leg| leg.action.as_deref())
     }
@@ -93,8 +93,10 @@ impl Closed<'_> {
                 .steps
                 .iter()
                 .filter(|one| self.owner.owns(one.controllable));
-            let meant = own
-                .filter(|one| one.parts == *action || controller && one.entry() == entry(action));
+            let meant = own.filter(|one| {
+                one.parts == *action
+                    || controller && one.entry == entry(&self.graph.network, action)
+            });
             let before = targets.len();
             targets.extend(meant.map(|one| one.target));
             if targets.len() == before {

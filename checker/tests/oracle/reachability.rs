@@ -18,6 +18,7 @@ const SHAPE: Shape = Shape {
     deadlock: true,
     priorities: false,
     guarded_urgency: false,
+    legs: false,
 };
 
 fn compare(

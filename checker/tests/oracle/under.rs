@@ -22,8 +22,9 @@ use crate::random::Random;
 /// Leaves only what the strategy allows.
 fn restrict(graph: &mut Graph, strategy: &Strategy) {
     let ticks = graph.ticks;
+    let network = &graph.network;
     for node in &mut graph.nodes {
-        let said = Said::new(strategy, &node.state, ticks);
+        let said = Said::new(network, strategy, &node.state, ticks);
         node.steps.retain(|step| {
             let parts: Vec<Part> = step.parts.iter().map(|&part| part.into()).collect();
             !step.controllable || said.allows(&parts)

@@ -363,6 +363,37 @@ fn receivers_and_values_of_select_are_those_of_the_strategy() {
 }
 
 #[test]
+fn an_edge_is_that_of_the_strategy_and_the_leg_is_drawn() {
+    // The strategy takes the edge that leads to `b`, whoever the leg meets, and not the one to `c`.
+    let text = "
+        chan meet; broadcast chan tell; clock x;
+        process P() {
+            state start { x <= 2 }, met, told, left, lost;
+            branchpoint b, c;
+            init start;
+            trans start -> b { select i : int[0, 1]; guard x >= 1 && i == 1; },
+                  b -> met { sync meet!; probability 2; },
+                  b -> told { sync tell!; probability 5; },
+                  b -> left { select i : int[0, 2]; guard i < 1; probability 1; },
+                  start -> c { guard x >= 1; },
+                  c -> left { sync tell!; }, c -> lost { guard x >= 0; };
+        }
+        process Q() {
+            state on, off;
+            init on;
+            trans on -> off { sync meet?; }, on -> off { sync tell?; };
+        }
+        system P, Q;";
+    let mut model = with_strategy(text, "control: A<> (P.met || P.told || P.left) && x <= 2");
+    for choice in [UnderChoice::Race, UnderChoice::Eager, UnderChoice::Lazy] {
+        expect(&mut model, choice, "Pr[<=3](<> P.met && Q.off)", 0.25);
+        expect(&mut model, choice, "Pr[<=3](<> P.told && Q.off)", 0.625);
+        expect(&mut model, choice, "Pr[<=3](<> P.left && Q.on)", 0.125);
+        expect(&mut model, choice, "Pr[<=3](<> P.lost)", 0.0);
+    }
+}
+
+#[test]
 fn other_objectives_and_limits_of_time_are_followed() {
     let text = "
         clock x;

@@ -131,7 +131,7 @@ fn weights_choose_branches() {
 
 #[test]
 fn legs_that_send_are_chosen_by_weight() {
-    // Who listens moves with the sender. In the urgent location nobody else can come in between.
+    // Who listens moves with the sender.
     let model = "
         broadcast chan high, low; int heard = 0; clock x;
         process Coin() {
@@ -151,6 +151,40 @@ fn legs_that_send_are_chosen_by_weight() {
     expect(model, "Pr[<=1](<> Coin.done && heard == 55 && Ear.b)", 0.75);
     expect(model, "Pr[<=1](<> Coin.done && heard == 12 && Ear.a)", 0.25);
     expect(model, "Pr[<=1](<> Ear.b && Coin.wait)", 0.0);
+}
+
+#[test]
+fn of_the_legs_that_are_possible_one_is_chosen_by_weight() {
+    // Until 1 the second leg is closed; nobody receives on `alone`; a leg without a weight has 1,
+    // and one of weight 0 is never drawn. The other edge counts once, however many legs this one
+    // has.
+    let model = "
+        chan alone, meet;
+        int n = 0;
+        clock x;
+        process P() {
+            state a { x <= 1 }, b, c, d, e, f;
+            branchpoint t;
+            init a;
+            trans a -> t { guard x >= 1; },
+                  t -> b { guard n == 0; probability 2; },
+                  t -> c { guard n == 1; probability 100; },
+                  t -> c { sync alone!; probability 100; },
+                  t -> d { sync meet!; },
+                  t -> e { probability 0; },
+                  a -> f { guard x >= 1; };
+        }
+        process Q() {
+            state a, b;
+            branchpoint t;
+            init a;
+            trans a -> t { }, t -> b { sync meet?; };
+        }
+        system P, Q;";
+    expect(model, "Pr[<=2](<> P.b)", 1.0 / 3.0);
+    expect(model, "Pr[<=2](<> P.d && Q.b)", 1.0 / 6.0);
+    expect(model, "Pr[<=2](<> P.f)", 0.5);
+    expect(model, "Pr[<=2](<> P.c || P.e)", 0.0);
 }
 
 #[test]

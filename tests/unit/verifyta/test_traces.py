@@ -40,6 +40,8 @@ MODELS = [
     "committed_interleaving",
     "extrema_of_clocks",
     "fischer_too_eager",
+    "leg_meets_a_committed_receiver",
+    "legs_with_all_labels",
     "liveness_with_a_loop",
     "meta_is_not_identity",
     "scalars",

@@ -63,7 +63,7 @@ pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> 
         for rule in &mut rules {
             simplify(&mut rule.zones);
         }
-        let picked = closed_loop::picked(&joined.legs, dimension).into_iter();
+        let picked = closed_loop::picked(network, &joined.legs).into_iter();
         let legs = picked.filter(|_| !is_goal).map(|(parts, mut zones)| {
             simplify(&mut zones);
             Rule {

@@ -13,7 +13,7 @@ use serde_json::{Value as Json, json};
 
 use crate::game::partial_observation::{Action, Knowledge, Machine};
 use crate::ir::Network;
-use crate::network::Part;
+use crate::network::{Part, entry_of};
 use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
@@ -157,6 +157,7 @@ fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch
         return Ok(check::Action::Channel(channel as u32));
     }
     let part = NetworkReader::new(network).part(&at.field("edge")?)?;
+    let part = entry_of(network, &[part])[0];
     Ok(check::Action::Edge {
         process: part.process,
         edge: part.edge,
@@ -247,7 +248,7 @@ pub fn action_text(network: &Network, action: Action) -> String {
             select,
         } => {
             let part = part(process, edge, select);
-            format!("propose {}", text::part_text(network, part))
+            format!("propose {}", text::entry_text(network, part))
         }
     }
 }

@@ -213,12 +213,17 @@ fn trimmed_lines(text: &str) -> String {
 
 fn processes(network: &Network) -> Vec<Json> {
     let processes = network.processes.iter().map(|process| {
+        let edges = process.edges.iter().enumerate();
+        let entries = edges.filter(|(number, edge)| {
+            let leg = edge.leg.as_ref();
+            leg.is_none_or(|leg| leg.first.0 as usize == *number)
+        });
         json!({
             "name": process.name,
             "template": process.template,
             "priority": process.priority,
             "locations": process.locations.len(),
-            "edges": process.edges.len(),
+            "edges": entries.count(),
         })
     });
     processes.collect()
@@ -331,6 +336,7 @@ fn features(model: &LoadedModel) -> Vec<&'static str> {
         doubles,
         hybrid_clocks,
         uncontrollable,
+        legs: _,
     } = &network.features;
     let has_urgency = |wanted| locations().any(|location| location.urgency == wanted);
     let has_rates = used().any(|template| {

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use crate::cancellation;
 use crate::engine::evidence::witness::{Missing, Proof, Witness};
 use crate::engine::loaded_model::LoadedModel;
-use crate::ir::{Branch, Edge, EdgeLabels, Network, RunTimeErrorKind, Shape};
+use crate::ir::{Branch, Edge, EdgeId, EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::discrete::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
 use crate::search::Trace;
@@ -188,19 +188,36 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
 /// An edge as `P.a->P.b { guard, sync, update }`, with the select values.
 pub fn part_text(network: &Network, part: Part) -> String {
     let edge = edge_of(network, part);
-    edge_text(network, part, &edge.branches[part.branch as usize..][..1])
+    let branch = &edge.branches[part.branch as usize];
+    edge_text(network, part, &edge.labels, edge.select.len(), [branch])
 }
 
-/// An edge with all the legs of its branch point, as `P.a->(P.b|P.c) { guard, sync, update }`.
+/// An edge with all the legs of its branch point, as `P.a->(P.b|P.c) { guard, sync, update }`. The
+/// labels are those of the edge to the branch point.
 pub fn entry_text(network: &Network, part: Part) -> String {
-    edge_text(network, part, &edge_of(network, part).branches)
+    let process = &network.processes[part.process as usize];
+    let edge = edge_of(network, part);
+    let (labels, bindings) = match &edge.leg {
+        Some(leg) => (&leg.entry, leg.bindings),
+        None => (&edge.labels, edge.select.len()),
+    };
+    let edges = process.edges_of_entry(EdgeId(part.edge));
+    let branches = edges.flat_map(|edge| &edge.branches);
+    edge_text(network, part, labels, bindings, branches)
 }
 
 fn edge_of(network: &Network, part: Part) -> &Edge {
     &network.processes[part.process as usize].edges[part.edge as usize]
 }
 
-fn edge_text(network: &Network, part: Part, branches: &[Branch]) -> String {
+/// An edge with these labels, the values of its first `bindings`, and these ends.
+fn edge_text<'n>(
+    network: &'n Network,
+    part: Part,
+    labels: &EdgeLabels,
+    bindings: usize,
+    branches: impl IntoIterator<Item = &'n Branch>,
+) -> String {
     let process = &network.processes[part.process as usize];
     let edge = edge_of(network, part);
     let name = |location: u32| {
@@ -225,7 +242,7 @@ fn edge_text(network: &Network, part: Part, branches: &[Branch]) -> String {
         sync,
         update,
         ..
-    } = &edge.labels;
+    } = labels;
     let or = |text: &str, default: &str| {
         if text.is_empty() {
             default.to_owned()
@@ -241,7 +258,7 @@ fn edge_text(network: &Network, part: Part, branches: &[Branch]) -> String {
         or(sync, "tau"),
         or(update, "1")
     );
-    for (name, value) in selects(network, part) {
+    for (name, value) in selects(network, part).into_iter().take(bindings) {
         // Writing to a string cannot fail.
         let _ = write!(text, " [{name}={value}]");
     }

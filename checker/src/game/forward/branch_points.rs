@@ -1,17 +1,17 @@
 //! Branch points after edges of the controller: it chooses the edge, and the environment picks the
 //! leg.
 //!
-//! The *entry* of a move is its edges with their `select` values, without the legs. By an entry,
-//! the controller gets into given valuations where at least one leg is possible and all possible
-//! legs lead into them. A strategy of the controller names entries; a strategy of the environment
-//! says which leg it picks.
+//! By an *entry* ([`entry_of`]), the controller gets into given valuations where at least one leg
+//! is possible and all possible legs lead into them. A strategy of the controller names entries; a
+//! strategy of the environment says which leg it picks.
 //!
-//! Moves with the same entry are successive in the order of moves.
+//! Moves with the same entry are successive in the order of moves, unless legs are edges of the
+//! network.
 
 use rustc_hash::FxHashMap;
 
 use crate::ir::Network;
-use crate::network::{Moves, Part, is_same_entry};
+use crate::network::{Moves, entry_of, is_same_entry};
 use crate::zones::federation::{block_bytes, table_bytes};
 
 use super::node::Edge;
@@ -21,6 +21,8 @@ use super::node::Edge;
 pub(in crate::game) struct BranchPoints {
     /// Whether the network has any.
     is_possible: bool,
+    /// Whether legs are edges of the network.
+    are_edges: bool,
     /// For each node: its entries with several legs, and the edges of each.
     entries: FxHashMap<u32, Vec<Vec<u32>>>,
     bytes: usize,
@@ -31,7 +33,9 @@ impl BranchPoints {
     pub(super) fn new(network: &Network) -> BranchPoints {
         let mut edges = network.processes.iter().flat_map(|process| &process.edges);
         BranchPoints {
-            is_possible: edges.any(|edge| edge.controllable && edge.branches.len() > 1),
+            is_possible: edges
+                .any(|edge| edge.controllable && (edge.branches.len() > 1 || edge.leg.is_some())),
+            are_edges: network.features.legs,
             ..BranchPoints::default()
         }
     }
@@ -47,29 +51,28 @@ impl BranchPoints {
     }
 
     /// Marks the legs among the edges of a node that was just expanded. Its edges start at `first`.
-    pub(super) fn find(&mut self, node: u32, (edges, first): (&mut [Edge], usize), moves: &Moves) {
+    pub(super) fn find(
+        &mut self,
+        network: &Network,
+        node: u32,
+        (edges, first): (&mut [Edge], usize),
+        moves: &Moves,
+    ) {
         if !self.is_possible {
             return;
         }
-        let parts = |edge: &Edge| moves.get(edge.ordinal as usize).parts;
-        let mut entries = Vec::new();
-        let mut start = first;
-        for end in first + 1..=edges.len() {
-            let goes_on = edges.get(end).is_some_and(|edge| {
-                edge.controllable && is_same_entry(parts(edge), parts(&edges[start]))
-            });
-            if goes_on {
-                continue;
-            }
-            let ordinals = [&edges[start], &edges[end - 1]].map(|edge| edge.ordinal);
-            // Several edges of the same move are pieces of it.
-            if ordinals[0] != ordinals[1] {
-                for edge in &mut edges[start..end] {
-                    edge.is_leg = true;
-                }
-                entries.push((start as u32..end as u32).collect::<Vec<_>>());
-            }
-            start = end;
+        let mut entries = if self.are_edges {
+            apart(network, (edges, first), moves)
+        } else {
+            successive(network, (edges, first), moves)
+        };
+        // Several edges of the same move are pieces of it.
+        entries.retain(|legs| {
+            let ordinal = |leg: &u32| edges[*leg as usize].ordinal;
+            legs.iter().any(|leg| ordinal(leg) != ordinal(&legs[0]))
+        });
+        for &leg in entries.iter().flatten() {
+            edges[leg as usize].is_leg = true;
         }
         if entries.is_empty() {
             self.entries.remove(&node);
@@ -89,9 +92,34 @@ impl BranchPoints {
     }
 }
 
-/// The edges of a move with their first legs: this is the name of the move in a strategy of the
-/// controller.
-pub(in crate::game) fn entry_of(parts: &[Part]) -> Vec<Part> {
-    let parts = parts.iter().map(|&part| Part { branch: 0, ..part });
-    parts.collect()
+/// The controllable edges of a node by their entries, where those of an entry are successive.
+fn successive(network: &Network, (edges, first): (&[Edge], usize), moves: &Moves) -> Vec<Vec<u32>> {
+    let parts = |edge: &Edge| moves.get(edge.ordinal as usize).parts;
+    let is_same = |one: &Edge, other: &Edge| {
+        other.controllable && is_same_entry(network, parts(one), parts(other))
+    };
+    let mut start = first as u32;
+    let entries = edges[first..].chunk_by(is_same).map(|legs| {
+        let end = start + legs.len() as u32;
+        (std::mem::replace(&mut start, end)..end).collect()
+    });
+    entries.collect()
+}
+
+/// The controllable edges of a node by their entries.
+fn apart(network: &Network, (edges, first): (&[Edge], usize), moves: &Moves) -> Vec<Vec<u32>> {
+    let mut places = FxHashMap::default();
+    let mut entries: Vec<Vec<u32>> = Vec::new();
+    for (number, edge) in edges.iter().enumerate().skip(first) {
+        if !edge.controllable {
+            continue;
+        }
+        let entry = entry_of(network, moves.get(edge.ordinal as usize).parts);
+        let place = *places.entry(entry).or_insert(entries.len());
+        if place == entries.len() {
+            entries.push(Vec::new());
+        }
+        entries[place].push(number as u32);
+    }
+    entries
 }

@@ -53,8 +53,9 @@ impl Graph<'_, '_> {
             self.target = target;
             result?;
         }
-        self.branch_points
-            .find(node, (&mut self.edges, first as usize), moves);
+        let network = self.symbolic.stepper.network();
+        let edges = (&mut self.edges[..], first as usize);
+        self.branch_points.find(network, node, edges, moves);
         let node = &mut self.nodes[node as usize];
         node.edges = (first, self.edges.len() as u32);
         node.delays = delays;

@@ -1,7 +1,7 @@
 //! The question that a game under partial observation answers, and the form of its strategies.
 
-use crate::ir::{ChannelId, Predicate};
-use crate::network::MoveRef;
+use crate::ir::{ChannelId, Network, Predicate};
+use crate::network::{MoveRef, entry_of};
 
 use super::knowledge::{Knowledge, Observation};
 use crate::game::Forced;
@@ -13,7 +13,8 @@ pub enum Action {
     Wait,
     /// A synchronisation on this channel between controllable edges.
     Channel(ChannelId),
-    /// A controllable edge without a channel.
+    /// A controllable edge without a channel, or one to a branch point whose legs have channels;
+    /// all legs have the name of the first.
     Edge {
         /// Index of the process.
         process: u32,
@@ -26,17 +27,23 @@ pub enum Action {
 
 impl Action {
     /// The action that allows a move; `None` if the move is the environment's.
-    pub(super) fn of(one: MoveRef<'_>) -> Option<Action> {
+    pub(super) fn of(network: &Network, one: MoveRef<'_>) -> Option<Action> {
         if !one.controllable {
             return None;
         }
+        let first = &one.parts[0];
+        let edge = &network.processes[first.process as usize].edges[first.edge as usize];
+        let has_channels = edge.leg.as_ref().is_some_and(|leg| !leg.follows_sync);
         Some(match one.channel {
-            Some(channel) => Action::Channel(channel),
-            None => Action::Edge {
-                process: one.parts[0].process,
-                edge: one.parts[0].edge,
-                select: one.parts[0].select,
-            },
+            Some(channel) if !has_channels => Action::Channel(channel),
+            _ => {
+                let entry = entry_of(network, one.parts)[0];
+                Action::Edge {
+                    process: entry.process,
+                    edge: entry.edge,
+                    select: entry.select,
+                }
+            }
         })
     }
 }

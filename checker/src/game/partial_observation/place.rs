@@ -127,7 +127,10 @@ impl Place {
             goal,
             broken,
             stops,
-            actions: moves.iter().map(Action::of).collect(),
+            actions: moves
+                .iter()
+                .map(|one| Action::of(symbolic.stepper.network(), one))
+                .collect(),
             taken: moves.iter().map(|_| OnceCell::new()).collect(),
             moves,
             zone,

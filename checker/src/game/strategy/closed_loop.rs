@@ -30,7 +30,6 @@ impl ClosedLoop {
     /// The restriction of its network for a strategy. The network must have the clock that measures
     /// time if the strategy uses it.
     pub fn new(network: &Network, strategy: &Strategy) -> ClosedLoop {
-        let dimension = network.clocks.len().max(1);
         let mut store = StateStore::new(network);
         let mut atoms = Vec::new();
         let mut states = Vec::new();
@@ -41,7 +40,7 @@ impl ClosedLoop {
             }
             states.push(
                 (!one.is_goal)
-                    .then(|| allowed(&one, (strategy.owner, strategy.selection), dimension)),
+                    .then(|| allowed(network, &one, (strategy.owner, strategy.selection))),
             );
         }
         atoms.sort_by_key(|one| (one.left.first, one.right.first, one.low, one.strict));
@@ -115,12 +114,15 @@ pub fn joined<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Joined<'s>> 
 }
 
 /// For each leg, the part in which it is picked: among those with the same entry, the first counts.
-pub fn picked<'d>(legs: &[&'d Decision], dimension: usize) -> Vec<(&'d [Part], Federation)> {
+pub fn picked<'d>(network: &Network, legs: &[&'d Decision]) -> Vec<(&'d [Part], Federation)> {
+    let dimension = network.clocks.len().max(1);
     let mut picked: Vec<(&[Part], Federation)> = Vec::new();
     for leg in legs {
         let parts = leg.action.as_deref().unwrap_or_default();
         let mut part = leg.zones.clone();
-        let before = picked.iter().filter(|one| is_same_entry(one.0, parts));
+        let before = picked
+            .iter()
+            .filter(|one| is_same_entry(network, one.0, parts));
         let before = before.fold(Federation::empty(dimension), |mut all, one| {
             all.unite(&one.1);
             all
@@ -156,10 +158,11 @@ pub fn counting<'d>(
 }
 
 fn allowed(
+    network: &Network,
     joined: &Joined<'_>,
     (owner, selection): (Player, Selection),
-    dimension: usize,
 ) -> Allowed {
+    let dimension = network.clocks.len().max(1);
     let counting = counting(&joined.decisions, selection, dimension);
     let mut decided = Federation::empty(dimension);
     let mut waiting = Federation::empty(dimension);
@@ -177,7 +180,7 @@ fn allowed(
         };
         // A move of the controller is known by its entry, which may have two names.
         let is_it = |one: &[Part]| match owner {
-            Player::Controller => is_same_entry(one, parts),
+            Player::Controller => is_same_entry(network, one, parts),
             Player::Environment => one == parts,
         };
         match moves.iter_mut().find(|one| is_it(&one.0)) {
@@ -198,7 +201,7 @@ fn allowed(
         forbidden.reduce();
         (parts, forbidden)
     });
-    let legs = picked(&joined.legs, dimension).into_iter();
+    let legs = picked(network, &joined.legs).into_iter();
     let legs = legs.map(|(parts, here)| (parts.to_vec(), here));
     Allowed {
         barriers,

@@ -1,13 +1,12 @@
 //! How a strategy is read from a solved game: node by node, wherever play under it leads.
 
 use crate::cancellation;
-use crate::network::{Failure, Moves, Part};
+use crate::network::{Failure, Moves, Part, entry_of};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
 use super::{Decision, Selection, Strategy, StrategyState};
 use crate::game::Player;
-use crate::game::forward::branch_points::entry_of;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
@@ -112,7 +111,10 @@ pub(super) fn extract(
         steps_to_end.push(0);
         for edge in taken {
             let edge = solver.graph.edges[edge as usize];
-            let inside = chooser.inside(solver, &edge, &words)?;
+            let mut inside = chooser.inside(solver, &edge, &words)?;
+            if chooser.owner() == Player::Controller {
+                name_entries(solver, &mut inside);
+            }
             steps_to_end.extend((1..=inside.len() as u32).rev());
             strategy.states.extend(inside);
             if !std::mem::replace(&mut seen[edge.target as usize], true) {
@@ -134,9 +136,21 @@ pub(super) fn extract(
 pub(super) fn named(solver: &Solver<'_, '_, '_>, moves: &Moves, edge: &Edge) -> Vec<Part> {
     let parts = moves.get(edge.ordinal as usize).parts;
     if solver.graph.branch_points.is_possible() && edge.controllable {
-        entry_of(parts)
+        entry_of(solver.graph.symbolic.stepper.network(), parts)
     } else {
         parts.to_vec()
+    }
+}
+
+/// Names the moves of the controller in states inside chains by their entries.
+fn name_entries(solver: &Solver<'_, '_, '_>, inside: &mut [StrategyState]) {
+    if !solver.graph.branch_points.is_possible() {
+        return;
+    }
+    let network = solver.graph.symbolic.stepper.network();
+    let decisions = inside.iter_mut().flat_map(|state| &mut state.decisions);
+    for action in decisions.filter_map(|one| one.action.as_mut()) {
+        *action = entry_of(network, action);
     }
 }
 

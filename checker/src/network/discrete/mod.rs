@@ -7,6 +7,7 @@ pub(super) mod broadcast_receivers;
 pub(super) mod candidate;
 pub(super) mod edge_tables;
 pub(super) mod enabled_edges;
+pub(super) mod entry;
 pub(super) mod pairing;
 pub(super) mod partners;
 pub(super) mod select_cache;

@@ -26,12 +26,6 @@ pub struct Part {
     pub select: u32,
 }
 
-/// Whether two moves take the same edges with the same `select` values, with any branches.
-pub fn is_same_entry(one: &[Part], other: &[Part]) -> bool {
-    let key = |part: &Part| (part.process, part.edge, part.select);
-    one.len() == other.len() && one.iter().map(key).eq(other.iter().map(key))
-}
-
 /// Ranges into the buffers of [`Moves`].
 #[derive(Clone, Copy, Debug)]
 struct Header {

@@ -180,7 +180,7 @@ impl Symbolic<'_> {
         }
         self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
-            restriction::apply(restriction, words, out);
+            restriction::apply(self.stepper.network(), restriction, words, out);
         }
         Ok(())
     }
@@ -190,7 +190,7 @@ impl Symbolic<'_> {
         self.stepper.moves(words, out)?;
         self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
-            restriction::apply(restriction, words, out);
+            restriction::apply(self.stepper.network(), restriction, words, out);
         }
         Ok(())
     }

@@ -14,7 +14,7 @@
 //! whether priorities count.
 
 use crate::exec::EmittedConstraint;
-use crate::ir::ClockAtom;
+use crate::ir::{ClockAtom, Network};
 use crate::zones::Federation;
 use crate::zones::future::Barriers;
 
@@ -48,26 +48,35 @@ pub trait Restriction: Sync {
 
 impl Allowed {
     /// Where a move of the player is forbidden; a move of the controller is known by its entry.
-    fn forbidden(&self, one: &MoveRef<'_>) -> &Federation {
+    fn forbidden(&self, network: &Network, one: &MoveRef<'_>) -> &Federation {
         let is_it = |parts: &[Part]| {
-            parts == one.parts || one.controllable && is_same_entry(parts, one.parts)
+            parts == one.parts || one.controllable && is_same_entry(network, parts, one.parts)
         };
         let listed = self.forbidden.iter().find(|listed| is_it(&listed.0));
         listed.map_or(&self.others, |listed| &listed.1)
     }
 
     /// Where another leg is picked, and not the leg of this move of the other player.
-    fn picked_otherwise(&self, one: &MoveRef<'_>) -> impl Iterator<Item = &Federation> {
+    fn picked_otherwise(
+        &self,
+        network: &Network,
+        one: &MoveRef<'_>,
+    ) -> impl Iterator<Item = &Federation> {
         let others = self
             .legs
             .iter()
-            .filter(|leg| leg.0 != one.parts && is_same_entry(&leg.0, one.parts));
+            .filter(|leg| leg.0 != one.parts && is_same_entry(network, &leg.0, one.parts));
         others.map(|leg| &leg.1)
     }
 }
 
 /// Restricts the moves of a state to what is allowed.
-pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Moves) {
+pub(super) fn apply(
+    network: &Network,
+    restriction: &dyn Restriction,
+    words: &[i32],
+    moves: &mut Moves,
+) {
     let Some(allowed) = restriction.allowed(words) else {
         return;
     };
@@ -78,9 +87,9 @@ pub(super) fn apply(restriction: &dyn Restriction, words: &[i32], moves: &mut Mo
     let mut rest = Moves::default();
     for one in moves.iter() {
         let forbidden: Vec<Vec<EmittedConstraint>> = if is_own(&one) {
-            conjunctions(allowed.forbidden(&one))
+            conjunctions(allowed.forbidden(network, &one))
         } else {
-            let others = allowed.picked_otherwise(&one);
+            let others = allowed.picked_otherwise(network, &one);
             others.flat_map(conjunctions).collect()
         };
         // An empty conjunction always holds.

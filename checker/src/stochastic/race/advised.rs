@@ -15,7 +15,7 @@
 //! does.
 
 use super::{Next, Race, TOLERANCE};
-use crate::ir::Urgency;
+use crate::ir::{Network, Urgency};
 use crate::stochastic::advice::{Advice, Ready, View};
 use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
@@ -203,7 +203,8 @@ impl<'a> Race<'a> {
         ahead: f64,
         view: View,
     ) -> Result<Mask, Failure> {
-        let own = entry(sender);
+        let network = self.network();
+        let (own, is_alone) = (entry(network, sender), is_alone(sender));
         let Some(channel) = self.channel(sender)? else {
             return Ok(self.allowed(&[own], ahead, view));
         };
@@ -223,18 +224,22 @@ impl<'a> Race<'a> {
                 let mut mask = self.mask_of(program, receiver.guard, &receiver.values, ahead)?;
                 if is_broadcast {
                     audience.push(Ready {
-                        entry: entry(receiver),
+                        entry: entry(network, receiver),
                         controllable: receiver.edge.controllable,
                         mask,
                     });
                 } else if receiver.edge.controllable {
-                    mask = mask.and(self.allowed(&[own, entry(receiver)], ahead, view));
+                    let movers = [own, entry(network, receiver)];
+                    let named = if is_alone { &movers[..1] } else { &movers };
+                    mask = mask.and(self.allowed(named, ahead, view));
                 }
                 ready = ready.or(mask);
             }
         }
         Ok(match &self.advice {
-            Some(advice) if is_broadcast => advice.allows_broadcast(own, &audience, ahead, view),
+            Some(advice) if is_broadcast => {
+                advice.allows_broadcast((own, is_alone), &audience, ahead, view)
+            }
             _ => ready,
         })
     }
@@ -256,20 +261,41 @@ impl<'a> Race<'a> {
         if movers.clone().any(|one| !one.edge.controllable) {
             return true;
         }
-        let movers: Vec<Entry> = movers.by_ref().map(entry).collect();
+        let named = match program.instance(self.movers[0].0) {
+            sender if is_alone(sender) => 1,
+            _ => self.movers.len(),
+        };
+        let network = self.network();
+        let movers = movers.by_ref().take(named);
+        let movers: Vec<Entry> = movers.map(|one| entry(network, one)).collect();
         advice.allows_now(&movers)
     }
 }
 
-/// The edge of an instance with the number of its values.
-fn entry(instance: &Instance<'_>) -> Entry {
-    let select = instance.edge.select.iter().zip(&instance.values);
+/// The edge of an instance with the number of its values; of a leg that is an edge, the first leg
+/// of its entry, as [`crate::network::entry_of`] names it.
+fn entry(network: &Network, instance: &Instance<'_>) -> Entry {
+    let edge = instance.edge;
+    let bindings = edge
+        .leg
+        .as_ref()
+        .map_or(edge.select.len(), |leg| leg.bindings);
+    let select = edge.select[..bindings].iter().zip(&instance.values);
     let select = select.fold(0, |number, (range, value)| {
         number * (range.high - range.low + 1) as u32 + (value - range.low) as u32
     });
+    let edges = &network.processes[instance.process as usize].edges;
+    let first = edge.leg.as_ref().map_or(instance.id, |leg| leg.first);
+    let leg = edges[first.0 as usize].leg.as_ref();
     Entry {
         process: instance.process,
-        edge: instance.id.0,
-        select,
+        edge: first.0,
+        select: select * leg.map_or(1, |leg| leg.combinations),
     }
+}
+
+/// Whether the entry of a sender names the move, whoever receives.
+fn is_alone(sender: &Instance<'_>) -> bool {
+    let leg = sender.edge.leg.as_ref();
+    leg.is_some_and(|leg| !leg.follows_sync)
 }

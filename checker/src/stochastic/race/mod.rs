@@ -388,6 +388,7 @@ impl<'a> Race<'a> {
             return self.count_move(process, false);
         }
         let chosen = match self.choices[..] {
+            ref several if program.has_legs => self.by_entry(program, several.to_vec())?,
             [only] => only,
             ref many => many[self.machine.stream().below(many.len() as u32) as usize],
         };

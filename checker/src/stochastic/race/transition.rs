@@ -40,23 +40,61 @@ impl<'a> Race<'a> {
             }
             self.add_ready(program, process, channel)?;
             if is_broadcast {
-                self.keep_one(first);
+                self.keep_one(program, first)?;
                 first = self.movers.len();
             }
         }
         if !is_broadcast {
-            self.keep_one(first);
+            self.keep_one(program, first)?;
         }
         Ok(())
     }
 
     /// Keeps one of the movers from this place on.
-    pub(super) fn keep_one(&mut self, first: usize) {
+    pub(super) fn keep_one(&mut self, program: &Program<'a>, first: usize) -> Result<(), Failure> {
         let many = self.movers.len() - first;
-        if many > 1 {
+        if program.has_legs && many > 0 {
+            let inputs = self.movers.drain(first..).map(|mover| mover.0).collect();
+            let chosen = self.by_entry(program, inputs)?;
+            self.movers.push((chosen, 0));
+        } else if many > 1 {
             let chosen = self.machine.stream().below(many as u32) as usize;
             self.movers.swap(first, first + chosen);
             self.movers.truncate(first + 1);
+        }
+        Ok(())
+    }
+
+    /// One of some enabled instances, of which there are any: each entry is as likely as the
+    /// others, and of the legs that an entry has among them one is taken by weight.
+    pub(super) fn by_entry(
+        &mut self,
+        program: &Program<'a>,
+        mut instances: Vec<u32>,
+    ) -> Result<u32, Failure> {
+        let entry = |number: &u32| program.instance(*number).entry;
+        let mut entries: Vec<u32> = instances.iter().map(entry).collect();
+        entries.sort_unstable();
+        entries.dedup();
+        let chosen = match entries[..] {
+            [only] => only,
+            ref many => many[self.machine.stream().below(many.len() as u32) as usize],
+        };
+        instances.retain(|number| entry(number) == chosen);
+        let first = program.instance(instances[0]);
+        if first.edge.leg.is_none() {
+            return Ok(instances[0]);
+        }
+        let mut weights = Vec::with_capacity(instances.len());
+        for &number in &instances {
+            weights.push(self.weight(program, program.instance(number), 0)?);
+        }
+        match self.weighted(&weights) {
+            Some(place) => Ok(instances[place]),
+            None => Err(Failure::NoWeight(
+                self.stand(first.process as usize),
+                first.id,
+            )),
         }
     }
 
@@ -151,33 +189,54 @@ impl<'a> Race<'a> {
         program: &Program<'a>,
         mover: &Instance<'a>,
     ) -> Result<u32, Failure> {
-        let branches = &mover.edge.branches;
-        let stand = self.stand(mover.process as usize);
-        let mut weights = Vec::with_capacity(branches.len());
-        for branch in 0..branches.len() {
-            let weight = match program.weight(mover, branch) {
-                Number::Known(weight) => weight,
-                Number::Computed(weight) => self.machine.real(weight, &mover.values)?,
-            };
-            if !(weight >= 0.0 && weight.is_finite()) {
-                return Err(Failure::Weight(stand, mover.id));
-            }
-            weights.push(weight);
+        let mut weights = Vec::with_capacity(mover.edge.branches.len());
+        for branch in 0..mover.edge.branches.len() {
+            weights.push(self.weight(program, mover, branch)?);
         }
+        let chosen = self.weighted(&weights).map(|branch| branch as u32);
+        chosen.ok_or(Failure::NoWeight(
+            self.stand(mover.process as usize),
+            mover.id,
+        ))
+    }
+
+    /// The weight of a branch.
+    fn weight(
+        &mut self,
+        program: &Program<'a>,
+        mover: &Instance<'a>,
+        branch: usize,
+    ) -> Result<f64, Failure> {
+        let weight = match program.weight(mover, branch) {
+            Number::Known(weight) => weight,
+            Number::Computed(weight) => self.machine.real(weight, &mover.values)?,
+        };
+        if weight >= 0.0 && weight.is_finite() {
+            Ok(weight)
+        } else {
+            Err(Failure::Weight(
+                self.stand(mover.process as usize),
+                mover.id,
+            ))
+        }
+    }
+
+    /// The place of one of some weights, as likely as it says; `None` if all are 0.
+    fn weighted(&mut self, weights: &[f64]) -> Option<usize> {
         let total: f64 = weights.iter().sum();
         let mut rest = self.machine.stream().uniform() * total;
         let mut chosen = None;
-        for (branch, weight) in weights.into_iter().enumerate() {
+        for (place, &weight) in weights.iter().enumerate() {
             if weight > 0.0 {
                 // The last one takes what rounding leaves.
-                chosen = Some(branch as u32);
+                chosen = Some(place);
                 if rest < weight {
                     break;
                 }
                 rest -= weight;
             }
         }
-        chosen.ok_or(Failure::NoWeight(stand, mover.id))
+        chosen
     }
 
     /// Gives the clocks their rates anew of which a stale process sets some, and finds whose plans

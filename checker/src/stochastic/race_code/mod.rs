@@ -12,6 +12,7 @@
 
 mod asked;
 mod conditions;
+mod entries;
 mod inline;
 mod layout;
 mod moves;

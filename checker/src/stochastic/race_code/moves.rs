@@ -3,13 +3,14 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use super::entries::{Candidate, take_one_of};
 use super::race_writer::{Ids, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
-    BlockId, Distribution, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register,
-    RegisterType, Relation, Update, Urgency,
+    BlockId, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register, RegisterType,
+    Relation, Update, Urgency,
 };
-use crate::stochastic::condition::{Condition, Number};
+use crate::stochastic::condition::Condition;
 use crate::stochastic::program::{Channel, Instance};
 use crate::stochastic::readers::Reader;
 
@@ -52,7 +53,9 @@ impl<'a> RaceWriter<'_, 'a> {
         let spot = &self.program.spots_of(process)[location];
         let outputs = self.program.range(spot.outputs);
         let missed = w.block();
-        if let [only] = outputs {
+        if let [only] = outputs
+            && only.edge.leg.is_none()
+        {
             if !spot.is_plain {
                 self.conditions.require(w, only.guard, &only.values, missed);
             }
@@ -80,6 +83,22 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Chooses one of the instances that are enabled, and returns its number; goes elsewhere if
     /// there are none.
     fn choose(&self, w: &mut Writer, instances: &[Instance<'a>], otherwise: BlockId) -> Register {
+        if instances.iter().any(|instance| instance.edge.leg.is_some()) {
+            let candidates = (0..).zip(instances).map(|(number, instance)| {
+                let flag = w.integer(0);
+                self.when_enabled(w, instance, |w| {
+                    let one = w.integer(1);
+                    w.copy(flag, one);
+                });
+                Candidate {
+                    instance,
+                    number,
+                    flag,
+                }
+            });
+            let candidates: Vec<_> = candidates.collect();
+            return self.by_entry(w, &candidates, otherwise);
+        }
         let count = w.integer(0);
         let flags: Vec<Option<Register>> = instances
             .iter()
@@ -388,7 +407,7 @@ impl<'a> RaceWriter<'_, 'a> {
         (chosen, first): (Register, i32),
         next: BlockId,
     ) {
-        let (count, taken) = (w.integer(0), w.integer(0));
+        let (count, mut taken) = (w.integer(0), w.integer(0));
         let mut flags = Vec::new();
         for (number, &input) in (first..).zip(inputs) {
             let (flag, otherwise) = (w.integer(0), w.block());
@@ -417,7 +436,16 @@ impl<'a> RaceWriter<'_, 'a> {
             w.at(otherwise);
             flags.push(flag);
         }
-        if inputs.len() > 1 {
+        if inputs.iter().any(|input| input.edge.leg.is_some()) {
+            let numbered = (first..).zip(inputs).zip(&flags);
+            let candidates = numbered.map(|((number, instance), &flag)| Candidate {
+                instance,
+                number,
+                flag,
+            });
+            let candidates: Vec<_> = candidates.collect();
+            taken = self.by_entry(w, &candidates, next);
+        } else if inputs.len() > 1 {
             let are_many = w.compare_to(count, Relation::Greater, 1);
             w.when(are_many, |w| {
                 let rest = w.draw_below(count);
@@ -468,51 +496,14 @@ impl<'a> RaceWriter<'_, 'a> {
     /// The branch that a mover takes: by weight.
     fn branch(&self, w: &mut Writer, mover: &Instance<'_>) -> Register {
         let branches = mover.edge.branches.len();
-        let chosen = w.integer(0);
         if branches < 2 {
-            return chosen;
+            return w.integer(0);
         }
         let wrong = w.block();
-        let (zero, infinity) = (w.double(0.0), w.double(f64::INFINITY));
         let weights: Vec<Register> = (0..branches)
-            .map(|branch| {
-                let number = self.program.weight(mover, branch);
-                let weight = self.conditions.number(w, number, &mover.values);
-                if !matches!(number, Number::Known(one) if one >= 0.0 && one.is_finite()) {
-                    let is_weight = w.compare_doubles(weight, Relation::GreaterEqual, zero);
-                    w.unless(is_weight, wrong);
-                    let is_finite = w.compare_doubles(weight, Relation::Less, infinity);
-                    w.unless(is_finite, wrong);
-                }
-                weight
-            })
+            .map(|branch| self.weight(w, mover, branch, wrong))
             .collect();
-        let mut total = w.double(0.0);
-        for &weight in &weights {
-            total = w.add(total, weight);
-        }
-        let rest = w.draw(Distribution::Uniform, total);
-        let (none, found) = (w.integer(-1), w.block());
-        w.copy(chosen, none);
-        for (branch, weight) in (0..).zip(weights) {
-            let next = w.block();
-            let is_possible = w.compare_doubles(weight, Relation::Greater, zero);
-            w.unless(is_possible, next);
-            let this = w.integer(branch);
-            w.copy(chosen, this);
-            let is_beyond = w.compare_doubles(rest, Relation::GreaterEqual, weight);
-            w.unless(is_beyond, found);
-            let less = w.subtract(rest, weight);
-            w.copy(rest, less);
-            w.jump(next);
-            w.at(next);
-        }
-        let is_none = w.compare(chosen, Relation::Equal, none);
-        w.branch(is_none, wrong, found);
-        w.at(wrong);
-        w.give_up();
-        w.at(found);
-        chosen
+        Self::weighted(w, &weights, wrong)
     }
 
     /// Runs the updates of a mover, and lets it enter the target of its branch.
@@ -653,33 +644,6 @@ impl<'a> RaceWriter<'_, 'a> {
         w.return_value(Some(zero));
         w.finish()
     }
-}
-
-/// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
-/// `rest` says, which counts down. A number without a flag counts always.
-pub(super) fn take_one_of(
-    w: &mut Writer,
-    numbers: impl Iterator<Item = (Register, Option<Register>)>,
-    rest: Register,
-    chosen: Register,
-) {
-    let (found, minus_one) = (w.block(), w.integer(-1));
-    for (number, flag) in numbers {
-        let next = w.block();
-        if let Some(flag) = flag {
-            w.unless(flag, next);
-        }
-        w.copy(chosen, number);
-        let goes_on = w.block();
-        w.branch(rest, goes_on, found);
-        w.at(goes_on);
-        let less = w.add_integers(rest, minus_one);
-        w.copy(rest, less);
-        w.jump(next);
-        w.at(next);
-    }
-    w.jump(found);
-    w.at(found);
 }
 
 /// The number of the channel of an instance that computes it.

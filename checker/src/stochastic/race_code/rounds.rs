@@ -1,7 +1,8 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
-use super::moves::{MISSED, take_one_of};
+use super::entries::take_one_of;
+use super::moves::MISSED;
 use super::plans::tolerant;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};

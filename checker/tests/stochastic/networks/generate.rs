@@ -162,14 +162,29 @@ fn edge(
         },
         Role::Receiver => {
             edge.sync = Some((random.below(net.channels.len()), false));
-            add_guard(random, family, net, locations[source], false, &mut edge);
+            let guard = conditions(
+                random,
+                family,
+                net,
+                locations[source],
+                edge.select.is_some(),
+                edge.sync,
+            );
+            edge.guard.extend(guard);
         }
         Role::Output => {
             if random.chance(50) {
                 edge.sync = Some((random.below(net.channels.len()), true));
             }
-            let is_urgent = edge.sync.is_some_and(|(channel, _)| net.channels[channel]);
-            add_guard(random, family, net, locations[source], is_urgent, &mut edge);
+            let guard = conditions(
+                random,
+                family,
+                net,
+                locations[source],
+                edge.select.is_some(),
+                edge.sync,
+            );
+            edge.guard.extend(guard);
         }
     }
     if matches!(role, Role::Bounded(_) | Role::Exit(_)) && random.chance(30) {
@@ -212,29 +227,68 @@ fn edge(
             Number::Constant(1 + random.below(4) as i32)
         };
         edge.branches.push(Branch {
-            weight,
+            weight: (!random.chance(10)).then_some(weight),
+            guard: Vec::new(),
+            sync: None,
             target,
             updates,
         });
     }
+    if edge.branches.len() > 1 && random.chance(50) {
+        label_legs(random, family, net, locations[source], role, &mut edge);
+    }
     edge
 }
 
-fn add_guard(
+/// Gives legs guards and synchronisations. The first leg of an edge that must be enabled stays so.
+fn label_legs(
     random: &mut Random,
     family: Family,
     net: &Net,
     location: Location,
-    is_urgent: bool,
+    role: Role,
     edge: &mut Edge,
 ) {
+    let must_be_enabled = matches!(role, Role::Exit(_) | Role::Bounded(_));
+    let is_moved = edge.sync.is_some() && random.chance(70);
+    let moved = if is_moved { edge.sync.take() } else { None };
+    let may_sync = edge.sync.is_none();
+    for (place, leg) in edge.branches.iter_mut().enumerate() {
+        leg.sync = moved;
+        if place > 0 && may_sync && random.chance(50) {
+            let channel = random.below(net.channels.len());
+            leg.sync = Some((channel, random.chance(60)));
+        }
+        let is_free = must_be_enabled && place == 0;
+        let is_urgent = leg
+            .sync
+            .is_some_and(|(channel, sends)| sends && net.channels[channel]);
+        if !is_free && (is_urgent || random.chance(50)) {
+            leg.guard = conditions(random, family, net, location, false, leg.sync);
+        }
+        if !is_free && random.chance(10) {
+            leg.weight = Some(Number::Constant(0));
+        }
+    }
+}
+
+/// Conditions of an edge or a leg with this synchronisation.
+fn conditions(
+    random: &mut Random,
+    family: Family,
+    net: &Net,
+    location: Location,
+    selects: bool,
+    sync: Option<(usize, bool)>,
+) -> Vec<Atom> {
+    let mut guard = Vec::new();
+    let is_receiver = sync.is_some_and(|(_, sends)| !sends);
+    let is_urgent = sync.is_some_and(|(channel, sends)| sends && net.channels[channel]);
     // An urgent output that is always enabled lets no time pass.
     let least = usize::from(is_urgent && (net.clocks == 0 || random.chance(50)));
     for _ in 0..least.max(random.below(2)) {
-        edge.guard
-            .push(comparison(random, net, edge.select.is_some()));
+        guard.push(comparison(random, net, selects));
     }
-    let is_receiver = edge.sync.is_some_and(|(_, sends)| !sends);
     if net.clocks > 0 && (random.chance(40) || is_urgent) {
         let clock = random.below(net.clocks);
         let constant = random.below(4) as i32;
@@ -249,16 +303,17 @@ fn add_guard(
         } else {
             Compare::AtLeast
         };
-        edge.guard.push(Atom::Clock(clock, compare, constant));
+        guard.push(Atom::Clock(clock, compare, constant));
     }
     if family == Family::Ticking && !is_receiver && !is_urgent {
         // Whatever it does happens at the end of the bound.
-        edge.guard.extend(
+        guard.extend(
             location
                 .bound
                 .map(|(clock, most)| Atom::Clock(clock, Compare::AtLeast, most)),
         );
     }
+    guard
 }
 
 fn comparison(random: &mut Random, net: &Net, selects: bool) -> Atom {

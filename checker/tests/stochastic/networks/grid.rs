@@ -181,7 +181,7 @@ fn window(
     bound: Option<i32>,
 ) -> Option<(i32, i32)> {
     let (mut low, mut high) = (0, bound.unwrap_or(i32::MAX));
-    for atom in &game.edge(process, output).guard {
+    for atom in game.guard(process, output) {
         match *atom {
             Atom::Clock(clock, compare, constant) => {
                 let ahead = constant * game.steps_in_unit - i32::from(state.clocks[clock]);

@@ -83,7 +83,11 @@ pub(crate) struct Edge {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Branch {
-    pub(crate) weight: Number,
+    /// 1 if it is not written.
+    pub(crate) weight: Option<Number>,
+    pub(crate) guard: Vec<Atom>,
+    /// Only if the edge has none.
+    pub(crate) sync: Option<(usize, bool)>,
     pub(crate) target: usize,
     pub(crate) updates: Vec<Assignment>,
 }
@@ -168,7 +172,7 @@ impl Net {
             .collect();
         let _ = writeln!(text, "process P{number}() {{");
         let _ = writeln!(text, "    state {};", states.join(", "));
-        let branching = |edge: &Edge| edge.branches.len() > 1;
+        let branching = |edge: &Edge| edge.branches.len() > 1 || edge.has_labelled_legs();
         let points: Vec<String> = (0..process.edges.len())
             .filter(|&edge| branching(&process.edges[edge]))
             .map(|edge| format!("b{edge}"))
@@ -192,14 +196,7 @@ impl Net {
             if let Some(most) = edge.select {
                 let _ = write!(labels, "select s : int[0, {most}]; ");
             }
-            if !edge.guard.is_empty() {
-                let guard: Vec<String> = edge.guard.iter().map(Atom::text).collect();
-                let _ = write!(labels, "guard {}; ", guard.join(" && "));
-            }
-            if let Some((channel, sends)) = edge.sync {
-                let mark = if sends { '!' } else { '?' };
-                let _ = write!(labels, "sync c{channel}{mark}; ");
-            }
+            labels.push_str(&conditions(&edge.guard, edge.sync));
             if branching(edge) {
                 let assign = self.assign(&edge.updates);
                 edges.push(format!(
@@ -207,11 +204,14 @@ impl Net {
                     edge.source
                 ));
                 for branch in &edge.branches {
+                    let weight = branch.weight.map_or(String::new(), |weight| {
+                        format!("probability {}; ", weight.text())
+                    });
                     edges.push(format!(
-                        "b{number} -> L{} {{ {}probability {}; }}",
+                        "b{number} -> L{} {{ {}{}{weight}}}",
                         branch.target,
+                        conditions(&branch.guard, branch.sync),
                         self.assign(&branch.updates),
-                        branch.weight.text()
                     ));
                 }
             } else {
@@ -263,6 +263,7 @@ impl Net {
             }
             for edge in &process.edges {
                 atoms.extend(&edge.guard);
+                atoms.extend(edge.branches.iter().flat_map(|branch| &branch.guard));
                 let updates = edge.branches.iter().flat_map(|branch| &branch.updates);
                 for update in edge.updates.iter().chain(updates) {
                     if let Assignment::Clock(_, value) = update {
@@ -277,6 +278,28 @@ impl Net {
             }
         }
         greatest
+    }
+}
+
+/// Guard and synchronisation as labels.
+fn conditions(guard: &[Atom], sync: Option<(usize, bool)>) -> String {
+    let mut labels = String::new();
+    if !guard.is_empty() {
+        let guard: Vec<String> = guard.iter().map(Atom::text).collect();
+        let _ = write!(labels, "guard {}; ", guard.join(" && "));
+    }
+    if let Some((channel, sends)) = sync {
+        let mark = if sends { '!' } else { '?' };
+        let _ = write!(labels, "sync c{channel}{mark}; ");
+    }
+    labels
+}
+
+impl Edge {
+    /// Whether some leg has a guard or synchronises.
+    pub(crate) fn has_labelled_legs(&self) -> bool {
+        let mut legs = self.branches.iter();
+        legs.any(|leg| !leg.guard.is_empty() || leg.sync.is_some())
     }
 }
 

@@ -25,8 +25,8 @@ pub(crate) enum Unfit {
     Zeno,
 }
 
-/// An output of a process: an edge, and what it selects.
-pub(crate) type Output = (usize, i32);
+/// What a process can do: an edge, what it selects, and the leg if legs have labels.
+pub(crate) type Output = (usize, i32, Option<usize>);
 
 /// A network with the number of steps that a unit of time has, and the step from which on clocks
 /// are alike.
@@ -101,36 +101,100 @@ impl Game<'_> {
         edges.filter(move |(_, edge)| edge.source == location)
     }
 
-    /// The outputs of the location of a process, whatever their guards say.
-    pub(crate) fn all_outputs(&self, process: usize, state: &State) -> Vec<Output> {
-        self.edges(process, state)
-            .filter(|(_, edge)| edge.sync.is_none_or(|(_, sends)| sends))
-            .flat_map(|(number, edge)| (0..=edge.select.unwrap_or(0)).map(move |one| (number, one)))
-            .collect()
+    /// All that a process can do in its location, whatever guards say.
+    fn instances(&self, process: usize, state: &State) -> Vec<Output> {
+        let mut instances = Vec::new();
+        for (number, edge) in self.edges(process, state) {
+            for selected in 0..=edge.select.unwrap_or(0) {
+                if edge.has_labelled_legs() {
+                    let legs = 0..edge.branches.len();
+                    instances.extend(legs.map(|leg| (number, selected, Some(leg))));
+                } else {
+                    instances.push((number, selected, None));
+                }
+            }
+        }
+        instances
     }
 
-    pub(crate) fn edge(&self, process: usize, (edge, _): Output) -> &Edge {
+    /// The outputs of the location of a process, whatever their guards say.
+    pub(crate) fn all_outputs(&self, process: usize, state: &State) -> Vec<Output> {
+        let mut outputs = self.instances(process, state);
+        outputs.retain(|&one| self.sync(process, one).is_none_or(|(_, sends)| sends));
+        outputs
+    }
+
+    fn edge(&self, process: usize, (edge, ..): Output) -> &Edge {
         &self.net.processes[process].edges[edge]
     }
 
+    /// The conditions of the edge and of the leg.
+    pub(crate) fn guard(&self, process: usize, output: Output) -> impl Iterator<Item = &Atom> {
+        let edge = self.edge(process, output);
+        let leg = output.2.map(|leg| &edge.branches[leg].guard);
+        edge.guard.iter().chain(leg.into_iter().flatten())
+    }
+
+    /// The synchronisation of the edge, or of the leg.
+    fn sync(&self, process: usize, output: Output) -> Option<(usize, bool)> {
+        let edge = self.edge(process, output);
+        edge.sync
+            .or(output.2.and_then(|leg| edge.branches[leg].sync))
+    }
+
     pub(crate) fn is_urgent(&self, process: usize, output: Output) -> bool {
-        let sync = self.edge(process, output).sync;
+        let sync = self.sync(process, output);
         sync.is_some_and(|(channel, _)| self.net.channels[channel])
     }
 
     fn is_enabled(&self, process: usize, output: Output, state: &State) -> bool {
-        let guard = &self.edge(process, output).guard;
-        guard
-            .iter()
-            .all(|&atom| self.is_true(atom, state, output.1))
+        let mut guard = self.guard(process, output);
+        guard.all(|&atom| self.is_true(atom, state, output.1))
     }
 
     fn receivers(&self, process: usize, channel: usize, state: &State) -> Vec<Output> {
-        self.edges(process, state)
-            .filter(|(_, edge)| edge.sync == Some((channel, false)))
-            .flat_map(|(number, edge)| (0..=edge.select.unwrap_or(0)).map(move |one| (number, one)))
-            .filter(|&one| self.is_enabled(process, one, state))
-            .collect()
+        let mut receivers = self.instances(process, state);
+        receivers.retain(|&one| {
+            self.sync(process, one) == Some((channel, false))
+                && self.is_enabled(process, one, state)
+        });
+        receivers
+    }
+
+    /// How likely each of some instances of a process is: all edges with what they select are
+    /// alike, and of the legs that one has among them each is as likely as its weight says.
+    fn drawn(
+        &self,
+        process: usize,
+        instances: &[Output],
+        seen: &State,
+    ) -> Result<Vec<(f64, Output)>, Unfit> {
+        let mut entries: Vec<(usize, i32)> = instances.iter().map(|one| (one.0, one.1)).collect();
+        entries.dedup();
+        let share = 1.0 / entries.len() as f64;
+        let mut drawn = Vec::new();
+        for entry in entries {
+            let legs = instances.iter().filter(|one| (one.0, one.1) == entry);
+            let weight = |leg: usize| self.weight(process, (entry.0, entry.1, Some(leg)), seen);
+            let weighted: Vec<(f64, Output)> =
+                legs.map(|&one| (one.2.map_or(1.0, weight), one)).collect();
+            let total: f64 = weighted.iter().map(|one| one.0).sum();
+            if total == 0.0 {
+                return Err(Unfit::WeightsZero);
+            }
+            drawn.extend(
+                weighted
+                    .into_iter()
+                    .map(|(weight, one)| (share * weight / total, one)),
+            );
+        }
+        Ok(drawn)
+    }
+
+    fn weight(&self, process: usize, output: Output, seen: &State) -> f64 {
+        let branch = &self.edge(process, output).branches[output.2.unwrap_or(0)];
+        let weight = branch.weight.map(|weight| Self::number(weight, seen, 0));
+        weight.map_or(1.0, f64::from)
     }
 
     /// The outputs that are enabled.
@@ -183,20 +247,20 @@ impl Game<'_> {
         changed: &State,
     ) -> Result<Vec<(f64, State)>, Unfit> {
         let outputs = self.outputs(process, seen);
-        let share = 1.0 / outputs.len() as f64;
         let mut outcomes = Vec::new();
-        for output in outputs {
-            let mut movers = vec![(process, vec![output])];
-            if let Some((channel, _)) = self.edge(process, output).sync {
+        for (share, output) in self.drawn(process, &outputs, seen)? {
+            let mut movers = vec![(process, vec![(1.0, output)])];
+            if let Some((channel, _)) = self.sync(process, output) {
                 for other in (0..self.net.processes.len()).filter(|&one| one != process) {
                     let ready = self.receivers(other, channel, seen);
                     if !ready.is_empty() {
-                        movers.push((other, ready));
+                        movers.push((other, self.drawn(other, &ready, seen)?));
                     }
                 }
             }
             self.add_outcomes(&movers, seen, (share, *changed, *changed), &mut outcomes)?;
         }
+        outcomes.retain(|(chance, _)| *chance > 0.0);
         Ok(outcomes)
     }
 
@@ -204,7 +268,7 @@ impl Game<'_> {
     /// `targets` the locations.
     fn add_outcomes(
         &self,
-        movers: &[(usize, Vec<Output>)],
+        movers: &[(usize, Vec<(f64, Output)>)],
         seen: &State,
         (chance, reached, targets): (f64, State, State),
         outcomes: &mut Vec<(f64, State)>,
@@ -220,13 +284,16 @@ impl Game<'_> {
             ));
             return Ok(());
         };
-        for &choice in choices {
+        for &(likely, choice) in choices {
             let edge = self.edge(*process, choice);
-            let weights: Vec<f64> = edge
-                .branches
-                .iter()
-                .map(|branch| f64::from(Self::number(branch.weight, seen, 0)))
-                .collect();
+            let weights: Vec<f64> = match choice.2 {
+                Some(leg) => (0..edge.branches.len())
+                    .map(|one| f64::from(u8::from(one == leg)))
+                    .collect(),
+                None => (0..edge.branches.len())
+                    .map(|one| self.weight(*process, (choice.0, choice.1, Some(one)), seen))
+                    .collect(),
+            };
             let total: f64 = weights.iter().sum();
             if edge.branches.len() > 1 && total == 0.0 {
                 return Err(Unfit::WeightsZero);
@@ -246,7 +313,7 @@ impl Game<'_> {
                 }
                 let mut targets = targets;
                 targets.locations[*process] = branch.target as u8;
-                let chance = chance * part / choices.len() as f64;
+                let chance = chance * part * likely;
                 self.add_outcomes(others, seen, (chance, state, targets), outcomes)?;
             }
         }
