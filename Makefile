@@ -145,8 +145,9 @@ bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 2
 	$(BIN)/python tests/benchmarks/limits.py
 
 .PHONY: bench-games
-bench-games: $(INSTALLED) ## Measure how far the solver of games gets: seven families, up to 60 s or 4 GiB
+bench-games: $(INSTALLED) ## Measure how far the solver of games gets (seven families, up to 60 s or 4 GiB), and what checking strategies costs
 	$(BIN)/python tests/benchmarks/games.py
+	$(BIN)/python tests/benchmarks/verified.py
 
 .PHONY: ablation
 ablation: $(INSTALLED) ## Measure what each heuristic of the engine gains (about 20 minutes; MODELS=FOLDER adds models)

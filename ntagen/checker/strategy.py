@@ -349,7 +349,7 @@ class Strategy:
         The check shares no code with the solver.
 
         Args:
-            states: The check gives up after this many regions; by default two million.
+            states: The check gives up after this many zones; by default two million.
 
         Returns:
             Whether the owner wins; if not, the lines have the run that shows why.

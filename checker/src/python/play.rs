@@ -212,7 +212,7 @@ impl Strategy {
         states: Option<u64>,
     ) -> PyResult<(Option<bool>, Vec<String>)> {
         let rules = rules(forced, priorities)?;
-        let most = states.unwrap_or(strategy_check::MOST_REGIONS);
+        let most = states.unwrap_or(strategy_check::MOST_PARTS);
         let model = self.model.get();
         let inner = &self.inner;
         let result = until_signal(py, || {

@@ -25,12 +25,12 @@
 
 use std::collections::HashMap;
 
-use crate::exec::EmittedAssignment;
-use crate::ir::{ClockChoice, ClockId, FixedConstraint, Network, Predicate, Urgency};
+use crate::ir::{Network, Predicate, Urgency};
 
-use super::code::{Candidate, Code, Combination};
+use super::code::Combination;
 use super::moves::{Error, Part};
 use super::strategy::Constraint;
+use super::symbolic::{Possible, Symbolic, by_priority, guarded, without_all};
 use super::zone::{Comparison, Zone, is_exact};
 
 /// The states with some words.
@@ -88,8 +88,7 @@ pub fn verify(network: &Network, states: &[States], avoided: &Predicate) -> Resu
     }
     let clocks = network.clocks.len().max(1);
     let mut check = ClosureCheck {
-        code: Code::new(network),
-        clocks,
+        symbolic: Symbolic::new(network),
         zones: HashMap::new(),
         coverage: Coverage::default(),
     };
@@ -129,32 +128,14 @@ fn zones(network: &Network, entry: &States, clocks: usize) -> Option<Vec<Zone>> 
             .all(|one| one.left < clocks && one.right < clocks && one.left != one.right);
     fits.then(|| {
         let zones = entry.zones.iter().map(|constraints| {
-            let comparisons = constraints.iter().map(|one| Comparison {
-                left: one.left,
-                right: one.right,
-                bound: one.bound.into(),
-                is_strict: one.strict,
-            });
-            Zone::universe(clocks).within(comparisons)
+            Zone::universe(clocks).within(constraints.iter().map(Comparison::from))
         });
         zones.collect()
     })
 }
 
-/// A move from some words, where only they decide.
-struct Possible {
-    parts: Vec<Part>,
-    level: (u32, u32),
-    target: Vec<i32>,
-    assignments: Vec<EmittedAssignment>,
-    /// Where its guards hold, every receiver that must take part does, and the invariants of the
-    /// target hold after it.
-    enabled: Vec<Zone>,
-}
-
 struct ClosureCheck<'a> {
-    code: Code<'a>,
-    clocks: usize,
+    symbolic: Symbolic<'a>,
     zones: HashMap<&'a [i32], Vec<Zone>>,
     coverage: Coverage,
 }
@@ -165,53 +146,28 @@ impl ClosureCheck<'_> {
     }
 
     fn has_initial_state(&self) -> Result<bool, Error> {
-        let network = self.code.network();
-        let values = network.initial_clocks.iter().enumerate().skip(1);
-        let point = values.flat_map(|(clock, &value)| {
-            let upper = Comparison {
-                left: clock,
-                right: 0,
-                bound: value.into(),
-                is_strict: false,
-            };
-            let lower = Comparison {
-                left: 0,
-                right: clock,
-                bound: -i64::from(value),
-                is_strict: false,
-            };
-            [upper, lower]
-        });
-        let Some(invariant) = self.invariant(&network.initial)? else {
+        let words = &self.symbolic.network().initial;
+        let Some(invariant) = self.symbolic.invariant(words)? else {
             return Err(Error::InitialInvariant);
         };
-        let point = Zone::universe(self.clocks).within(point).within(invariant);
+        let point = self.symbolic.initial().within(invariant);
         if point.is_empty() {
             return Err(Error::InitialInvariant);
         }
-        Ok(point.is_covered(self.of(&network.initial)))
-    }
-
-    /// What the invariants ask of the clocks; `None` if the words break one.
-    fn invariant(&self, words: &[i32]) -> Result<Option<Vec<Comparison>>, Error> {
-        let invariants = self.code.invariants(words)?;
-        Ok(invariants.map(|all| all.iter().map(Comparison::from).collect()))
+        Ok(point.is_covered(self.of(words)))
     }
 
     /// What is wrong with the states with these words.
     fn defect(&mut self, words: &[i32], avoided: &Predicate) -> Result<Option<Defect>, Error> {
-        let Some(invariant) = self.invariant(words)? else {
+        let Some(invariant) = self.symbolic.invariant(words)? else {
             // No state has these words: the zones stand for nothing, and claim nothing.
             return Ok(None);
         };
-        let network = self.code.network();
-        let mut candidates = Vec::new();
-        for process in 0..network.processes.len() {
-            candidates.push(self.code.candidates(process, words, &|_| true)?);
-        }
-        let is_urgent = (0..network.processes.len())
-            .any(|process| self.code.urgency(process, words) != Urgency::Normal);
-        let stopped = self.code.stopped(words)?;
+        let candidates = self.symbolic.candidates(words)?;
+        let code = &self.symbolic.code;
+        let is_urgent = (0..self.symbolic.network().processes.len())
+            .any(|process| code.urgency(process, words) != Urgency::Normal);
+        let stopped = code.stopped(words)?;
         let own: Vec<Zone> = self.of(words).to_vec();
         for zone in &own {
             let zone = zone.within(invariant.iter().copied());
@@ -222,9 +178,14 @@ impl ClosureCheck<'_> {
             let around = if is_urgent {
                 zone.clone()
             } else {
-                within_all(&zone.future(&stopped), &invariant)
+                zone.future(&stopped).within(invariant.iter().copied())
             };
-            let (combinations, barriers) = self.combinations(&candidates, words, &around)?;
+            let combinations = self.symbolic.combinations(&candidates, words, &around)?;
+            let urgent = combinations.iter();
+            let urgent = urgent.filter(|one| self.symbolic.is_urgent(one));
+            let barriers: Vec<Zone> = urgent
+                .flat_map(|one| guarded(&one.guard, &one.excluded, &around))
+                .collect();
             if !is_urgent {
                 for later in futures(&zone, &stopped, &barriers) {
                     let later = later.within(invariant.iter().copied());
@@ -238,25 +199,28 @@ impl ClosureCheck<'_> {
                     }
                 }
             }
-            let possible = self.possible(&combinations, words, &zone)?;
+            let possible = self.symbolic.possible(&combinations, words, &zone)?;
+            let enabled = self.enabled(&possible);
             let state = Looked {
                 words,
-                possible: &possible,
+                enabled: &enabled,
                 combinations: &combinations,
                 around: &around,
                 may_wait: !is_urgent,
                 stopped: &stopped,
                 barriers: &barriers,
             };
-            let met = self.part(avoided, &zone, &state)?;
+            let alive =
+                |zone: &Zone| Ok(without_all(vec![zone.clone()], &self.alive(zone, &state)?));
+            let met = self.symbolic.part(avoided, (words, &zone), &alive)?;
             if met.iter().any(|part| !part.is_empty()) {
                 return Ok(Some(Defect::Met));
             }
-            for one in &possible {
-                self.coverage.moves += 1;
-                for part in &self.enabled(one, &possible) {
-                    let entered = part.after(&one.assignments);
-                    if !entered.is_covered(self.of(&one.target)) {
+            self.coverage.moves += possible.len() as u64;
+            for (one, enabled) in possible.iter().zip(&enabled) {
+                for part in enabled {
+                    let entered = part.after(&one.effect.assignments);
+                    if !entered.is_covered(self.of(&one.effect.target)) {
                         return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
                     }
                 }
@@ -265,148 +229,23 @@ impl ClosureCheck<'_> {
         Ok(None)
     }
 
-    /// The combinations of edges that words and guards make possible somewhere in a zone, and where
-    /// an urgent combination stops time.
-    fn combinations(
-        &self,
-        candidates: &[Vec<Candidate>],
-        words: &[i32],
-        zone: &Zone,
-    ) -> Result<(Vec<Combination>, Vec<Zone>), Error> {
-        let network = self.code.network();
-        let is_possible = |guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>]| {
-            !guarded(guard, excluded, zone).is_empty()
-        };
-        let combinations = self.code.combinations(candidates, words, &is_possible)?;
-        let is_urgent = |channel: u32| network.channels[channel as usize].urgent;
-        let urgent = combinations
-            .iter()
-            .filter(|one| one.channel.is_some_and(is_urgent));
-        let barriers = urgent
-            .flat_map(|one| guarded(&one.guard, &one.excluded, zone))
-            .collect();
-        Ok((combinations, barriers))
-    }
-
-    /// The moves that are possible somewhere in the zone, priorities apart.
-    fn possible(
-        &self,
-        combinations: &[Combination],
-        words: &[i32],
-        zone: &Zone,
-    ) -> Result<Vec<Possible>, Error> {
-        let mut found = Vec::new();
-        for one in combinations {
-            let guard = guarded(&one.guard, &one.excluded, zone);
-            if guard.is_empty() {
-                continue;
-            }
-            let mut target = words.to_vec();
-            let assignments = self.code.take(&one.parts, &mut target)?;
-            let Some(invariant) = self.invariant(&target)? else {
-                continue;
-            };
-            let positive = assignments.iter().enumerate().map(|(index, assigned)| {
-                let at_least_zero = Comparison {
-                    left: 0,
-                    right: assigned.source.0 as usize,
-                    bound: assigned.value.into(),
-                    is_strict: false,
-                };
-                at_least_zero.before(&assignments[..index])
-            });
-            let before: Vec<Comparison> = invariant
-                .iter()
-                .map(|one| one.before(&assignments))
-                .chain(positive)
-                .collect();
-            let enabled: Vec<Zone> = guard
-                .iter()
-                .map(|part| within_all(part, &before))
-                .filter(|part| !part.is_empty())
-                .collect();
-            found.push(Possible {
-                parts: one.parts.clone(),
-                level: self.code.level(&one.parts, one.channel),
-                target,
-                assignments,
-                enabled,
-            });
+    /// Where moves are possible.
+    fn enabled(&self, moves: &[Possible]) -> Vec<Vec<Zone>> {
+        if self.symbolic.network().features.priorities {
+            by_priority(moves)
+        } else {
+            moves.iter().map(|one| one.enabled.clone()).collect()
         }
-        Ok(found)
-    }
-
-    /// Where a move is possible, those of higher priority subtracted.
-    fn enabled(&self, one: &Possible, all: &[Possible]) -> Vec<Zone> {
-        let mut parts = one.enabled.clone();
-        if self.code.network().features.priorities {
-            let above = all.iter().filter(|other| other.level > one.level);
-            for higher in above.flat_map(|other| &other.enabled) {
-                parts = parts.iter().flat_map(|part| part.without(higher)).collect();
-            }
-        }
-        parts
-    }
-
-    /// Where in the zone the predicate holds.
-    fn part(
-        &self,
-        predicate: &Predicate,
-        zone: &Zone,
-        state: &Looked<'_>,
-    ) -> Result<Vec<Zone>, Error> {
-        let all = || vec![zone.clone()];
-        let all_if = |holds: bool| if holds { all() } else { Vec::new() };
-        Ok(match predicate {
-            Predicate::Data(function) => all_if(self.code.value(*function, state.words)? != 0),
-            Predicate::Constant(value) => all_if(*value),
-            Predicate::Location(process, location) => {
-                all_if(state.words[process.0 as usize] == location.0 as i32)
-            }
-            Predicate::Clock(clock) => {
-                let one = Comparison {
-                    left: self.clock(clock.left, state.words)?,
-                    right: self.clock(clock.right, state.words)?,
-                    bound: self.code.value(clock.bound, state.words)?.into(),
-                    is_strict: clock.strict,
-                };
-                vec![within_all(zone, &[one])]
-            }
-            Predicate::Not(inner) => without_all(all(), &self.part(inner, zone, state)?),
-            Predicate::And(parts) => {
-                let mut rest = all();
-                for inner in parts {
-                    let mut next = Vec::new();
-                    for part in &rest {
-                        next.extend(self.part(inner, part, state)?);
-                    }
-                    rest = next;
-                    rest.retain(|part| !part.is_empty());
-                }
-                rest
-            }
-            Predicate::Or(parts) => {
-                let mut found = Vec::new();
-                for inner in parts {
-                    found.extend(self.part(inner, zone, state)?);
-                }
-                found
-            }
-            Predicate::Deadlock => without_all(all(), &self.alive(zone, state)?),
-        })
     }
 
     /// From where in the zone a move is possible, now or after a wait.
     fn alive(&self, zone: &Zone, state: &Looked<'_>) -> Result<Vec<Zone>, Error> {
-        let now = |possible: &[Possible]| -> Vec<Zone> {
-            let parts = possible.iter().flat_map(|one| self.enabled(one, possible));
-            parts.collect()
-        };
+        let now = || state.enabled.iter().flatten().cloned().collect();
         if !state.may_wait {
-            return Ok(now(state.possible));
+            return Ok(now());
         }
         if !is_exact(state.stopped) {
-            let alive = now(state.possible);
+            let alive: Vec<Zone> = now();
             return if zone.is_covered(&alive) {
                 Ok(alive)
             } else {
@@ -420,29 +259,21 @@ impl ClosureCheck<'_> {
                     "deadlocks beside clock-guarded urgent channels",
                 ));
             }
-            return Ok(now(state.possible));
+            return Ok(now());
         }
         // What is possible later need not be possible in the zone.
-        let possible = self.possible(state.combinations, state.words, state.around)?;
-        let enabled = now(&possible);
-        Ok(enabled.iter().map(|one| one.past(state.stopped)).collect())
-    }
-
-    fn clock(&self, choice: ClockChoice, words: &[i32]) -> Result<usize, Error> {
-        let clock = match choice {
-            ClockChoice::Fixed(ClockId(clock)) => clock,
-            ClockChoice::Indexed(range, offset) => {
-                range.first.0 + self.code.value(offset, words)? as u32
-            }
-        };
-        Ok(clock as usize)
+        let (combinations, around) = (state.combinations, state.around);
+        let possible = self.symbolic.possible(combinations, state.words, around)?;
+        let enabled = self.enabled(&possible).into_iter().flatten();
+        Ok(enabled.map(|one| one.past(state.stopped)).collect())
     }
 }
 
 /// What is known about a zone in which a predicate is searched.
 struct Looked<'l> {
     words: &'l [i32],
-    possible: &'l [Possible],
+    /// Where moves are possible.
+    enabled: &'l [Vec<Zone>],
     /// What words and guards make possible in the zone or after a wait.
     combinations: &'l [Combination],
     /// What can be waited for in the zone, and possibly more.
@@ -450,30 +281,6 @@ struct Looked<'l> {
     may_wait: bool,
     stopped: &'l [bool],
     barriers: &'l [Zone],
-}
-
-/// The part in which all comparisons hold, those of a clock with itself included.
-fn within_all(zone: &Zone, comparisons: &[Comparison]) -> Zone {
-    zone.within(comparisons.iter().copied())
-}
-
-fn without_all(mut zones: Vec<Zone>, others: &[Zone]) -> Vec<Zone> {
-    for other in others {
-        zones = zones.iter().flat_map(|zone| zone.without(other)).collect();
-    }
-    zones
-}
-
-/// The part of a zone in which the guards hold, and every receiver that must take part does.
-fn guarded(guard: &[FixedConstraint], excluded: &[Vec<FixedConstraint>], zone: &Zone) -> Vec<Zone> {
-    let within = zone.within(guard.iter().map(Comparison::from));
-    let mut parts = vec![within];
-    parts.retain(|part| !part.is_empty());
-    for conjunction in excluded {
-        let excluded = zone.within(conjunction.iter().map(Comparison::from));
-        parts = without_all(parts, std::slice::from_ref(&excluded));
-    }
-    parts
 }
 
 /// The future of a zone up to the barriers. Each stops time, so a wait ends before the barrier
@@ -486,14 +293,9 @@ fn futures(zone: &Zone, stopped: &[bool], barriers: &[Zone]) -> Vec<Zone> {
         let mut next = Vec::new();
         for (start, end) in &waits {
             for one in barrier.comparisons() {
-                if one.left == 0 && !stopped[one.right] {
+                if one.left() == 0 && !stopped[one.right()] {
                     let mut end = end.clone();
-                    end.push(Comparison {
-                        left: one.right,
-                        right: 0,
-                        bound: -one.bound,
-                        is_strict: false,
-                    });
+                    end.push(Comparison::new(one.right(), 0, -one.bound(), false));
                     next.push((start.clone(), end));
                 } else {
                     let start = start.within([one.negated()]);
@@ -507,6 +309,6 @@ fn futures(zone: &Zone, stopped: &[bool], barriers: &[Zone]) -> Vec<Zone> {
     }
     let futures = waits
         .iter()
-        .map(|(start, end)| within_all(&start.future(stopped), end));
+        .map(|(start, end)| start.future(stopped).within(end.iter().copied()));
     futures.collect()
 }

@@ -334,7 +334,7 @@ impl<'a> Code<'a> {
         }
         for &part in parts {
             let edge = self.edge(part);
-            let values = &select_combinations(edge)[part.select as usize];
+            let values = &select_values(edge, part.select);
             self.update(&edge.update, values, words, &mut assignments)?;
             let branch = &edge.branches[part.branch as usize];
             self.update(&branch.update, values, words, &mut assignments)?;
@@ -401,6 +401,19 @@ impl<'a> Code<'a> {
             self.interpreter.call(function, values, &mut context);
         Ok(result?)
     }
+}
+
+/// The combination of the select values of an edge with this number.
+fn select_values(edge: &Edge, number: u32) -> Vec<i32> {
+    let mut rest = i64::from(number);
+    let mut values: Vec<i32> = Vec::with_capacity(edge.select.len());
+    for select in edge.select.iter().rev() {
+        let count = i64::from(select.high) - i64::from(select.low) + 1;
+        values.push((i64::from(select.low) + rest % count) as i32);
+        rest /= count;
+    }
+    values.reverse();
+    values
 }
 
 /// All combinations of the select values of an edge, the last binding fastest.

@@ -24,9 +24,9 @@ use crate::ir::{Network, Predicate};
 
 use super::effort::Effort;
 use super::moves::{Error, Move, Part, State};
+use super::outcome::{Coverage, Defect, Kind, Outcome, Step, Violation};
 use super::regions::Regions;
 use super::rules::{Aim, Claim, Owner, Rest, Rules, entry};
-use super::strategy::{Coverage, Defect, Outcome, Step, Violation};
 
 /// What the controller proposes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,7 +72,10 @@ pub fn verify(
         observations,
         seen: HashMap::new(),
         path: Vec::new(),
-        coverage: Coverage::default(),
+        coverage: Coverage {
+            kind: Kind::Regions,
+            ..Coverage::default()
+        },
     };
     play.run(effort)
 }
@@ -128,7 +131,7 @@ impl Play<'_> {
                     None => {}
                 }
             }
-            if let Some(why) = effort.is_over(self.coverage.regions) {
+            if let Some(why) = effort.is_over(self.coverage.parts) {
                 return Ok(Outcome::GivenUp(why, self.coverage));
             }
             if let Some(defect) = self.enter(number, &target)? {
@@ -163,7 +166,7 @@ impl Play<'_> {
 
     /// Puts a new place on the path, with its successors; what is wrong with it.
     fn enter(&mut self, number: Option<usize>, state: &State) -> Result<Option<Defect>, Error> {
-        self.coverage.regions += 1;
+        self.coverage.parts += 1;
         let place = (number.unwrap_or(self.machine.len()), state.clone());
         self.push(place.clone());
         match self.rules.winner(state)? {

@@ -233,7 +233,10 @@ pub fn look(
     let state = doubled(&timed.state);
     let predicates: Vec<&Predicate> = claim.goal.into_iter().chain(claim.keep).collect();
     let mut moments = Moments::new(network, &predicates)?;
-    let deciding = [rules.decisions_of(&state), rules.allowed_of(&state)];
+    let deciding = [
+        rules.decisions_of(&state.words),
+        rules.allowed_of(&state.words),
+    ];
     for decisions in deciding.into_iter().flatten() {
         moments = moments.with(&constants_of(network, decisions));
     }

@@ -24,6 +24,9 @@ pub struct Constraint {
 /// What to do in some zones.
 #[derive(Clone, Debug)]
 pub struct Decision {
+    /// Decisions of lower ranks are looked at first. Nothing else hangs on it: what is wrong here
+    /// costs time alone.
+    pub rank: u32,
     /// Where it applies: in one of these conjunctions.
     pub zones: Vec<Vec<Constraint>>,
     /// The move to take; `None` is to wait. For a move of the controller only the edges and their
@@ -273,8 +276,8 @@ impl<'a> Rules<'a> {
     }
 
     /// All that the controller may be allowed in states with these words.
-    pub(super) fn allowed_of(&self, state: &State) -> Option<&'a Decisions> {
-        let words = identity(self.semantics.network(), &state.words);
+    pub(super) fn allowed_of(&self, words: &[i32]) -> Option<&'a Decisions> {
+        let words = identity(self.semantics.network(), words);
         self.under.get(words).copied()
     }
 
@@ -308,7 +311,7 @@ impl<'a> Rules<'a> {
         let others = possible.iter().filter(|(one, _)| !self.is_own(one));
         let others: Vec<_> = others.collect();
         let legs = self
-            .decisions_of(state)
+            .decisions_of(&state.words)
             .map_or(&[][..], |decisions| &decisions.legs);
         if legs.is_empty() || self.claim.owner == Owner::Controller {
             return Some(others);
@@ -381,7 +384,7 @@ impl<'a> Rules<'a> {
 
     /// The decisions that apply.
     pub(super) fn decisions(&self, state: &State) -> Vec<&'a Decision> {
-        let Some(decisions) = self.decisions_of(state) else {
+        let Some(decisions) = self.decisions_of(&state.words) else {
             return Vec::new();
         };
         let unit = self.semantics.ticks_per_unit();
@@ -390,9 +393,9 @@ impl<'a> Rules<'a> {
         indices.map(|index| &decisions.decisions[index]).collect()
     }
 
-    /// All decisions for the words of a state.
-    pub(super) fn decisions_of(&self, state: &State) -> Option<&'a Decisions> {
-        let words = identity(self.semantics.network(), &state.words);
+    /// All decisions for words.
+    pub(super) fn decisions_of(&self, words: &[i32]) -> Option<&'a Decisions> {
+        let words = identity(self.semantics.network(), words);
         self.strategy.get(words).copied()
     }
 

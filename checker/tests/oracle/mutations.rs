@@ -126,6 +126,7 @@ fn everywhere(decisions: &mut Vec<Decision>, action: Option<Vec<Part>>) {
     decisions.insert(
         0,
         Decision {
+            rank: 0,
             zones: vec![Vec::new()],
             action,
         },
@@ -541,4 +542,57 @@ fn counter_strategy_must_win_from_everywhere() {
     let steady = || solved(HELP, "E<> control: A[] (P.Open && A<> P.Open && P.x > 1)");
     assert_eq!(steady().strategy.start, Start::Anywhere);
     assert_eq!(defect_of(steady(), 1, |_| {}), None);
+}
+
+/// A lift between two floors, doors and calls, with all constants but two multiplied by a factor.
+fn lift(factor: i64) -> String {
+    let times = |value: i64| value * factor;
+    format!(
+        "
+clock move, door, call, idle;
+int[0, 1] at;
+bool open, asked;
+process Lift() {{
+  state Stay, Go {{ move <= {go} }}, Open {{ door <= {shut} }};
+  init Stay;
+  trans Stay -> Go {{ guard !open && idle >= 17; assign move = 0; }},
+        Go -u-> Stay {{ guard move >= {arrive}; assign at = 1 - at, idle = 0; }},
+        Stay -> Open {{ assign door = 0, open = true; }},
+        Open -u-> Stay {{ guard door >= 150; assign open = false, idle = 0; }};
+}}
+process User() {{
+  state Rest, Wait, Bad;
+  init Rest;
+  trans Rest -u-> Wait {{ guard call >= 701; assign call = 0, asked = true; }},
+        Wait -> Rest {{ guard open && at == 1; assign asked = false, call = 0; }},
+        Wait -u-> Bad {{ guard call > {late}; }};
+}}
+L = Lift();
+U = User();
+system L, U;
+",
+        go = times(430),
+        shut = times(310),
+        arrive = times(290),
+        late = times(2003),
+    )
+}
+
+#[test]
+fn checks_do_not_count_up_to_constants() {
+    for factor in [1, 2_500] {
+        let game = || solved(&lift(factor), "control: A[] not U.Bad");
+        assert_eq!(game().strategy.owner, Player::Controller);
+        assert_eq!(defect_of(game(), 0, |_| {}), None, "{factor}");
+    }
+    // The run that shows it goes through regions, of which there may be too many.
+    let silent = |factor| {
+        let game = solved(&lift(factor), "control: A[] not U.Bad");
+        defect_of(game, 1, Vec::clear)
+    };
+    assert_eq!(silent(1), Some(Defect::NoDecision));
+    assert!(matches!(
+        silent(2_500),
+        Some(Defect::NoDecision | Defect::Lost)
+    ));
 }

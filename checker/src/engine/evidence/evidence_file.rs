@@ -87,7 +87,7 @@ fn check_strategy(
     };
     let decisions = strategy_check::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
-    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
+    let effort = &mut Effort::up_to(strategy_check::MOST_PARTS);
     let result = strategy_check::verify(network, asked, played, rules, effort);
     Ok(Checked::of_strategy(network, &result).without("states that play by it does not come to"))
 }
@@ -113,7 +113,7 @@ fn check_machine(
         objective,
         observations: &observations[..],
     };
-    let effort = &mut Effort::up_to(strategy_check::MOST_REGIONS);
+    let effort = &mut Effort::up_to(strategy_check::MOST_PARTS);
     let result = partial_observation::verify(network, asked, &machine, rules, effort);
     Ok(Checked::of_strategy(network, &result)
         .without("what its states say of where play may be and what is seen there"))

@@ -25,8 +25,8 @@ use crate::engine::query::time_clock;
 use crate::engine::rejection::Rejection;
 use crate::syntax::ast::QueryText;
 
-/// Regions that a check explores before it gives up.
-pub const MOST_REGIONS: u64 = 2_000_000;
+/// Zones, or regions, that a check looks at before it gives up.
+pub const MOST_PARTS: u64 = 2_000_000;
 
 /// What a control query asks for.
 #[derive(Clone, Copy, Debug)]
@@ -324,6 +324,7 @@ pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
 fn decision(decision: &Decision) -> strategy::Decision {
     let action = decision.action.as_ref();
     strategy::Decision {
+        rank: decision.rank,
         zones: zones(&decision.zones),
         action: action.map(|parts| parts.iter().map(|&one| one.into()).collect()),
     }
@@ -380,17 +381,22 @@ pub fn describe(
 ) -> Vec<String> {
     match verification {
         Ok(strategy::Outcome::Verified(coverage)) => vec![format!(
-            "strategy verified: {} regions, {} moves of its own, {} of the opponent, {} ends that are won",
-            coverage.regions, coverage.own_moves, coverage.opponent_moves, coverage.goals
+            "strategy verified: {} {}, {} moves of its own, {} of the opponent, {} ends that are won",
+            coverage.parts,
+            coverage.kind,
+            coverage.own_moves,
+            coverage.opponent_moves,
+            coverage.goals
         )],
         Ok(strategy::Outcome::GivenUp(GivenUp::TooLarge, coverage)) => vec![format!(
-            "strategy not verified: more than {} regions; the state limit (--states) sets another bound",
-            coverage.regions
+            "strategy not verified: more than {} {}; the state limit (--states) sets another bound",
+            coverage.parts, coverage.kind
         )],
         Ok(strategy::Outcome::GivenUp(GivenUp::Ended, coverage)) => vec![format!(
-            "strategy not verified: it was found, and checking it was {} after {} regions",
+            "strategy not verified: it was found, and checking it was {} after {} {}",
             ended_text(stop.unwrap_or(StopReason::Interrupted)),
-            coverage.regions
+            coverage.parts,
+            coverage.kind
         )],
         Ok(strategy::Outcome::Violated(violation, _)) => violation_lines(network, violation),
         Err(verify::Error::Unsupported(what)) => {
@@ -412,6 +418,7 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
         Defect::OtherGame => "it is for another start or time limit than the query",
         Defect::ImpossibleWay => "the way to where it begins is not possible",
         Defect::Recurring => "the goal of the controller comes again and again",
+        Defect::Lost => "its owner does not win from here; the run that shows it is too long",
         Defect::Endless => "the run goes on for ever without what the strategy is for",
     };
     let mut lines = vec![format!("strategy violated: {defect}")];

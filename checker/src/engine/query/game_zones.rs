@@ -104,12 +104,7 @@ pub(super) fn add_check_by(
 
 /// The effort that a check may take.
 fn effort_of<'a>(options: &Options) -> Effort<'a> {
-    Effort::up_to(
-        options
-            .limits
-            .states
-            .unwrap_or(strategy_check::MOST_REGIONS),
-    )
+    Effort::up_to(options.limits.states.unwrap_or(strategy_check::MOST_PARTS))
 }
 
 #[cfg(test)]
