@@ -33,7 +33,8 @@ pub(crate) fn entry(network: &Network, parts: &[Part]) -> Entry {
         let process = &network.processes[part.process as usize];
         process.edges[part.edge as usize].leg.as_ref()
     };
-    let is_alone = leg(&parts[0]).is_some_and(|leg| !leg.follows_sync);
+    let first = parts.first().and_then(leg);
+    let is_alone = first.is_some_and(|leg| !leg.follows_sync);
     let named = parts.iter().take(if is_alone { 1 } else { parts.len() });
     named
         .map(|part| match leg(part) {
