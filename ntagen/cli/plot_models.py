@@ -44,10 +44,10 @@ GRAPHS: Final = ("states", "discrete")
 """Those that may be written for Graphviz, too."""
 
 MOST_DRAWN: Final = 100
-"""If no number is given, the picture of a graph has at most so many states."""
+"""If no number is given, the picture of a graph has at most this number of states."""
 
 MOST_SEARCHED: Final = 10_000
-"""If no greater number is given, at most so many symbolic states are searched for."""
+"""If no greater number is given, at most this number of symbolic states is searched for."""
 
 
 @dataclass(frozen=True, slots=True)
