@@ -29,7 +29,7 @@
 
 use std::collections::HashMap;
 
-use crate::cancellation;
+use crate::cancellation::Room;
 use crate::exec::EmittedAssignment;
 
 use super::courses::courses;
@@ -59,12 +59,8 @@ pub(super) struct Winning<'r, 'a> {
     coverage: Coverage,
     /// Zones that were judged.
     judged: u64,
-    bytes: usize,
-    told_bytes: usize,
+    room: Room,
 }
-
-/// Bytes between two questions whether there is enough memory.
-const BETWEEN_QUESTIONS: usize = 1 << 20;
 
 impl<'r, 'a> Winning<'r, 'a> {
     /// The places that play from these words may come to, with nothing judged; that the whole model
@@ -84,8 +80,7 @@ impl<'r, 'a> Winning<'r, 'a> {
             sources: Vec::new(),
             coverage: Coverage::default(),
             judged: 0,
-            bytes: 0,
-            told_bytes: 0,
+            room: Room::default(),
         };
         winning.place_of(words.into());
         let mut next = 0;
@@ -204,11 +199,7 @@ impl<'r, 'a> Winning<'r, 'a> {
                 }
             }
         }
-        self.bytes += known.bytes();
-        if self.bytes > self.told_bytes + BETWEEN_QUESTIONS {
-            self.told_bytes = self.bytes;
-            cancellation::ask_for(self.bytes);
-        }
+        self.room.take(known.bytes());
         self.places[place] = known;
         Ok(())
     }
