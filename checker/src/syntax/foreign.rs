@@ -5,17 +5,6 @@ use super::keywords::Dialect;
 use super::lexer::TokenKind;
 use super::parser::Parser;
 
-/// Temporal operators and words of other notations that begin a query, with UPPAAL's.
-const FOREIGN_BEGINNINGS: [(&str, &str); 7] = [
-    ("G", "A[] p"),
-    ("F", "A<> p"),
-    ("always", "A[] p"),
-    ("never", "A[] not p"),
-    ("eventually", "A<> p"),
-    ("possibly", "E<> p"),
-    ("reachable", "E<> p"),
-];
-
 /// Words that are no operators, with those that are.
 const FOREIGN_OPERATORS: [(&str, &str); 12] = [
     ("AND", "`and` or `&&`"),
@@ -76,10 +65,6 @@ impl Parser<'_> {
         if is_query {
             if matches!((before, word), ("no", "deadlock") | ("deadlock", "free")) {
                 return Some("write `A[] not deadlock`".to_owned());
-            }
-            let beginning = FOREIGN_BEGINNINGS.iter().find(|one| one.0 == before);
-            if let Some((_, meant)) = beginning {
-                return Some(format!("write `{meant}` for \"{before} p\""));
             }
             if matches!(before, "sup" | "inf" | "bounds") {
                 return Some(format!("write `{before}: {word}`"));

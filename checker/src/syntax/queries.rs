@@ -49,9 +49,20 @@ pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
     }
 }
 
-/// Path quantifiers as other tools write them, each with that of UPPAAL.
-const FOREIGN_QUANTIFIERS: [(&str, &str); 4] =
-    [("EF", "E<>"), ("AG", "A[]"), ("AF", "A<>"), ("EG", "E[]")];
+/// Path quantifiers as other tools and people write them, each with that of UPPAAL.
+const FOREIGN_QUANTIFIERS: [(&str, &str); 11] = [
+    ("EF", "E<>"),
+    ("AG", "A[]"),
+    ("AF", "A<>"),
+    ("EG", "E[]"),
+    ("G", "A[]"),
+    ("F", "A<>"),
+    ("always", "A[]"),
+    ("never", "A[] not"),
+    ("eventually", "A<>"),
+    ("possibly", "E<>"),
+    ("reachable", "E<>"),
+];
 
 impl Parser<'_> {
     fn query(&mut self) -> Query {
@@ -255,11 +266,15 @@ impl Parser<'_> {
 
     fn leads_to(&mut self) -> QueryKind {
         let (start, quantifier) = (self.checkpoint(), self.word());
+        let is_call = self.peek(1).kind == TokenKind::LeftParenthesis;
         let left = self.expression();
         if self.eat(TokenKind::LeadsTo) {
             return QueryKind::LeadsTo(left, self.expression());
         }
-        if let Some((_, meant)) = FOREIGN_QUANTIFIERS.iter().find(|one| one.0 == quantifier) {
+        // An operator behind it shows that the word is a name: `G == 1`.
+        let is_before_operand = is_call || matches!(left.kind, ExprKind::Name(_));
+        let foreign = FOREIGN_QUANTIFIERS.iter().find(|one| one.0 == quantifier);
+        if let Some((_, meant)) = foreign.filter(|_| is_before_operand) {
             self.rewind(&start);
             return self.foreign_quantifier(meant);
         }

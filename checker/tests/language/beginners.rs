@@ -150,8 +150,13 @@ fn queries_of_beginners_get_a_hint_that_helps() {
         ("A[] !deadlock()", "write `deadlock` without parentheses"),
         ("A[] no deadlock", "write `A[] not deadlock`"),
         ("A[] deadlock free", "write `A[] not deadlock`"),
-        ("G p.Idle", "write `A[] p` for \"G p\""),
-        ("always p.Idle", "write `A[] p` for \"always p\""),
+        ("G p.Idle", "did you mean `A[] p.Idle`?"),
+        ("always p.Idle", "did you mean `A[] p.Idle`?"),
+        ("never (p.Done)", "did you mean `A[] not (p.Done)`?"),
+        (
+            "G == 1",
+            "write `E<> p` for \"p can be reached\" or `A[] p` for \"p always holds\"",
+        ),
         (
             "A[]<> p.Done",
             "a query has one path quantifier, at its start: A[], A<>, E[] or E<>",
