@@ -12,13 +12,11 @@ import math
 import os
 import random
 import struct
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from mcap.records import Attachment, Channel, DataEnd, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Message, Metadata
 from mcap.writer import CompressionType, Writer
 
 from ntagen.cli import main
@@ -37,6 +35,7 @@ from ntagen.tracking.points import Points, pair, read_points
 from ntagen.tracking.registration import register
 from ntagen.tracking.transform_file import read_transform
 from tests.damage import SEED, Read, check_files, damaged, is_read
+from tests.logs import repacked
 
 ROOT = Path(__file__).parents[2]
 FILES = int(os.environ.get("NTAGEN_FILES", "60"))
@@ -159,31 +158,6 @@ def test_damaged_calibrations_are_read_or_refused(
 
 
 # Logs and bags.
-
-
-def repacked(data: bytes, compression: CompressionType, change: Callable[[Any], Any]) -> bytes:
-    """A log written anew."""
-    out = io.BytesIO()
-    writer = Writer(out, chunk_size=1 << 14, compression=compression)
-    writer.start()
-    for found in StreamReader(io.BytesIO(data)).records:
-        match item := change(found):
-            case Schema():
-                writer.register_schema(item.name, item.encoding, item.data)
-            case Channel():
-                writer.register_channel(item.topic, item.message_encoding, item.schema_id)
-            case Metadata():
-                writer.add_metadata(item.name, item.metadata)
-            case Attachment():
-                times = (item.create_time, item.log_time)
-                writer.add_attachment(*times, item.name, item.media_type, item.data)
-            case Message():
-                times = (item.log_time, item.data, item.publish_time, item.sequence)
-                writer.add_message(item.channel_id, *times)
-            case DataEnd():
-                break
-    writer.finish()
-    return out.getvalue()
 
 
 @pytest.fixture(scope="module")

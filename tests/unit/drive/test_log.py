@@ -20,8 +20,7 @@ from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Chunk, Footer
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
@@ -44,6 +43,7 @@ from ntagen.errors import InputError
 from ntagen.needle.kinematics import bending_axis
 from ntagen.scene import MEASURED_TISSUE, Pose, Scene
 from ntagen.traces.reading import read_samples
+from tests.logs import repacked
 from tests.scenes import poses
 from tests.steering import PAPER, scene
 
@@ -410,27 +410,7 @@ def test_logs_that_were_packed_anew_are_read(tmp_path: Path, compression: Compre
     path = written(tmp_path / "run.mcap")
     expected = read_log(path)
     anew = tmp_path / "anew.mcap"
-    with path.open("rb") as file, anew.open("wb") as out:
-        writer = Writer(out, compression=compression)
-        writer.start()
-        for item in StreamReader(file).records:
-            match item:
-                case Schema():
-                    writer.register_schema(item.name, item.encoding, item.data)
-                case Channel():
-                    writer.register_channel(item.topic, item.message_encoding, item.schema_id)
-                case Metadata():
-                    writer.add_metadata(item.name, item.metadata)
-                case Attachment():
-                    times = (item.create_time, item.log_time)
-                    writer.add_attachment(*times, item.name, item.media_type, item.data)
-                case Message():
-                    writer.add_message(
-                        item.channel_id, item.log_time, item.data, item.publish_time, item.sequence
-                    )
-                case DataEnd():
-                    break
-        writer.finish()
+    anew.write_bytes(repacked(path.read_bytes(), compression, lambda record: record))
     assert read_log(anew) == expected
 
 
