@@ -184,6 +184,14 @@ impl ClockBounds {
             );
         }
         let everywhere = to_ceilings(&summary.bounds(everywhere, is_maximum));
+        // Ceilings hold no greater constants, and where two clocks are compared, none may be less.
+        let is_beyond =
+            abstraction == Abstraction::Differences && summary.greatest > Bound::MAX_VALUE;
+        let abstraction = if is_beyond {
+            Abstraction::Exact
+        } else {
+            abstraction
+        };
         let classes = ceilings.iter().zip(&tracked).enumerate();
         let classes =
             classes.filter_map(|(process, (nodes, tracked))| Classes::new(process, nodes, tracked));
@@ -197,7 +205,9 @@ impl ClockBounds {
             greatest: summary.greatest,
             has_differences: network.features.diagonals
                 || atoms.iter().any(ClockAtom::is_difference),
-            has_opposed_clocks: summary.has_opposed_clocks,
+            // Demands have room for no greater constants.
+            has_opposed_clocks: summary.has_opposed_clocks
+                && summary.greatest <= Bound::NARROW_VALUE,
         }
     }
 
@@ -463,12 +473,14 @@ fn spread(bounds: &mut [(i32, i32)], copy: &ClockAssignment) -> bool {
 fn spread_to_limit(bounds: &mut [(i32, i32)], copy: &ClockAssignment) -> bool {
     let before = bounds.to_vec();
     spread(bounds, copy);
+    let is_narrow = |(lower, upper): &(i32, i32)| *lower.max(upper) <= Bound::NARROW_VALUE;
+    let most = if before.iter().all(is_narrow) {
+        Bound::NARROW_VALUE
+    } else {
+        Bound::MAX_VALUE
+    };
     let limit = |old: i32, new: i32| {
-        if new > old {
-            Bound::MAX_VALUE.max(old)
-        } else {
-            old
-        }
+        if new > old { most.max(old) } else { old }
     };
     for (bound, old) in bounds.iter_mut().zip(&before) {
         *bound = (limit(old.0, bound.0), limit(old.1, bound.1));

@@ -153,6 +153,22 @@ pub fn greatest_reset(network: &Network) -> i32 {
     constants.chain(initial).max().unwrap_or(0).max(0)
 }
 
+/// A value that no constant exceeds with which clocks are compared or to which they are set.
+pub fn greatest_constant(network: &Network) -> i32 {
+    let guards = network.processes.iter().flat_map(|process| {
+        let edges = process.edges.iter().map(|edge| &edge.guard);
+        edges.chain(process.locations.iter().map(|location| &location.invariant))
+    });
+    let atoms = guards.flat_map(|guard| &guard.atoms);
+    let greatest = atoms.map(greatest_in_atom).max().unwrap_or(0);
+    greatest.saturating_add(greatest_reset(network))
+}
+
+/// The greatest absolute value of the constants of a comparison.
+pub fn greatest_in_atom(atom: &ClockAtom) -> i32 {
+    atom.low.saturating_abs().max(atom.high.saturating_abs())
+}
+
 /// Adds the comparisons that an atom stands for, if it is one of two clocks; `None` if there are
 /// too many.
 fn collect(atom: &ClockAtom, into: &mut BTreeSet<Difference>) -> Option<()> {

@@ -216,8 +216,7 @@ impl LimitWatch {
 }
 
 /// What becomes of a search in zones whose bounds are too great.
-pub(crate) const CLOCKS_GREW: &str =
-    "differences of clocks grow beyond what zones can hold: no abstraction keeps them small here";
+pub(crate) const CLOCKS_GREW: &str = "clocks, or differences of them, grow beyond what zones can hold: no abstraction keeps them small";
 
 /// What is said where there are more states than numbers for them.
 pub(crate) const OUT_OF_STATES: &str = "there are more than 4,294,967,295 states or moves between them, as many as a search has numbers for";

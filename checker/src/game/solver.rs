@@ -176,6 +176,7 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
                 return Ok(Solution::Stopped(reason));
             }
         }
+        self.graph.symbolic.check_differences()?;
         Ok(Solution::Won(self.winner(extent)))
     }
 

@@ -18,9 +18,8 @@ use crate::builtins::Code;
 pub use crate::builtins::{Distribution, MathFunction, STREAM_WORDS, Stream};
 
 /// The greatest absolute value of a clock bound and of a value that a clock is set to; beyond it is
-/// a [`RunTimeErrorKind::ClockValue`]. The limit of zones, whose operations add several bounds
-/// before they check.
-pub const CLOCK_LIMIT: i32 = (1 << 27) - 1;
+/// a [`RunTimeErrorKind::ClockValue`]. The limit of zones and of UPPAAL.
+pub const CLOCK_LIMIT: i32 = (1 << 30) - 1;
 
 /// Index of a virtual register in its function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -22,7 +22,7 @@
 
 use super::dbm::{Constraint, constrain, least_sum, upper_bounds};
 use super::rows::{for_small_dimension, rows, rows_mut, with_row};
-use super::{Bound, ClockSet};
+use super::{Bound, ClockSet, wide};
 
 /// Up to this number of upper bounds, each clock looks at them one by one. If there are more, they
 /// are written into a row with one bound for each clock.
@@ -74,7 +74,7 @@ pub fn up_within(zone: &mut [Bound], dimension: usize, constraints: &[Constraint
     if count <= FEW_BOUNDS {
         for row in rows_mut(zone, dimension).skip(1) {
             let upper = constraints.iter().filter(is_upper);
-            let sums = upper.map(|one| row[one.left].plus(one.bound));
+            let sums = upper.map(|one| row[one.left].noted_sum(one.bound));
             row[0] = sums.fold(Bound::INFINITY, Bound::min);
         }
         return;
@@ -156,9 +156,9 @@ pub fn down_stopped(zone: &mut [Bound], dimension: usize, stopped: &ClockSet) {
     for right in (1..dimension).filter(|clock| is_running(*clock)) {
         let delay = column_least(zone, right);
         for left in (0..dimension).filter(|clock| !is_running(*clock)) {
-            let crossed = zone[left * dimension] + delay;
+            let crossed = zone[left * dimension].noted_sum(delay);
             let bound = &mut zone[left * dimension + right];
-            *bound = (*bound + longest_delay).min(crossed);
+            *bound = bound.noted_sum(longest_delay).min(crossed);
         }
     }
 }
@@ -184,6 +184,7 @@ pub fn reset(zone: &mut [Bound], dimension: usize, clock: usize, value: i32) {
         zone[start + clock] = Bound::LE_ZERO;
         return;
     }
+    wide::admit(value);
     zone[start..start + dimension]
         .iter_mut()
         .for_each(|bound| *bound = bound.shifted(value));
@@ -244,7 +245,8 @@ pub fn shift(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32)
 /// Drops the valuations in which `clock + increment` is negative; returns whether something is
 /// left.
 fn keep_from(zone: &mut [Bound], dimension: usize, clock: usize, increment: i32) -> bool {
-    increment >= 0 || constrain(zone, dimension, 0, clock, Bound(2 * increment + 1))
+    wide::admit(increment);
+    increment >= 0 || constrain(zone, dimension, 0, clock, Bound::le(increment))
 }
 
 /// Carries out the assignments in order; returns whether something is left.
@@ -302,8 +304,9 @@ fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bo
         } => (clock, source, increment),
         Assignment::Value { clock, value } => (clock, 0, value),
     };
-    let is_reachable = constrain(zone, dimension, clock, source, Bound(2 * increment + 1))
-        && constrain(zone, dimension, source, clock, Bound(1 - 2 * increment));
+    wide::admit(increment);
+    let is_reachable = constrain(zone, dimension, clock, source, Bound::le(increment))
+        && constrain(zone, dimension, source, clock, Bound::le(-increment));
     if is_reachable {
         free_clock(zone, dimension, clock);
     }

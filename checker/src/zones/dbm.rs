@@ -31,7 +31,7 @@ use std::cmp::Ordering;
 use crate::cancellation;
 
 use super::rows::{for_small_dimension, relax_row, rows_mut, with_row};
-use super::{Bound, ClockSet};
+use super::{Bound, ClockSet, wide};
 
 /// How two zones of the same dimension relate to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,14 +87,14 @@ pub fn is_empty(zone: &[Bound]) -> bool {
     zone[0] < Bound::LE_ZERO
 }
 
-/// Whether the constants of all bounds have an absolute value of at most `most`; see
-/// [`Bound::most_in_zone`].
+/// Whether sums can be formed: either they have 64 bits, or the constants of all bounds have an
+/// absolute value of at most `most`, see [`Bound::most_in_zone`].
 ///
 /// Bounds exceed the constants of a model only if they grow over many steps without extrapolation.
 pub fn is_in_range(zone: &[Bound], most: i32) -> bool {
-    let (least, most) = (-2 * most, 2 * most + 1);
-    zone.iter()
-        .all(|bound| bound.is_infinite() || (least..=most).contains(&bound.0))
+    let range = Bound::lt(-most)..=Bound::le(most);
+    let mut bounds = zone.iter();
+    bounds.all(|bound| bound.is_infinite() || range.contains(bound)) || wide::is_on()
 }
 
 /// Closes any matrix with a diagonal of `<= 0` (Floyd–Warshall); returns whether it is consistent,
@@ -187,6 +187,10 @@ fn tighten(zone: &mut [Bound], left: usize, right: usize, bound: Bound, dimensio
     let (source, after) = rest.split_at_mut(dimension);
     let relax = |target: &mut [Bound]| {
         let via = target[left] + bound;
+        let is_lost = via.is_infinite() && target[left].is_finite() && target[right].is_infinite();
+        if is_lost || via == Bound::TIGHTEST {
+            wide::note();
+        }
         if via < target[right] {
             relax_row(target, via, source);
         }
@@ -269,6 +273,9 @@ pub(super) fn upper_bounds<'b>(constraints: &[Constraint], bounds: &'b mut [Boun
 /// itself is `<= 0`.
 #[inline(always)]
 pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
+    if wide::is_on() {
+        return least_sum_in_64_bits(row, upper_bounds);
+    }
     let length = row.len().min(upper_bounds.len());
     let (row, upper_bounds) = (&row[..length], &upper_bounds[..length]);
     let (Some(last), Some(last_bounds)) = (row.last_chunk::<4>(), upper_bounds.last_chunk::<4>())
@@ -286,6 +293,17 @@ pub(super) fn least_sum(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
         least = std::array::from_fn(|lane| least[lane].lesser(sums[lane]));
     }
     least.into_iter().fold(Bound::INFINITY, Bound::lesser)
+}
+
+#[cold]
+#[inline(never)]
+fn least_sum_in_64_bits(row: &[Bound], upper_bounds: &[Bound]) -> Bound {
+    let pairs = row.iter().zip(upper_bounds);
+    let finite = pairs.filter(|(difference, bound)| difference.is_finite() && bound.is_finite());
+    let least = finite
+        .map(|(difference, bound)| difference.wide_sum(*bound))
+        .min();
+    least.map_or(Bound::INFINITY, Bound::fitted)
 }
 
 #[inline(always)]

@@ -122,7 +122,7 @@ impl Ceilings {
     /// [`Bound::MAX_VALUE`] counts as that value.
     pub fn admit_lower(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
-            let row = Bound(2 * constant.min(Bound::MAX_VALUE) + 1);
+            let row = Bound::le(constant.min(Bound::MAX_VALUE));
             self.rows[clock] = self.rows[clock].max(row);
         }
     }
@@ -131,7 +131,7 @@ impl Ceilings {
     /// [`Ceilings::admit_lower`].
     pub fn admit_upper(&mut self, clock: usize, constant: i32) {
         if constant >= 0 {
-            let column = Bound(-2 * constant.min(Bound::MAX_VALUE));
+            let column = Bound::lt(-constant.min(Bound::MAX_VALUE));
             self.columns[clock] = self.columns[clock].min(column);
         }
     }
@@ -175,7 +175,6 @@ impl Ceilings {
     /// The same with M, the greater of L and U, for both.
     #[must_use]
     pub fn to_maximal(&self) -> Ceilings {
-        let flipped = |bound: &Bound| Bound(1_i32.saturating_sub(bound.0));
         let mut maximal = self.clone();
         maximal.raise(&Ceilings {
             rows: self
@@ -185,11 +184,21 @@ impl Ceilings {
                     if column.is_infinite() {
                         Bound(i32::MIN)
                     } else {
-                        flipped(column)
+                        column.negated()
                     }
                 })
                 .collect(),
-            columns: self.rows.iter().map(flipped).collect(),
+            columns: self
+                .rows
+                .iter()
+                .map(|row| {
+                    if row.0 == i32::MIN {
+                        Bound::INFINITY
+                    } else {
+                        row.negated()
+                    }
+                })
+                .collect(),
         });
         maximal
     }
@@ -204,7 +213,7 @@ impl Ceilings {
     /// Whether the clock is certainly above L, given its entry in row 0.
     #[inline]
     fn is_above_lower(&self, clock: usize, entry: Bound) -> bool {
-        entry.0 < 1_i32.saturating_sub(self.rows[clock].0)
+        entry < self.rows[clock].negated()
     }
 
     /// `<= L` of each clock; below every bound if there is no L.
@@ -224,7 +233,7 @@ impl Ceilings {
 /// the entry (0, x).
 #[inline]
 pub(super) fn forgotten_from(limit: Bound, lower: Bound) -> Bound {
-    Bound((limit.0 + lower.0) & !1)
+    Bound((limit.0 + 2 + lower.0) & !1)
 }
 
 /// Extrapolates further than `Extra_LU+`, but stays within `aLU`. With the ceilings of

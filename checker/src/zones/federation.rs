@@ -433,7 +433,7 @@ impl Federation {
             let lower = Constraint {
                 left: 0,
                 right: left,
-                bound: Bound(2 - bound.raw()),
+                bound: Bound::le(-bound.value()),
             };
             let upper = Constraint { left, right, bound };
             if dbm::constrain_all(&mut face, dimension, &[upper, lower]) {
@@ -619,9 +619,9 @@ fn join(hull: &mut [Bound], zone: &[Bound], other: &[Bound], dimension: usize) -
         let row = &hull[left * dimension..(left + 1) * dimension];
         exceeded(hull, other, dimension).all(|(other_left, other_right)| {
             let other_beyond = other[other_left * dimension + other_right].negated();
-            let there = row[other_right].plus(other_beyond);
-            let back = hull[other_left * dimension + right].plus(beyond);
-            there.plus(back) < Bound::LE_ZERO
+            let there = row[other_right] + other_beyond;
+            let back = hull[other_left * dimension + right] + beyond;
+            there + back < Bound::LE_ZERO
         })
     };
     exceeded(hull, zone, dimension).all(|(left, right)| is_covered_beyond(left, right))

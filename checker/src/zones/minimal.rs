@@ -22,12 +22,13 @@ use crate::cancellation;
 
 use super::dbm::Constraint;
 use super::rows::{relax_row, rows, with_row};
-use super::{Bound, ClockSet};
+use super::{Bound, ClockSet, wide};
 
 /// Calls `visit` with the minimal constraints of a zone that is not empty, row by row.
 pub fn for_each_minimal(zone: &[Bound], dimension: usize, visit: impl FnMut(Constraint)) {
     with_row(dimension, |detours| {
-        visit_minimal(zone, dimension, detours, visit);
+        // Detours that are too long are none.
+        wide::unnoticed(|| visit_minimal(zone, dimension, detours, visit));
     });
 }
 
@@ -40,6 +41,9 @@ fn visit_minimal(
 ) {
     let representatives = representatives(zone, dimension);
     let has_ties = representatives.len() < dimension;
+    if has_ties && wide::is_on() && !follow_from(zone, dimension, &representatives) {
+        return visit_all(zone, dimension, visit);
+    }
     for (left, row) in rows(zone, dimension).enumerate() {
         let is_representative = representatives.contains(left);
         let successor = if has_ties {
@@ -60,6 +64,38 @@ fn visit_minimal(
             if (is_needed || successor == Some(right))
                 && (left != 0 || !is_implied_by_sign(zone, dimension, right))
             {
+                visit(Constraint { left, right, bound });
+            }
+        }
+    }
+}
+
+/// Whether the bounds of all clocks follow from those of the representatives. They do in a closed
+/// matrix, but bounds beyond what can be held may be missing (see [`wide`]).
+fn follow_from(zone: &[Bound], dimension: usize, representatives: &ClockSet) -> bool {
+    let bound = |left: usize, right: usize| zone[left * dimension + right];
+    let tied = |clock: usize| {
+        let mut others = representatives.iter();
+        let own = others.find(|&other| other == clock || are_tied(zone, dimension, other, clock));
+        own.unwrap_or(clock)
+    };
+    (0..dimension).all(|clock| {
+        let own = tied(clock);
+        own == clock
+            || (0..dimension).filter(|&other| other != clock).all(|other| {
+                let beyond = bound(clock, own) + bound(own, other);
+                let before = bound(other, own) + bound(own, clock);
+                bound(clock, other) == beyond && bound(other, clock) == before
+            })
+    })
+}
+
+/// Calls `visit` with all constraints of a zone.
+fn visit_all(zone: &[Bound], dimension: usize, mut visit: impl FnMut(Constraint)) {
+    for (left, row) in rows(zone, dimension).enumerate() {
+        for (right, &bound) in row.iter().enumerate() {
+            let is_sign = left == 0 && bound == Bound::LE_ZERO;
+            if left != right && bound.is_finite() && !is_sign {
                 visit(Constraint { left, right, bound });
             }
         }
@@ -96,7 +132,7 @@ fn are_tied(zone: &[Bound], dimension: usize, left: usize, right: usize) -> bool
         zone[left * dimension + right],
         zone[right * dimension + left],
     );
-    forth.is_finite() && !forth.is_strict() && back.raw() == 2_i32.saturating_sub(forth.raw())
+    forth.is_finite() && !forth.is_strict() && back == Bound::le(-forth.value())
 }
 
 /// The least clock of each class of tied clocks.

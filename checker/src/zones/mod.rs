@@ -5,6 +5,7 @@
 //! reference clock, whose value is always 0; a zone of *dimension* n describes the n - 1 clocks
 //! 1..n. These are the modules in reading order:
 //!
+//! * [`wide`]: whether sums of bounds need 64 bits;
 //! * [`bound`]: one bound `x - y < c` or `x - y <= c` in an `i32`;
 //! * [`clock_set`]: a set of clocks as a bit set;
 //! * `rows`: the innermost loops;
@@ -28,6 +29,7 @@
 pub mod bound;
 pub mod clock_set;
 mod rows;
+pub mod wide;
 
 pub mod dbm;
 

@@ -9,7 +9,7 @@
     reason = "the dimension is a constant at some calls"
 )]
 
-use super::Bound;
+use super::{Bound, wide};
 
 /// Calls a function with the dimension as its last argument. For small dimensions the argument is a
 /// constant.
@@ -77,6 +77,10 @@ pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
     if via.is_infinite() {
         return;
     }
+    if wide::is_on() {
+        relax_row_in_64_bits(target, via, source);
+        return;
+    }
     let length = target.len().min(source.len());
     let (target, source) = (&mut target[..length], &source[..length]);
     let Some(tail) = last_relaxed(target, via, source) else {
@@ -94,6 +98,19 @@ pub(super) fn relax_row(target: &mut [Bound], via: Bound, source: &[Bound]) {
         && let Some(entries) = target.last_chunk_mut::<4>()
     {
         *entries = tail;
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn relax_row_in_64_bits(target: &mut [Bound], via: Bound, source: &[Bound]) {
+    for (entry, rest) in target.iter_mut().zip(source) {
+        if rest.is_finite() {
+            let encoded = via.wide_sum(*rest);
+            if encoded < i64::from(entry.raw()) || entry.is_infinite() {
+                *entry = Bound::fitted(encoded);
+            }
+        }
     }
 }
 

@@ -151,9 +151,9 @@ fn what_does_not_fit_is_refused_with_its_place() {
         ),
         (
             "/states/0/decisions/0/zones/1/0",
-            json!("x < 999999999"),
+            json!("x < 1999999999"),
             "states[0].decisions[0].zones[1][0]",
-            "999999999 is too large for a zone",
+            "1999999999 is too large for a zone",
         ),
         (
             "/states/0/decisions/0/action",

@@ -9,6 +9,7 @@ mod checks;
 #[path = "../common/corpus.rs"]
 #[allow(dead_code, reason = "this program reads some of the files only")]
 mod corpus;
+mod great_constants;
 mod great_differences;
 mod interrupts;
 mod live_variables;
@@ -16,6 +17,8 @@ mod long_chains;
 mod numbers;
 mod option_sets;
 mod partial_order;
+#[path = "../common/process.rs"]
+mod process;
 #[path = "../common/random.rs"]
 mod random;
 mod random_queries;

@@ -150,6 +150,12 @@ pub(crate) fn regions_for(
     regions(model, i64::from(constant), has_differences, tally).transpose()
 }
 
+/// Whether the engine gave up since differences of clocks grew too great.
+pub(crate) fn has_grown(answer: &Result<Answer, Rejection>) -> bool {
+    let verdict = answer.as_ref().map(|one| one.verdict);
+    verdict.is_ok_and(|verdict| verdict == Verdict::Unknown(StopReason::Clocks))
+}
+
 /// Compares an answer of the engine with what brute force says.
 pub(crate) fn check(
     answer: &Result<Answer, Rejection>,

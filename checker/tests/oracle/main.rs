@@ -21,6 +21,8 @@ mod generate;
 mod legs;
 mod mutations;
 mod observed;
+#[path = "../common/process.rs"]
+mod process;
 #[path = "../common/random.rs"]
 #[expect(dead_code, reason = "networks are made by proptest here")]
 mod random;

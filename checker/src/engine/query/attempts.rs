@@ -4,6 +4,7 @@
 use crate::analysis::Abstraction;
 use crate::game::Nodes;
 use crate::game::backward::budget::Budget;
+use crate::zones::wide;
 
 /// The first result that is of use. The last attempt always counts.
 ///
@@ -17,11 +18,13 @@ pub(super) fn first_of_use<A: Copy, T>(
 ) -> T {
     let (&last, others) = attempts.split_last().expect("there is an attempt");
     for &attempt in others {
+        wide::start();
         let mut result = make(attempt);
         if is_of_use(attempt, &mut result) {
             return result;
         }
     }
+    wide::start();
     make(last)
 }
 

@@ -12,7 +12,7 @@ use crate::network::symbolic::predicate;
 use crate::network::{Failure, Symmetry};
 use crate::search::limits::StopReason;
 use crate::search::optimum::extremum::Question;
-use crate::zones::Bound;
+use crate::zones::{Bound, wide};
 
 use super::extremum::extremum;
 use super::liveness::{always, leads_to};
@@ -71,6 +71,7 @@ impl LoadedModel {
 /// Answers a query that [`crate::engine::LoadedModel`] has accepted.
 fn answer(subject: Subject<'_>, query: &Query) -> Answer {
     let options = subject.options;
+    wide::start();
     let start = Instant::now();
     let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
     let at_hand_bytes = (zones_in_use(&query.kind) * zone_bytes) as u64;

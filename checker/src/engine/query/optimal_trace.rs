@@ -1,7 +1,8 @@
 //! Traces to a state that are the best: with the fewest moves, or in the least time.
 
 use crate::analysis::Abstraction;
-use crate::ir::{ClockAtom, ClockId, ClockRange, Predicate};
+use crate::analysis::clock_differences::greatest_constant;
+use crate::ir::{ClockAtom, ClockId, ClockRange, Network, Predicate};
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first;
@@ -58,7 +59,7 @@ pub(super) fn best(
                 network: &timed,
                 ..subject
             };
-            atoms.push(time_atom(clock));
+            atoms.push(time_atom(subject.network, clock));
             let mut zones = symbolic(subject, &[predicate], &atoms, Abstraction::LowerUpper);
             let measure = best_first::Measure::Time(clock);
             let mut search = best_first::BestFirst::new(&mut zones, &*target, measure, none);
@@ -78,8 +79,10 @@ pub(super) fn best(
     }
 }
 
-/// A comparison that keeps the lower bounds of the clock apart.
-fn time_atom(clock: usize) -> ClockAtom {
+/// A comparison that keeps the lower bounds of the clock apart, up to the longest time for which
+/// there are bounds.
+fn time_atom(network: &Network, clock: usize) -> ClockAtom {
+    let longest = Bound::reach(greatest_constant(network));
     let range = |clock: usize| ClockRange {
         first: ClockId(clock as u32),
         count: 1,
@@ -87,11 +90,8 @@ fn time_atom(clock: usize) -> ClockAtom {
     ClockAtom {
         left: range(clock),
         right: range(0),
-        low: LONGEST_TIME,
-        high: LONGEST_TIME,
+        low: longest,
+        high: longest,
         strict: false,
     }
 }
-
-/// Up to here times of traces are compared.
-const LONGEST_TIME: i32 = Bound::MAX_VALUE / 4;

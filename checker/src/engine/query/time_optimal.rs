@@ -19,6 +19,7 @@
 use std::sync::Arc;
 
 use crate::analysis::Abstraction;
+use crate::analysis::clock_differences::greatest_constant;
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::graph::Graph;
 use crate::game::forward::objective::{Deadline, Objective as GameObjective};
@@ -239,14 +240,15 @@ impl ClockedGame<'_, '_> {
                 Nodes::Automatic | Nodes::Symbolic => FIRST_LIMIT,
             };
         }
+        let longest = Bound::reach(greatest_constant(self.subject.network));
         loop {
             let end = self.time_needed(nodes, tried, watch);
             let is_enough = !matches!(end, Ok(RaceEnd::Time(None)));
-            let is_last = self.race.limit.is_some() || tried.limit > Bound::MAX_VALUE / 2;
+            let is_last = self.race.limit.is_some() || tried.limit >= longest;
             if is_enough || is_last {
                 return end;
             }
-            tried.limit *= 2;
+            tried.limit = tried.limit.saturating_mul(2).min(longest);
         }
     }
 

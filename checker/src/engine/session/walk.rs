@@ -15,7 +15,7 @@ use crate::search::optimum::best_first::{BestFirst, Link, Measure, Met};
 use crate::tuning::Tuning;
 use crate::verify;
 use crate::verify::choices::Choices;
-use crate::zones::Zone;
+use crate::zones::{Zone, wide};
 
 use crate::engine::limits::{LimitWatch, Limits};
 use crate::engine::loaded_model::LoadedModel;
@@ -110,6 +110,7 @@ impl LoadedModel {
         };
         let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
         let mut symbolic = Symbolic::new(Stepper::new(network, self.executor()), bounds);
+        wide::start();
         let nothing = &Predicate::Constant(false);
         let most = limits.states.map_or(usize::MAX, |most| most as usize);
         let mut watch = LimitWatch::new(limits);
@@ -142,6 +143,7 @@ impl LoadedModel {
 
 /// The semantics of a network as simulations take it: nothing is extrapolated.
 pub fn symbolic<'a>(network: &'a Network, executor: &'a dyn Executor) -> Symbolic<'a> {
+    wide::start();
     let bounds = ClockBounds::new(network, &[], Abstraction::Exact, Tuning::default());
     Symbolic::new(Stepper::new(network, executor), bounds)
 }

@@ -134,6 +134,7 @@ impl Solver<'_, '_, '_> {
             }
             let batch = sweep.next_batch();
             if batch.is_empty() {
+                self.graph.symbolic.check_differences()?;
                 return Ok(None);
             }
             let mut tasks = Vec::new();

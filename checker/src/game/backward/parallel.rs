@@ -14,6 +14,7 @@ use std::time::Duration;
 use crate::cancellation::{self, Cut, Look};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::federation::block_bytes;
+use crate::zones::wide;
 
 use super::predecessors::Situation;
 use super::winning_sets::Gained;
@@ -214,7 +215,7 @@ impl Solver<'_, '_, '_> {
                     let work = move || {
                         // The thread reports its end also when its work is cut off.
                         let _over = over;
-                        self.work(tasks, progress, index)
+                        (self.work(tasks, progress, index), wide::has_forgotten())
                     };
                     // A thread that cannot be started is not needed: the others do its tasks.
                     let thread = thread::Builder::new().stack_size(STACK_BYTES);
@@ -229,7 +230,12 @@ impl Solver<'_, '_, '_> {
             }
             for helper in helpers {
                 match helper.join() {
-                    Ok(more) => done.extend(more),
+                    Ok((more, has_forgotten)) => {
+                        done.extend(more);
+                        if has_forgotten {
+                            wide::note();
+                        }
+                    }
                     Err(panic) => panic::resume_unwind(panic),
                 }
             }

@@ -16,7 +16,7 @@ use crate::exec::EmittedConstraint;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
-use crate::zones::{Bound, ClockSet, Federation, Zone, simulation};
+use crate::zones::{Bound, ClockSet, Federation, Zone, simulation, wide};
 
 use super::clock_effect::{
     ClockEffect, add_constraints, check_limit, to_assignment, to_constraint, to_constraints,
@@ -419,7 +419,20 @@ impl<'a> Symbolic<'a> {
         }
         match self.range {
             Some(most) if !dbm::is_in_range(zone, most) => Err(Failure::ClockRange),
-            _ => Ok(()),
+            _ => self.check_differences(),
+        }
+    }
+
+    /// What zones say is right, although this thread may have lost bounds beyond what zones can
+    /// hold: no comparison of a single clock can tell.
+    ///
+    /// # Errors
+    /// Clocks are compared with each other.
+    pub fn check_differences(&self) -> Result<(), Failure> {
+        if self.bounds.has_differences() && wide::has_forgotten() {
+            Err(Failure::ClockRange)
+        } else {
+            Ok(())
         }
     }
 

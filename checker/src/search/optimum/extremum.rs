@@ -26,7 +26,7 @@ use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Network, P
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::clocks::Assignment;
-use crate::zones::{Bound, Zone, clocks, dbm};
+use crate::zones::{Bound, Zone, clocks, dbm, wide};
 
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::outcome::{Outcome, Trace};
@@ -145,18 +145,11 @@ pub fn search<'a>(
 
 /// A value that no comparison of the model or the query exceeds.
 fn greatest_constant(network: &Network, question: &Question<'_>) -> i32 {
-    let guards = network.processes.iter().flat_map(|process| {
-        let edges = process.edges.iter().map(|edge| &edge.guard);
-        edges.chain(process.locations.iter().map(|location| &location.invariant))
-    });
-    let atoms = guards.flat_map(|guard| guard.atoms.iter().cloned());
-    let all = atoms
-        .chain(predicate::atoms(question.predicate))
-        .chain(question.further.iter().cloned());
-    let greatest = all.map(|atom| atom.low.saturating_abs().max(atom.high.saturating_abs()));
-    let greatest = greatest.max().unwrap_or(0);
-    let reset = clock_differences::greatest_reset(network);
-    greatest.saturating_add(reset).min(Bound::MAX_VALUE / 4)
+    let asked = predicate::atoms(question.predicate);
+    let asked = asked.iter().chain(question.further);
+    let asked = asked.map(clock_differences::greatest_in_atom);
+    let greatest = clock_differences::greatest_constant(network).max(asked.max().unwrap_or(0));
+    greatest.min(Bound::reach(greatest) - 1)
 }
 
 /// An item of the question, while it is measured.
@@ -249,7 +242,7 @@ impl<'q> Measuring<'q> {
     fn atoms_without_ceiling(&self) -> Vec<ClockAtom> {
         let mut items = self.items.clone();
         if let Some(index) = self.exceeding {
-            items[index].high_ceiling = Bound::MAX_VALUE / 2;
+            items[index].high_ceiling = Bound::reach(self.greatest_constant);
         }
         let measuring = Measuring { items, ..*self };
         measuring.atoms(false)
@@ -283,7 +276,7 @@ impl<'q> Measuring<'q> {
     fn raise_low(&mut self) -> Result<(), Failure> {
         for item in &mut self.items {
             if item.least.is_some_and(|least| least.0 >= item.low_ceiling) {
-                item.low_ceiling = doubled(item.low_ceiling)?;
+                item.low_ceiling = doubled(item.low_ceiling, self.greatest_constant)?;
             }
         }
         Ok(())
@@ -308,11 +301,15 @@ impl<'q> Measuring<'q> {
             predicate: self.question.predicate,
         };
         let is_infinite = counting.zones().any(is_unbounded) || pump.is_on(symbolic, trace)?;
+        if is_infinite && wide::has_forgotten() {
+            // The bound may only be greater than zones can say.
+            return Err(Failure::ClockRange);
+        }
         let item = &mut self.items[index];
         if is_infinite {
             item.is_infinite = true;
         } else {
-            item.high_ceiling = doubled(item.high_ceiling)?;
+            item.high_ceiling = doubled(item.high_ceiling, self.greatest_constant)?;
         }
         Ok(())
     }
@@ -436,9 +433,9 @@ impl SharedGoal for Measuring<'_> {
     }
 }
 
-fn doubled(ceiling: i32) -> Result<i32, Failure> {
+fn doubled(ceiling: i32, greatest_constant: i32) -> Result<i32, Failure> {
     let doubled = ceiling.saturating_mul(2);
-    if doubled > Bound::MAX_VALUE / 2 {
+    if doubled > Bound::reach(greatest_constant) {
         return Err(Failure::ClockLimit(doubled));
     }
     Ok(doubled)

@@ -52,12 +52,15 @@ enum Comparison {
     Above,
 }
 
-/// A bound packed into `N` bytes; the greatest value stands for infinity, the least for no demand.
+/// A bound packed into `N` bytes; the greatest value stands for infinity.
 trait Entry<const N: usize>: Copy + Ord {
     const INFINITY: Self;
 
-    /// The least value.
+    /// The least bound that fits.
     const LEAST: Self;
+
+    /// Stands for no demand.
+    const NO_DEMAND: Self;
 
     /// The lower bits of an encoded bound.
     fn truncated(raw: i32) -> Self;
@@ -71,10 +74,11 @@ trait Entry<const N: usize>: Copy + Ord {
 }
 
 macro_rules! entry {
-    ($type:ty, $bytes:literal) => {
+    ($type:ty, $bytes:literal, $least:expr, $no_demand:expr) => {
         impl Entry<$bytes> for $type {
             const INFINITY: $type = <$type>::MAX;
-            const LEAST: $type = <$type>::MIN;
+            const LEAST: $type = $least;
+            const NO_DEMAND: $type = $no_demand;
 
             #[inline]
             fn truncated(raw: i32) -> $type {
@@ -98,21 +102,22 @@ macro_rules! entry {
         }
     };
 }
-entry!(i8, 1);
-entry!(i16, 2);
-entry!(i32, 4);
+entry!(i8, 1, i8::MIN + 1, i8::MIN);
+entry!(i16, 2, i16::MIN + 1, i16::MIN);
+entry!(i32, 4, i32::MIN, NO_DEMAND.raw());
 
 /// Packs a zone; returns whether all bounds fit.
 fn pack<T: Entry<N>, const N: usize>(zone: &[Bound], target: &mut [u8]) -> bool {
     let (least, infinity) = (T::LEAST.raw(), T::INFINITY.raw());
+    let no_demand = T::NO_DEMAND.raw();
     let mut lost = 0;
     for (bytes, bound) in target.as_chunks_mut::<N>().0.iter_mut().zip(zone) {
         let raw = bound.raw();
         let is_no_demand = -i32::from(raw == NO_DEMAND.raw());
-        let is_lost = raw <= least || raw >= infinity && raw != i32::MAX;
+        let is_lost = raw < least || raw >= infinity && raw != i32::MAX;
         lost |= i32::from(is_lost) & !is_no_demand;
         let fitting = raw.clamp(least, infinity);
-        *bytes = T::truncated(fitting & !is_no_demand | least & is_no_demand).to_bytes();
+        *bytes = T::truncated(fitting & !is_no_demand | no_demand & is_no_demand).to_bytes();
     }
     lost == 0
 }
@@ -122,7 +127,7 @@ fn unpack<T: Entry<N>, const N: usize>(bytes: &[u8], zone: &mut [Bound]) {
         let entry = T::of_bytes(*bytes);
         *bound = if entry == T::INFINITY {
             Bound::INFINITY
-        } else if entry == T::LEAST {
+        } else if entry == T::NO_DEMAND {
             NO_DEMAND
         } else {
             Bound::from_raw(entry.raw())
@@ -441,8 +446,8 @@ fn widened<T: Entry<N>, W: Entry<M>, const N: usize, const M: usize>(
         let entry = T::of_bytes(*bytes);
         if entry == T::INFINITY {
             W::INFINITY.to_bytes()
-        } else if entry == T::LEAST {
-            W::LEAST.to_bytes()
+        } else if entry == T::NO_DEMAND {
+            W::NO_DEMAND.to_bytes()
         } else {
             W::truncated(entry.raw()).to_bytes()
         }
@@ -640,6 +645,7 @@ mod tests {
     #[test]
     fn every_bound_near_the_end_of_a_width_is_told_from_infinity() {
         for raw in [
+            i32::MIN,
             i32::MIN + 1,
             NO_DEMAND.raw(),
             -32_769,

@@ -53,12 +53,12 @@ fn weight(block: usize, is_weighted: bool) -> i32 {
 }
 
 /// The weighted sums of every eighth bound of a period. A bound counts from the negated greatest
-/// one on, and up to one more than that.
+/// one on less one, and up to the greatest.
 fn sums(matrix: &[Bound], greatest: i32, period: Period) -> [i32; 8] {
     let mut sums = [0; 8];
     let mut add = |bounds: &[Bound], index| {
         for (sum, bound) in sums.iter_mut().zip(bounds) {
-            *sum += weight(index, period.is_weighted) * bound.raw().clamp(-greatest, greatest + 1);
+            *sum += weight(index, period.is_weighted) * bound.raw().clamp(-greatest - 1, greatest);
         }
     };
     for row in matrix.chunks_exact(period.length) {
@@ -77,7 +77,7 @@ fn narrow_sums(matrix: &[i16], greatest: i16, period: Period) -> [i32; 8] {
     let mut add = |entries: &[i16], index| {
         let weight = weight(index, period.is_weighted) as i16;
         for (sum, entry) in sums.iter_mut().zip(entries) {
-            *sum += weight * (*entry).clamp(-greatest, greatest + 1);
+            *sum += weight * (*entry).clamp(-greatest - 1, greatest);
         }
     };
     for row in matrix.chunks_exact(period.length) {
@@ -109,7 +109,7 @@ pub(super) fn widen_narrow(matrix: &[u8], limits: &[Bound], dimension: usize, ta
     {
         let limit = limit.raw().clamp(NONE.into(), -i32::from(NONE) - 1) as i16;
         for (entry, lower) in row.iter_mut().zip(&*lower_bounds) {
-            *entry = (*entry).min((limit + lower) & !1);
+            *entry = (*entry).min((limit + 2 + lower) & !1);
         }
     }
 }
@@ -120,7 +120,7 @@ pub(super) struct Signatures {
     /// The number of successive bounds after which the numbers start again with the first one, and
     /// whether bounds have weights.
     period: Period,
-    /// The greatest encoded bound that signatures tell from greater ones.
+    /// Encoded bounds from here on look alike.
     greatest: i32,
     /// By number: the sum of the weights of its bounds.
     weights: [i32; 8],
@@ -165,7 +165,7 @@ impl Signatures {
 
     fn scaled(&self, sums: [i32; 8]) -> Signature {
         let number = |lane: usize| {
-            let above_least = sums[lane] + self.greatest * self.weights[lane];
+            let above_least = sums[lane] + (self.greatest + 1) * self.weights[lane];
             ((above_least as u64 * self.scale) >> 32) as u32
         };
         Signature::of(std::array::from_fn(number))

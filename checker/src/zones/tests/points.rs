@@ -15,7 +15,7 @@ use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::{self, Ceilings};
 use crate::zones::{
-    Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past, simulation,
+    Bound, ClockSet, Federation, Relation, Zone, instants, minimal, past, simulation, wide,
 };
 
 /// The greatest constant in generated constraints.
@@ -926,18 +926,40 @@ proptest! {
 }
 
 #[test]
+fn sums_beyond_the_range_are_noticed() {
+    wide::forced::set(false);
+    let mut zone = Zone::universe(2);
+    let most = Bound::most_in_zone(2, false);
+    zone.constrain(1, 0, Bound::weak(Bound::NARROW_VALUE).unwrap());
+    assert!(dbm::is_in_range(zone.bounds(), most));
+    for _ in 0..2 {
+        zone.assign(&[Assignment::Copy {
+            clock: 1,
+            source: 1,
+            increment: Bound::NARROW_VALUE,
+        }]);
+    }
+    assert!(!dbm::is_in_range(zone.bounds(), most));
+}
+
+#[test]
 fn constants_beyond_the_range_are_refused() {
+    wide::forced::set(true);
     assert_eq!(Bound::weak(Bound::MAX_VALUE + 1), None);
     assert_eq!(Bound::strict(i32::MIN), None);
-    let mut zone = Zone::universe(2);
-    zone.constrain(1, 0, Bound::weak(Bound::MAX_VALUE).unwrap());
-    assert!(dbm::is_in_range(zone.bounds(), Bound::MAX_VALUE));
-    zone.assign(&[Assignment::Copy {
+    wide::start();
+    let increase = [Assignment::Copy {
         clock: 1,
         source: 1,
         increment: 1,
-    }]);
-    assert!(!dbm::is_in_range(zone.bounds(), Bound::MAX_VALUE));
+    }];
+    let mut zone = Zone::universe(2);
+    zone.constrain(1, 0, Bound::weak(Bound::MAX_VALUE - 1).unwrap());
+    zone.assign(&increase);
+    assert_eq!(zone.bound(1, 0), Bound::weak(Bound::MAX_VALUE).unwrap());
+    assert!(!wide::has_forgotten());
+    zone.assign(&increase);
+    assert!(zone.bound(1, 0).is_infinite() && wide::has_forgotten());
 }
 
 #[test]
