@@ -8,7 +8,7 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen import _checker
-from ntagen.checker.edges import EdgeEntry, EngineEdge, EnginePlan, EngineStep, step_of
+from ntagen.checker.edges import EdgeTable, EngineEdge, EnginePlan, EngineStep, step_of
 from ntagen.checker.errors import rejecting
 from ntagen.errors import InputError
 from ntagen.values import dataclass
@@ -133,7 +133,7 @@ class Answer:
         self,
         raw: _checker.Answer,
         query: str,
-        edges: list[list[EdgeEntry]],
+        edges: EdgeTable,
         rules: tuple[ForcedRule, PriorityRule],
     ) -> None:
         self._raw = raw

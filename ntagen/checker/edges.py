@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import TYPE_CHECKING
 
 from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from ntagen import _checker
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +53,7 @@ class EdgeEntry:
     targets: list[str]
     selects: list[str]
     sync: str
+    controllable: bool
 
     def taken(self, branch: int, values: list[int]) -> EngineEdge:
         """The edge with this leg of its branch point and these values of its selects."""
@@ -56,9 +61,22 @@ class EdgeEntry:
         return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
 
 
-def step_of(
-    edges: list[list[EdgeEntry]], step: list[tuple[int, int, int, list[int]]]
-) -> EngineStep:
-    """A transition from the numbers of its edges; `edges` are those of the model, by process."""
+class EdgeTable:
+    """The edges of a model, by process. Those of a process are asked for when they are needed."""
+
+    def __init__(self, raw: _checker.Model) -> None:
+        self._raw = raw
+        self._known: dict[int, list[EdgeEntry]] = {}
+
+    def __getitem__(self, process: int) -> list[EdgeEntry]:
+        edges = self._known.get(process)
+        if edges is None:
+            edges = [EdgeEntry(*entry) for entry in self._raw.edges(process)]
+            self._known[process] = edges
+        return edges
+
+
+def step_of(edges: EdgeTable, step: list[tuple[int, int, int, list[int]]]) -> EngineStep:
+    """A transition from the numbers of its edges."""
     taken = (edges[process][edge].taken(branch, values) for process, edge, branch, values in step)
     return EngineStep(tuple(taken))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from ntagen import _checker
 from ntagen.checker.answer import Answer
 from ntagen.checker.constants import Value, written
-from ntagen.checker.edges import EdgeEntry
+from ntagen.checker.edges import EdgeTable
 from ntagen.checker.errors import RejectedError, failing, rejecting
 from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.options import CodeEngine, Options, by_keywords
@@ -57,7 +57,7 @@ class Model:
 
     def __init__(self, raw: _checker.Model) -> None:
         self._raw = raw
-        self._edges: list[list[EdgeEntry]] | None = None
+        self._edges = EdgeTable(raw)
         self._facts: Facts | None = None
 
     @property
@@ -240,9 +240,9 @@ class Model:
             with rejecting():
                 raw = _checker.check(self._raw, query, options)
         except _checker.InterruptedError as interrupted:
-            answer = Answer(interrupted.args[0], query, self._edge_table(), rules)
+            answer = Answer(interrupted.args[0], query, self._edges, rules)
             raise Interrupted(answer) from None
-        return Answer(raw, query, self._edge_table(), rules)
+        return Answer(raw, query, self._edges, rules)
 
     def block_of_runs(self, query: str, first: int, count: int, options: Options) -> bytes:
         """Makes random runs of ``Pr`` or ``E``, for whoever answers the query elsewhere.
@@ -293,9 +293,8 @@ class Model:
         texts = [text for text, _ in queries]
         with rejecting():
             answers = _checker.check_jointly(self._raw, texts, [options for _, options in queries])
-        edges = self._edge_table()
         return [
-            Answer(raw, text, edges, (options.forced, options.priorities))
+            Answer(raw, text, self._edges, (options.forced, options.priorities))
             for raw, (text, options) in zip(answers, queries, strict=True)
         ]
 
@@ -528,7 +527,7 @@ class Model:
                 f"the search was stopped by the {stop} limit; "
                 "raise that limit, or ask for fewer states with `limit`"
             )
-        return symbolic_states(found, self._edge_table())
+        return symbolic_states(found, self._edges)
 
     def state_space(
         self,
@@ -571,7 +570,7 @@ class Model:
             )
         if stop is not None:
             raise LimitError(f"the search was stopped by the {stop} limit\nhint: raise it")
-        return state_space(symbolic_states(found, self._edge_table()), links, self._raw.edges())
+        return state_space(symbolic_states(found, self._edges), links, self._edges)
 
     def walk(self, engine: CodeEngine = "jit") -> Simulation:
         """Starts a symbolic walk through the model from its initial state.
@@ -585,13 +584,7 @@ class Model:
         from ntagen.checker.states import Simulation
 
         with failing():
-            return Simulation(_checker.simulate(self._raw, engine), self._edge_table())
-
-    def _edge_table(self) -> list[list[EdgeEntry]]:
-        if self._edges is None:
-            processes = self._raw.edges()
-            self._edges = [[EdgeEntry(*entry[:5]) for entry in process] for process in processes]
-        return self._edges
+            return Simulation(_checker.simulate(self._raw, engine), self._edges)
 
 
 def load(text: str, path: str = "", *, allow_external: Sequence[str | Path] = ()) -> Model:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from ntagen.checker.edges import EdgeEntry, EngineStep, step_of
+from ntagen.checker.edges import EdgeTable, EngineStep, step_of
 from ntagen.checker.picture.diagram import Diagram, Edge, Location
 from ntagen.checker.picture.page import Svg, kind_of
 from ntagen.checker.picture.svg import draw
@@ -28,9 +28,6 @@ _LINES_OF_VALUES: Final = 6
 
 RawStep = list[tuple[int, int, int, list[int]]]
 """Process, edge, leg and select values of each edge, as the engine gives them."""
-
-RawEdges = Sequence[Sequence[tuple[str, str, list[str], list[str], str, bool]]]
-"""The edges of each process, as the engine gives them; the last entry says who owns it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,16 +115,15 @@ class StateSpace:
 
 
 def state_space(
-    states: Iterator[SymbolicState], links: Sequence[tuple[int, RawStep, int]], edges: RawEdges
+    states: Iterator[SymbolicState], links: Sequence[tuple[int, RawStep, int]], edges: EdgeTable
 ) -> StateSpace:
     """The graph from what the engine has found; `edges` are those of the model."""
-    table = [[EdgeEntry(*entry[:5]) for entry in process] for process in edges]
     moves = (
         Move(
             source,
-            step_of(table, step),
+            step_of(edges, step),
             target,
-            all(edges[process][edge][5] for process, edge, *_ in step),
+            all(edges[process][edge].controllable for process, edge, *_ in step),
         )
         for source, step, target in links
     )

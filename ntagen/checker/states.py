@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from ntagen import _checker
-from ntagen.checker.edges import EdgeEntry, EngineStep, step_of
+from ntagen.checker.edges import EdgeTable, EngineStep, step_of
 from ntagen.checker.errors import failing
 
 ReachedEntry = tuple[
@@ -54,9 +54,7 @@ class SymbolicState:
         return self._bounds
 
 
-def symbolic_states(
-    found: list[ReachedEntry], edges: list[list[EdgeEntry]]
-) -> Iterator[SymbolicState]:
+def symbolic_states(found: list[ReachedEntry], edges: EdgeTable) -> Iterator[SymbolicState]:
     """The states that the engine has reached; `edges` are the model's edges, by process."""
     for index, (discrete, zone, bounds, origin) in enumerate(found):
         raw = json.loads(discrete)
@@ -77,7 +75,7 @@ class Simulation:
     States are symbolic: `zone` holds all clock values that the moves so far allow.
     """
 
-    def __init__(self, raw: _checker.Simulation, edges: list[list[EdgeEntry]]) -> None:
+    def __init__(self, raw: _checker.Simulation, edges: EdgeTable) -> None:
         self._raw = raw
         self._edges = edges
 

@@ -153,35 +153,33 @@ impl Model {
         self.with(|model| json_list(model_json::queries(model, &model.queries)))
     }
 
-    /// By process: its edges.
-    fn edges(&self) -> Vec<Vec<EdgeEntry>> {
+    /// The edges of the process with this number.
+    fn edges(&self, process: usize) -> Vec<EdgeEntry> {
         self.with(|model| {
-            let processes = model.network().processes.iter().map(|process| {
-                let location = |index: u32| process.locations[index as usize].name.clone();
-                let edges = process.edges.iter().map(|edge| {
-                    let targets = edge
-                        .branches
-                        .iter()
-                        .map(|branch| location(branch.target.0))
-                        .collect();
-                    let selects = edge
-                        .select
-                        .iter()
-                        .map(|select| select.name.clone())
-                        .collect();
-                    let sync = edge.labels.sync.clone();
-                    (
-                        process.name.clone(),
-                        location(edge.source.0),
-                        targets,
-                        selects,
-                        sync,
-                        edge.controllable,
-                    )
-                });
-                edges.collect()
+            let process = &model.network().processes[process];
+            let location = |index: u32| process.locations[index as usize].name.clone();
+            let edges = process.edges.iter().map(|edge| {
+                let targets = edge
+                    .branches
+                    .iter()
+                    .map(|branch| location(branch.target.0))
+                    .collect();
+                let selects = edge
+                    .select
+                    .iter()
+                    .map(|select| select.name.clone())
+                    .collect();
+                let sync = edge.labels.sync.clone();
+                (
+                    process.name.clone(),
+                    location(edge.source.0),
+                    targets,
+                    selects,
+                    sync,
+                    edge.controllable,
+                )
             });
-            processes.collect()
+            edges.collect()
         })
     }
 
