@@ -12,7 +12,6 @@ mod play;
 mod walks;
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -25,7 +24,7 @@ use crate::exec::Libraries;
 use crate::tuning::PARTS;
 
 use answer::{Answer, InterruptedError, block_of_runs, check, check_jointly};
-use convert::{FailedError, RejectedError, rejected, until_signal};
+use convert::{FailedError, RejectedError, rejected, until_signal_apart};
 use model::Model;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
 
@@ -43,11 +42,9 @@ fn load(
     for piece in pieces.try_iter()? {
         bytes.extend_from_slice(piece?.cast::<PyBytes>()?.as_bytes());
     }
-    let model =
-        until_signal(py, || LoadedModel::load_with(path, bytes, &libraries))?.map_err(rejected)?;
-    Ok(Model {
-        inner: Mutex::new(model),
-    })
+    let path = path.to_owned();
+    let load = move || LoadedModel::load_with(&path, bytes, &libraries);
+    Ok(Model::new(until_signal_apart(py, load)?.map_err(rejected)?))
 }
 
 /// For each code: the code, its name, its severity ("error" or "warning"), and its page in

@@ -9,7 +9,8 @@ Ctrl-C, no file is left half written.
 * Time counts from the start of the command, and for each query after the first from its own start.
 * Memory is what the process takes beyond what it had when the command began: libraries that Python
   loads later count a little, so that there are always some megabytes beside the limit.
-* When a query is answered, a twentieth of the limit is left for printing and writing.
+* From a query on, which the engine ends by itself, a twentieth of the limit is left for printing
+  and writing.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ _LOOK_EVERY_S: Final = 0.01
 _LEFT: Final = 0.05
 """So much of a limit is left for what comes after an answer."""
 
-_LEAST_LEFT_S: Final = 0.25
-_LEAST_LEFT_BYTES: Final = 16 << 20
+_LEAST_LEFT_S: Final = 0.2
+_LEAST_LEFT_BYTES: Final = 8 << 20
 
 
 class Guard:
@@ -88,8 +89,8 @@ class Guard:
         """A query begins, whose time counts from now on; that of the first one counts already."""
         if self._has_query:
             self._start_s = time.monotonic()
-            self._arm(self._start_s, self._base_bytes)
         self._has_query = True
+        self._arm(self._start_s, self._base_bytes)
 
     def left_s(self) -> float | None:
         """How many seconds are left of the limit; at least 0."""
@@ -111,11 +112,12 @@ class Guard:
         with self._wake:
             self.reached = None
             self._is_told = False
+            share = _LEFT if self._has_query else 0.0
             if self._timeout_s is not None:
-                left_s = max(_LEAST_LEFT_S, _LEFT * self._timeout_s)
+                left_s = max(_LEAST_LEFT_S, share * self._timeout_s)
                 self._deadline_s = start_s + self._timeout_s + left_s
             if self._memory_bytes is not None:
-                left_bytes = max(_LEAST_LEFT_BYTES, int(_LEFT * self._memory_bytes))
+                left_bytes = max(_LEAST_LEFT_BYTES, int(share * self._memory_bytes))
                 self._most_bytes = base_bytes + self._memory_bytes + left_bytes
             self._wake.notify()
 

@@ -1,5 +1,8 @@
 //! What all of the module shares: errors, names of choices, interruption, and moves.
 
+use std::panic;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -173,6 +176,50 @@ pub(super) fn until_signal<T: Send>(py: Python<'_>, run: impl FnOnce() -> T + Se
         None => result.map_err(|Cut| PyKeyboardInterrupt::new_err(())),
     }
 }
+
+/// Does work as [`until_signal`] does, but in a thread of its own, which is left behind after a
+/// signal: what the work took until then, perhaps tens of millions of blocks, is given back
+/// meanwhile, or never if the process ends before.
+pub(super) fn until_signal_apart<T: Send + 'static>(
+    py: Python<'_>,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let is_over = Arc::new(AtomicBool::new(false));
+    let is_over_there = Arc::clone(&is_over);
+    let look: Look = Arc::new(move |_| is_over_there.load(Ordering::Relaxed));
+    let (sender, receiver) = mpsc::sync_channel(1);
+    let thread = thread::Builder::new().stack_size(STACK_BYTES);
+    let thread = thread.spawn(move || {
+        let result = cancellation::within(look, run);
+        // Nobody may wait for it any more.
+        sender.send(result).ok();
+    })?;
+    let received = py.detach(move || {
+        loop {
+            match receiver.recv_timeout(LOOK_FOR_SIGNALS_EVERY) {
+                Ok(result) => return Ok(Some(result)),
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => {
+                    let raised = Python::attach(|py| py.check_signals().err());
+                    if let Some(error) = raised {
+                        is_over.store(true, Ordering::Relaxed);
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    })?;
+    match received {
+        Some(result) => result.map_err(|Cut| PyKeyboardInterrupt::new_err(())),
+        None => match thread.join() {
+            Err(panic) => panic::resume_unwind(panic),
+            Ok(()) => unreachable!("the thread ends with a result or a panic"),
+        },
+    }
+}
+
+/// The stack of a thread that loads a model: as much as a process has.
+const STACK_BYTES: usize = 8 << 20;
 
 /// The rules of a game, by their names.
 pub(super) fn rules(forced: &str, priorities: &str) -> PyResult<Rules> {

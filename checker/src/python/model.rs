@@ -1,6 +1,7 @@
 //! Models: what is in them, and the check of files of evidence.
 
 use std::sync::{Mutex, PoisonError};
+use std::thread;
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -22,12 +23,38 @@ use crate::zones::Zone;
 /// A loaded model.
 #[pyclass(frozen, module = "ntagen._checker")]
 pub(super) struct Model {
-    pub(super) inner: Mutex<LoadedModel>,
+    /// There is one until the end.
+    inner: Mutex<Option<LoadedModel>>,
 }
 
 impl Model {
+    pub(super) fn new(model: LoadedModel) -> Model {
+        Model {
+            inner: Mutex::new(Some(model)),
+        }
+    }
+
     pub(super) fn with<T>(&self, action: impl FnOnce(&mut LoadedModel) -> T) -> T {
-        action(&mut self.inner.lock().unwrap_or_else(PoisonError::into_inner))
+        let mut model = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        action(model.as_mut().expect("there is a model until the end"))
+    }
+}
+
+/// A model with more edges takes long to give back.
+const MANY_EDGES: usize = 20_000;
+
+impl Drop for Model {
+    /// Gives a large model back in a thread of its own, tens of millions of blocks, so that a
+    /// program that ends need not wait.
+    fn drop(&mut self) {
+        let inner = self.inner.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let Some(model) = inner.take() else { return };
+        let processes = model.network().processes.iter();
+        let edges: usize = processes.map(|process| process.edges.len()).sum();
+        if edges > MANY_EDGES || model.text().len() > 1 << 20 {
+            // Without a thread it is given back here.
+            thread::Builder::new().spawn(move || drop(model)).ok();
+        }
     }
 }
 
@@ -107,8 +134,7 @@ impl Model {
     fn with_constants(slf: &Bound<'_, Self>, values: Vec<(String, String)>) -> PyResult<Model> {
         let model = slf.get();
         let load = move || model.with(|model| model.with_constants(&values));
-        let inner = Mutex::new(until_signal(slf.py(), load)?.map_err(rejected)?);
-        Ok(Model { inner })
+        Ok(Model::new(until_signal(slf.py(), load)?.map_err(rejected)?))
     }
 
     /// What happens where results of integer arithmetic do not fit: "wrap" or "error".
