@@ -198,10 +198,13 @@ class Answer:
         """The runs that ``simulate`` shows; empty for other queries."""
         from ntagen.checker.trajectories import Trajectory
 
-        items, runs = self._raw.trajectories() or ([], [])
+        items, count = self._raw.shown_runs() or ([], 0)
+        # One by one, so that limits and Ctrl-C hold in between.
+        runs = (self._raw.shown_run(index) for index in range(count))
         return tuple(
-            Trajectory(number, self.query, dict(zip(items, points, strict=True)))
-            for number, points in runs
+            Trajectory(run[0], self.query, dict(zip(items, run[1], strict=True)))
+            for run in runs
+            if run is not None
         )
 
     @property
@@ -250,7 +253,7 @@ class Answer:
 
         if (distribution := self.distribution) is not None:
             return distribution.to_frame()
-        if self._raw.trajectories() is None:
+        if self._raw.shown_runs() is None:
             raise InputError(
                 f"{self.query.strip()} has no random runs to make a frame of\n"
                 "hint: ask for Pr[…](…), E[…](…) or simulate[…]{…}"
@@ -394,9 +397,21 @@ class Answer:
         """Of each trace in `trace_json`, the zones of its symbolic states."""
         return self._raw.trace_zones()
 
+    @property
+    def certificate_states(self) -> int | None:
+        """How many states the certificate has; ``None`` if none was asked for or found."""
+        return self._raw.certificate_states
+
+    def certificate_pieces(self) -> Iterator[str]:
+        """The text of the file of the certificate, in pieces; none without a certificate."""
+        index = 0
+        while (piece := self._raw.certificate_piece(index)) is not None:
+            yield piece
+            index += 1
+
     def certificate_text(self) -> str | None:
         """The certificate as the text of a file; ``None`` if none was asked for or found."""
-        return self._raw.certificate_text()
+        return None if self.certificate_states is None else "".join(self.certificate_pieces())
 
     @property
     def strategy(self) -> Strategy | None:

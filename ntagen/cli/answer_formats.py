@@ -54,14 +54,32 @@ class JsonLines:
         """Prints the line of a query."""
         if outcome.answer is None:
             echo(outcome.refusal, err=True)
-        echo(json.dumps(_record(outcome)))
+        echo(_line(outcome))
 
     def end(self, outcomes: Sequence[Outcome]) -> None:
         """Prints nothing."""
 
 
+def _line(outcome: Outcome) -> str:
+    """The answer as the JSON object that the command line promises.
+
+    Runs that are shown may be long: each is written by itself, so that limits and Ctrl-C hold
+    between two of them.
+    """
+    text = json.dumps(_record(outcome))
+    answer = outcome.answer
+    if answer is None or not outcome.shows_runs:
+        return text
+    runs = answer.trajectories
+    shown = ", ".join([json.dumps(_trajectory(one)) for one in runs])
+    parts = [text[:-1], f'"trajectories": [{shown}]']
+    if len(runs) > 1:
+        parts.append(f'"over_time": {json.dumps(answer.frequency_over_time().to_json())}')
+    return ", ".join(parts) + "}"
+
+
 def _record(outcome: Outcome) -> dict[str, object]:
-    """The answer as the JSON object that the command line promises."""
+    """The answer without the runs that it shows."""
     query, answer = outcome.query, outcome.answer
     mistake = next(mistakes_in(outcome.refusal), None)
     record: dict[str, object] = {
@@ -85,11 +103,6 @@ def _record(outcome: Outcome) -> dict[str, object]:
             del record["compared"]
     if answer is not None and answer.distribution is not None:
         record["distribution"] = answer.distribution.to_json()
-    if answer is not None and outcome.shows_runs:
-        runs = answer.trajectories
-        record["trajectories"] = [_trajectory(one) for one in runs]
-        if len(runs) > 1:
-            record["over_time"] = answer.frequency_over_time().to_json()
     if answer is None:
         place = f"{mistake.path}:{mistake.line}:{mistake.column}" if mistake else None
         record |= {"place": place, "code": mistake and mistake.code}

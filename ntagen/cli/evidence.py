@@ -106,10 +106,9 @@ def _write_evidence(
                 outputs.written.add("--trace")
     if outputs.certificate:
         with doing("writing the certificate"):
-            if (certificate := answer.certificate_text()) is not None:
-                write_files({outputs.certificate: certificate})
+            if (states := answer.certificate_states) is not None:
+                write_files({outputs.certificate: answer.certificate_pieces()})
                 outputs.written.add("--certificate")
-                states = certificate.count("\n") - 1
                 notes.append(f"certificate of {states} states written to {outputs.certificate}")
     if outputs.strategy:
         with doing("the strategy was found; writing it"):

@@ -21,6 +21,9 @@ use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
 use crate::stochastic::Precision;
 
+/// So many states of a certificate are written at once.
+const STATES_IN_PIECE: usize = 1_000;
+
 /// Answers a query; `options` is an `Options` of `ntagen.checker.options`.
 #[pyfunction]
 pub(super) fn check(
@@ -182,23 +185,25 @@ impl Answer {
         Some(json::values(values).to_string())
     }
 
-    /// The runs that `simulate` shows: the texts of the items, and of each run its number and, of
-    /// each item, the moments, each with its value behind it, as native doubles; `None` for other
-    /// queries.
-    #[expect(clippy::type_complexity, reason = "it is what Python gets")]
-    fn trajectories<'py>(
+    /// The texts of the items of `simulate`, and how many runs it shows; `None` for other queries.
+    fn shown_runs(&self) -> Option<(Vec<String>, usize)> {
+        let simulated = self.inner.simulated.as_ref()?;
+        Some((simulated.items.clone(), simulated.runs.len()))
+    }
+
+    /// One of the runs that `simulate` shows: its number and, of each item, the moments, each with
+    /// its value behind it, as native doubles.
+    fn shown_run<'py>(
         &self,
         py: Python<'py>,
-    ) -> Option<(Vec<String>, Vec<(u64, Vec<Bound<'py, PyBytes>>)>)> {
-        let simulated = self.inner.simulated.as_ref()?;
-        let runs = simulated.runs.iter().map(|one| {
-            let items = one.points.iter().map(|points| {
-                let numbers = points.iter().flat_map(|&(time, value)| [time, value]);
-                doubles(py, numbers)
-            });
-            (one.run, items.collect())
+        index: usize,
+    ) -> Option<(u64, Vec<Bound<'py, PyBytes>>)> {
+        let one = self.inner.simulated.as_ref()?.runs.get(index)?;
+        let items = one.points.iter().map(|points| {
+            let numbers = points.iter().flat_map(|&(time, value)| [time, value]);
+            doubles(py, numbers)
         });
-        Some((simulated.items.clone(), runs.collect()))
+        Some((one.run, items.collect()))
     }
 
     /// How the values of runs are distributed, as JSON; `None` for queries whose runs have no
@@ -365,9 +370,17 @@ impl Answer {
         zones.collect()
     }
 
-    /// The certificate as a file; `None` without one.
-    fn certificate_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.certificate_text_or_none())
+    /// How many states the certificate has; `None` without one.
+    #[getter]
+    fn certificate_states(&self) -> Option<usize> {
+        let certificate = self.inner.evidence.certificate.as_ref()?;
+        Some(certificate.state_count())
+    }
+
+    /// A piece of the file of the certificate: the first line is the piece 0. `None` without a
+    /// certificate, and behind the last piece.
+    fn certificate_piece(&self, py: Python<'_>, index: usize) -> PyResult<Option<String>> {
+        until_signal(py, || self.certificate_piece_or_none(index))
     }
 
     /// Whether the strategy and the traces passed their checks; `None` if none was made or one came
@@ -454,13 +467,15 @@ impl Answer {
         )
     }
 
-    fn certificate_text_or_none(&self) -> Option<String> {
+    fn certificate_piece_or_none(&self, index: usize) -> Option<String> {
         let certificate = self.inner.evidence.certificate.as_ref()?;
-        Some(
-            self.model
-                .get()
-                .with(|model| certificate.text(model.network(), &self.query)),
-        )
+        if index == 0 {
+            let model = self.model.get();
+            return Some(model.with(|model| certificate.head(model.network(), &self.query)));
+        }
+        let first = (index - 1) * STATES_IN_PIECE;
+        let end = certificate.state_count().min(first + STATES_IN_PIECE);
+        (first < end).then(|| certificate.lines(first..end))
     }
 
     fn strategy_json_or_none(&self) -> Option<String> {

@@ -8,6 +8,8 @@
 //! at most bound, or less if strict is 1; clocks count from 1, and 0 stands for the number 0. What
 //! it claims is in [`crate::verify::certificate`].
 
+use std::ops::Range;
+
 use serde_json::{Value as Json, json};
 
 use crate::cancellation::{self, Cut, Room};
@@ -97,8 +99,18 @@ impl Certificate {
         self.states.iter().map(|state| state.zones.len()).sum()
     }
 
+    /// How many states it has.
+    pub fn state_count(&self) -> usize {
+        self.states.len()
+    }
+
     /// The certificate as a file.
     pub fn text(&self, network: &Network, query: &str) -> String {
+        self.head(network, query) + &self.lines(0..self.states.len())
+    }
+
+    /// The first line of the file.
+    pub fn head(&self, network: &Network, query: &str) -> String {
         let header = json!({
             "format": FORMAT,
             "version": 1,
@@ -108,8 +120,13 @@ impl Certificate {
             "clocks": clocks(network),
             "states": self.states.len(),
         });
-        let mut text = header.to_string();
-        for state in &self.states {
+        header.to_string() + "\n"
+    }
+
+    /// The lines of these states in the file. Those of all may be more than there is memory for.
+    pub fn lines(&self, states: Range<usize>) -> String {
+        let mut text = String::new();
+        for state in &self.states[states] {
             let zones = state.zones.iter().map(|zone| {
                 let constraints = zone.iter();
                 let constraints = constraints
@@ -117,10 +134,9 @@ impl Certificate {
                 Json::Array(constraints.collect())
             });
             let line = json!({ "words": state.words, "zones": zones.collect::<Vec<_>>() });
-            text.push('\n');
             text.push_str(&written(&line));
+            text.push('\n');
         }
-        text.push('\n');
         text
     }
 }
