@@ -25,4 +25,5 @@ def test_the_pieces_are_the_file() -> None:
 def test_without_a_certificate_there_is_no_piece() -> None:
     answer = checker.load(COUNTER).check("E<> n == 3")
     assert list(answer.certificate_pieces()) == []
-    assert answer.certificate_states is None and answer.certificate_text() is None
+    assert answer.certificate_states is None
+    assert answer.certificate_text() is None
