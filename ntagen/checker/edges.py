@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
-from typing import TYPE_CHECKING
 
 from ntagen.values import dataclass
 
-if TYPE_CHECKING:
-    from ntagen import _checker
+RawEdge = tuple[str, str, list[str], list[str], str, bool]
+"""The fields of `EdgeEntry`, as the engine gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +64,14 @@ class EdgeEntry:
 class EdgeTable:
     """The edges of a model, by process. Those of a process are asked for when they are needed."""
 
-    def __init__(self, raw: _checker.Model) -> None:
-        self._raw = raw
+    def __init__(self, of_process: Callable[[int], list[RawEdge]]) -> None:
+        self._of_process = of_process
         self._known: dict[int, list[EdgeEntry]] = {}
 
     def __getitem__(self, process: int) -> list[EdgeEntry]:
         edges = self._known.get(process)
         if edges is None:
-            edges = [EdgeEntry(*entry) for entry in self._raw.edges(process)]
+            edges = [EdgeEntry(*entry) for entry in self._of_process(process)]
             self._known[process] = edges
         return edges
 

@@ -57,7 +57,7 @@ class Model:
 
     def __init__(self, raw: _checker.Model) -> None:
         self._raw = raw
-        self._edges = EdgeTable(raw)
+        self._edges = EdgeTable(raw.edges)
         self._facts: Facts | None = None
 
     @property
