@@ -17,8 +17,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The greatest constant with which sums of bounds need no more than 32 bits.
 pub const NARROW: i32 = (1 << 27) - 1;
 
-/// Whether there was a constant above [`NARROW`]. Whoever sees a bound with such a
-/// constant saw it made, or got it from a thread that did.
+/// Whether there was a constant above [`NARROW`]. Whoever sees a bound with such a constant saw it
+/// made, or got it from a thread that did.
 static IS_ON: AtomicBool = AtomicBool::new(false);
 
 thread_local! {

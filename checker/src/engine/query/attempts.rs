@@ -17,14 +17,17 @@ pub(super) fn first_of_use<A: Copy, T>(
     mut is_of_use: impl FnMut(A, &mut T) -> bool,
 ) -> T {
     let (&last, others) = attempts.split_last().expect("there is an attempt");
-    for &attempt in others {
+    // What one attempt forgets says nothing of the next.
+    let mut make = |attempt| {
         wide::start();
+        make(attempt)
+    };
+    for &attempt in others {
         let mut result = make(attempt);
         if is_of_use(attempt, &mut result) {
             return result;
         }
     }
-    wide::start();
     make(last)
 }
 
