@@ -3,8 +3,9 @@
     python tests/benchmarks/verified.py [--seconds 5] [--gibibytes 3] [--only NAME]
 
 Three sets of games: the families of ``games.py``, each in the largest size that is solved within
-the seconds, strategy included; a lift, and the same with constants of 2^20 and more; and all games
-of ``tests/corpus`` whose strategies can be checked. Each answer has a process of its own.
+the seconds, strategy included; a lift, and a belt that goes by observations, both also with
+constants of 2^20 and more; and all games of ``tests/corpus`` whose strategies can be checked. Each
+answer has a process of its own.
 
 Seconds are those of the processor.
 
@@ -64,6 +65,41 @@ process User() {{
 L = Lift(); U = User();
 system L, U;
 """
+
+BELT = """
+clock move, load, rest;
+bool heavy;
+chan stop, go;
+process Belt() {{
+  state Rest, Loads {{ load <= {loaded} }}, Runs {{ move <= {far} }}, Full, Jam;
+  init Rest;
+  trans Rest -u-> Loads {{ guard rest >= {pause}; assign load = 0; }},
+        Loads -u-> Runs {{ guard load >= {slow}; assign move = 0; }},
+        Loads -u-> Runs {{ guard load < {quick}; assign move = 0, heavy = true; }},
+        Runs -> Full {{ guard move >= {near}; sync stop?; assign rest = 0; }},
+        Runs -u-> Jam {{ guard move >= {jam}; }},
+        Full -> Rest {{ guard rest >= {short}; sync go?; assign rest = 0, heavy = false; }},
+        Full -u-> Jam {{ guard rest >= {long}; }};
+}}
+process Hand() {{
+  state Ready;
+  init Ready;
+  trans Ready -> Ready {{ sync stop!; }}, Ready -> Ready {{ sync go!; }};
+}}
+system Belt, Hand;
+"""
+
+BELT_NUMBERS = {
+    "loaded": 500,
+    "far": 900,
+    "pause": 300,
+    "slow": 201,
+    "quick": 197,
+    "near": 400,
+    "jam": 800,
+    "short": 101,
+    "long": 301,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,12 +181,16 @@ def _families(seconds: float, gibibytes: float, only: str) -> Iterator[Case]:
             yield last
 
 
-def _lifts() -> Iterator[Case]:
+def _constants() -> Iterator[Case]:
     query = "control: A[] not U.Bad"
     small = {"go": 430, "shut": 310, "arrive": 290, "late": 2003}
     yield Case("lift", LIFT.format(**small), query)
     great = {name: (value << 20) // 430 for name, value in small.items()}
     yield Case("lift, constants of 2^20", LIFT.format(**great), query)
+    for name, factor in (("belt", 1), ("belt, constants of 2^20", (1 << 20) // 400)):
+        numbers = {name: value * factor for name, value in BELT_NUMBERS.items()}
+        seen = f"Belt.Runs, Belt.Full, move >= {500 * factor}, rest >= {200 * factor}"
+        yield Case(name, BELT.format(**numbers), f"{{{seen}}} control: A[] not Belt.Jam")
 
 
 def _corpus() -> Iterator[Case]:
@@ -173,7 +213,7 @@ def main() -> None:
     print(f"{'game':<44}{'wins s':>9}{'solve s':>9}{'check s':>9}{'times':>7}", end="")
     print(f"{'MiB':>8}{'with':>8}{'times':>7}")
     cases = [*_families(arguments.seconds, arguments.gibibytes, arguments.only)]
-    cases += [case for case in (*_lifts(), *_corpus()) if arguments.only in case.name]
+    cases += [case for case in (*_constants(), *_corpus()) if arguments.only in case.name]
     for case in cases:
         longest = 20 * arguments.seconds
         wins = _cost(case, arguments.gibibytes, longest, "verdict")

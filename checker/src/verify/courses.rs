@@ -3,9 +3,10 @@
 
 use crate::ir::Network;
 
-use super::moves::Part;
+use super::moves::{Part, is_same_entry};
 use super::place::{Conjunction, Kind, Move, Place, parts_in, without_conjunctions};
-use super::rules::{Decision, Owner, Rules, is_same_entry};
+use super::rules::{Decision, Owner, Rules};
+use super::stages;
 use super::symbolic::within_all;
 use super::zone::{Comparison, Zone};
 
@@ -24,7 +25,7 @@ pub(super) fn courses(
     let mut bad = Vec::new();
     let mut rest = vec![part.clone()];
     match kind {
-        Kind::Over => return (courses, bad),
+        Kind::Over | Kind::Turns(_) => return (courses, bad),
         Kind::Anything => {
             for (index, one) in known.moves.iter().enumerate() {
                 let parts = parts_in(part, &one.enabled).into_iter();
@@ -66,6 +67,12 @@ pub(super) fn courses(
             let acting = acting.filter(|one| matches!(one.kind, Kind::Acts(_)));
             for one in acting {
                 rest = without_conjunctions(rest, &one.zones);
+            }
+        }
+        Kind::Proposes => {
+            for index in stages::proposed(rules, known) {
+                let parts = parts_in(part, &known.moves[index].enabled).into_iter();
+                courses.extend(parts.map(|part| (index, part)));
             }
         }
         Kind::Waits => {}

@@ -17,7 +17,7 @@ use super::regions::Regions;
 use super::rules::{Aim, Owner, Rules};
 
 /// Regions that are looked at for a run: with more it could not be read either.
-const MOST_REGIONS: u64 = 200_000;
+pub(super) const MOST_REGIONS: u64 = 200_000;
 
 /// A run that shows that the owner of a strategy does not win from a state, or, if it has to win
 /// from everywhere, from one that the model can get to from there. `is_won` says of some states

@@ -3,9 +3,9 @@
 //! Nothing here uses the moves, zones, search or games of the engine. [`concrete`] computes the
 //! moves of a state with exact clock values straight from the definitions, running code on the
 //! interpreter, `symbolic` those of sets of values; [`regions`] makes the set of valuations finite;
-//! [`strategy`] closes the loop between a strategy and every move of the environment, on sets of
-//! values, [`observed`] that of one that goes by observations, on regions, both by the rules of
-//! `rules`, with an [`Effort`]; [`replay`] follows a single run;
+//! [`strategy`] closes the loop between a strategy and every move of the environment, [`observed`]
+//! that of one that goes by observations, both on sets of values and by the rules of `rules`, with
+//! an [`Effort`]; [`replay`] follows a single run;
 //! [`certificate`] checks that a set of states is closed and avoids a predicate; [`choices`] says
 //! what can happen next in a state, for simulating runs; [`play`] the same for playing against a
 //! strategy.
@@ -20,6 +20,7 @@ pub mod concrete;
 mod courses;
 mod defects;
 mod effort;
+mod machine;
 mod moments;
 mod moves;
 pub mod observed;
@@ -29,6 +30,7 @@ pub mod play;
 pub mod regions;
 pub mod replay;
 mod rules;
+mod stages;
 pub mod strategy;
 mod symbolic;
 pub mod timed;

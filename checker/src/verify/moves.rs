@@ -1,6 +1,7 @@
 //! States and moves as values, and why there may be none.
 
 use crate::exec::RunTimeError;
+use crate::ir::Network;
 
 /// Why a state could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,4 +55,29 @@ pub struct Move {
     pub is_urgent: bool,
     /// The priority of its channel, then the greatest of its participants.
     pub level: (u32, u32),
+}
+
+/// What is chosen of a move, where the rest is chance: its edges with their `select` values,
+/// without the branches; of legs that are edges the entry. If the sender's leg has the
+/// synchronisation, it says who takes part.
+pub(super) fn entry(network: &Network, parts: &[Part]) -> Vec<(u32, u32, u32)> {
+    let mut entry = Vec::with_capacity(parts.len());
+    for part in parts {
+        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        let Some(leg) = &edge.leg else {
+            entry.push((part.process, part.edge, part.select));
+            continue;
+        };
+        let is_first = entry.is_empty();
+        entry.push((part.process, leg.first.0, part.select / leg.combinations));
+        if is_first && !leg.follows_sync {
+            break;
+        }
+    }
+    entry
+}
+
+/// Whether the same is chosen of two moves.
+pub(super) fn is_same_entry(network: &Network, one: &[Part], other: &[Part]) -> bool {
+    entry(network, one) == entry(network, other)
 }

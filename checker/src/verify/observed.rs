@@ -1,63 +1,45 @@
 //! Closing the loop of a strategy that goes by observations: the machine against every move of the
 //! environment.
 //!
-//! The play goes over pairs of a state of the machine and a region (see [`super::regions`]), whose
-//! constants include those of the observations. As long as the observation stays the same, so does
-//! the state of the machine, and its action is proposed: where it is possible, it is taken or the
-//! environment moves; elsewhere the environment moves, or time passes to the next region. When the
-//! observation changes, the machine goes to the state that it has for the new one. It is right if
-//! * it has a state forevery observation that is met before the goal, and what must be kept holds
+//! As long as the observation stays the same, so does the state of the machine, and its action is
+//! proposed: where it is possible, it is taken or the environment moves; elsewhere the environment
+//! moves, or time passes. When the observation changes, the machine goes to the state that it has
+//! for the new one. It is right if
+//! * it has a state for every observation that is met before the goal, and what must be kept holds
 //!   until then;
 //! * where time cannot pass and its action is not possible, the environment has to move, or, if the
 //!   controller has only to keep something, may stop: as for a strategy that waits there
 //!   ([`super::strategy`]);
-//! * if the goal has to be reached, the graph up to the goals has no cycle, not even a region
-//!   without end.
+//! * if the goal has to be reached, no play continues forever without it.
+//!
+//! From which states the machine wins is computed on sets of clock values ([`super::winning`]), at
+//! each of its stages ([`super::machine`]). Where it does not win from where play begins, a run
+//! over regions shows it (see [`super::regions`]), whose constants include those of the
+//! observations: the first one that is wrong, or goes in a circle before the goal. With strict
+//! invariants, play is followed over regions alone, and a machine is right if no run is wrong.
 //!
 //! What the machine says that it knows is not used.
 //!
-//! Cost: each pair and its moves are visited once; memory for each pair.
+//! Cost: that of [`super::winning`], for each stage. On regions each pair of a state of the machine
+//! and a region, and its moves, are visited once; memory for each pair.
 
 use std::collections::HashMap;
 
 use crate::ir::{Network, Predicate};
 
-use super::effort::Effort;
-use super::moves::{Error, Move, Part, State};
+use super::defects::MOST_REGIONS;
+use super::effort::{Effort, GivenUp};
+use super::machine::{Machine, proposes};
+use super::moves::{Error, State};
 use super::outcome::{Coverage, Defect, Kind, Outcome, Step, Violation};
 use super::regions::Regions;
-use super::rules::{Aim, Claim, Owner, Rest, Rules, entry};
+use super::rules::{Aim, Claim, Owner, Rest, Rules};
+use super::winning::Winning;
 
-/// What the controller proposes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Nothing.
-    Wait,
-    /// Synchronisations on the channel with this index between controllable edges.
-    Channel(u32),
-    /// A controllable edge without a channel.
-    Edge {
-        /// Index of the process.
-        process: u32,
-        /// Index of the edge in its process.
-        edge: u32,
-        /// Which combination of `select` values.
-        select: u32,
-    },
-}
+pub use super::machine::{Action, MachineState};
 
-/// A state of the machine; the first one is the initial one.
-#[derive(Clone, Debug)]
-pub struct MachineState {
-    /// What is proposed.
-    pub action: Action,
-    /// By next observation: the index of the next state.
-    pub next: Vec<(Vec<bool>, usize)>,
-}
-
-/// Checks a machine of the controller, who sees `observations`, with this effort: each pair of a
-/// state of it and a region counts. The constants of the observations must be among those of the
-/// claim.
+/// Checks a machine of the controller, who sees `observations`, with this effort: each zone that is
+/// judged counts. The constants of the observations must be among those of the claim.
 pub fn verify(
     network: &Network,
     machine: &[MachineState],
@@ -65,8 +47,9 @@ pub fn verify(
     claim: &Claim<'_>,
     effort: &mut Effort<'_>,
 ) -> Result<Outcome, Error> {
+    let unit = Regions::ticks_per_unit(network);
     let mut play = Play {
-        rules: Rules::new(network, Regions::ticks_per_unit(network), &[], claim),
+        rules: Rules::new(network, unit, &[], claim),
         regions: Regions::new(network, claim.constant, claim.has_differences)?,
         machine,
         observations,
@@ -77,7 +60,36 @@ pub fn verify(
             ..Coverage::default()
         },
     };
-    play.run(effort)
+    if machine.is_empty() || network.features.strict_invariants {
+        return play.run(u64::MAX, effort);
+    }
+    let mut first = play.rules.semantics.initial()?;
+    let seen = play.observe(&first)?;
+    let machine = Machine::new(machine, observations, seen);
+    let rules = Rules::new(network, unit, &[], claim).with_machine(machine);
+    play.regions.represent_state(&mut first);
+    let mut winning = match Winning::new(&rules, &first.words, false, effort)? {
+        Ok(winning) => winning,
+        Err((why, coverage)) => return Ok(Outcome::GivenUp(why, coverage)),
+    };
+    let coverage = winning.coverage();
+    effort.restart_count();
+    match winning.solve((&first.words, &first.clocks), effort)? {
+        Ok(true) => return Ok(Outcome::Verified(coverage)),
+        Ok(false) => {}
+        Err(why) => return Ok(Outcome::GivenUp(why, coverage)),
+    }
+    effort.restart_count();
+    if let Outcome::Violated(violation, _) = play.run(MOST_REGIONS, effort)? {
+        return Ok(Outcome::Violated(violation, coverage));
+    }
+    let violation = Violation {
+        defect: Defect::Lost,
+        states: vec![first],
+        steps: Vec::new(),
+        ticks_per_unit: unit,
+    };
+    Ok(Outcome::Violated(Box::new(violation), coverage))
 }
 
 /// Where play stands: the state of the machine, and the region.
@@ -106,7 +118,8 @@ struct Play<'a> {
 }
 
 impl Play<'_> {
-    fn run(&mut self, effort: &mut Effort<'_>) -> Result<Outcome, Error> {
+    /// Follows play over at most so many regions.
+    fn run(&mut self, most: u64, effort: &mut Effort<'_>) -> Result<Outcome, Error> {
         let mut initial = self.rules.semantics.initial()?;
         self.regions.represent_state(&mut initial);
         let first = (!self.machine.is_empty()).then_some(0);
@@ -131,7 +144,9 @@ impl Play<'_> {
                     None => {}
                 }
             }
-            if let Some(why) = effort.is_over(self.coverage.parts) {
+            let is_over = effort.is_over(self.coverage.parts);
+            let is_long = (self.coverage.parts >= most).then_some(GivenUp::TooLarge);
+            if let Some(why) = is_over.or(is_long) {
                 return Ok(Outcome::GivenUp(why, self.coverage));
             }
             if let Some(defect) = self.enter(number, &target)? {
@@ -201,7 +216,8 @@ impl Play<'_> {
         let mut steps = Vec::new();
         let mut is_possible = false;
         for (one, target) in &possible {
-            let is_own = proposes(self.rules.semantics.network(), action, one);
+            let network = self.rules.semantics.network();
+            let is_own = one.controllable && proposes(network, action, (&one.parts, one.channel));
             if is_own {
                 self.coverage.own_moves += 1;
                 is_possible = true;
@@ -252,33 +268,4 @@ impl Play<'_> {
             .map(|one| self.rules.semantics.holds(one, state))
             .collect()
     }
-}
-
-/// Whether an action proposes a move.
-fn proposes(network: &Network, action: Action, one: &Move) -> bool {
-    let part = one.parts[0];
-    let edge = &network.processes[part.process as usize].edges[part.edge as usize];
-    // Legs with channels are proposed by their entry.
-    let is_edge = match &edge.leg {
-        Some(leg) if !leg.follows_sync => true,
-        _ => one.channel.is_none(),
-    };
-    one.controllable
-        && match action {
-            Action::Wait => false,
-            Action::Channel(channel) => !is_edge && one.channel == Some(channel),
-            Action::Edge {
-                process,
-                edge,
-                select,
-            } => {
-                let proposed = Part {
-                    process,
-                    edge,
-                    branch: 0,
-                    select,
-                };
-                is_edge && entry(network, &[part]) == entry(network, &[proposed])
-            }
-        }
 }

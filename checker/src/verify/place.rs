@@ -10,8 +10,8 @@ use std::mem::size_of_val;
 use crate::exec::EmittedAssignment;
 use crate::ir::{Network, Predicate, Urgency};
 
-use super::moves::{Error, Part};
-use super::rules::{Aim, Decision, Decisions, Forcing, Owner, Rules, is_same_entry};
+use super::moves::{Error, Part, is_same_entry};
+use super::rules::{Aim, Decision, Decisions, Forcing, Owner, Rules};
 use super::symbolic::{Possible, Symbolic, by_priority, guarded, within_all, without_all};
 use super::zone::{Comparison, Zone};
 
@@ -25,8 +25,12 @@ pub(super) enum Kind {
     Over,
     /// The owner makes the move of the decision with this index.
     Acts(usize),
+    /// The owner makes one of the moves that its machine proposes at the stage.
+    Proposes,
     /// The owner waits.
     Waits,
+    /// The machine sees something else, and comes to this stage.
+    Turns(u32),
     /// All moves are possible, and time passes where it can: no strategy is followed.
     Anything,
 }
@@ -74,6 +78,7 @@ pub(super) enum Target {
 #[derive(Debug)]
 pub(super) struct Move {
     pub(super) parts: Box<[Part]>,
+    pub(super) channel: Option<u32>,
     pub(super) controllable: bool,
     /// Where it is possible.
     pub(super) enabled: Vec<Conjunction>,
@@ -83,6 +88,8 @@ pub(super) struct Move {
 
 /// The states with some words.
 pub(super) struct Place<'a> {
+    /// The stage of the machine; 0 if none is followed.
+    pub(super) stage: u32,
     pub(super) words: Box<[i32]>,
     pub(super) invariant: Conjunction,
     pub(super) decisions: Option<&'a Decisions>,
@@ -107,6 +114,7 @@ impl<'a> Place<'a> {
     /// A place nothing is known of.
     pub(super) fn unknown(words: Box<[i32]>) -> Place<'a> {
         Place {
+            stage: 0,
             words,
             invariant: Box::default(),
             decisions: None,
@@ -274,6 +282,7 @@ impl<'a> Place<'a> {
             simple.push(one.excluded.is_empty().then(|| asked.collect()));
             moves.push(Possible {
                 parts: one.parts.clone(),
+                channel: one.channel,
                 level: symbolic.code.level(&one.parts, one.channel),
                 enabled,
                 effect,
@@ -310,6 +319,7 @@ impl<'a> Place<'a> {
                     None => zones.map(|zone| conjunction(zone, hull)).collect(),
                 },
                 parts: one.parts.into(),
+                channel: one.channel,
                 assignments: one.effect.assignments.into(),
                 target: Target::Words(one.effect.target.into()),
             });

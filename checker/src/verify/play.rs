@@ -12,8 +12,8 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::Semantics;
 use super::moments::{Moments, Stretch};
-use super::moves::{Error, Part, State};
-use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules, is_same_entry};
+use super::moves::{Error, Part, State, is_same_entry};
+use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules};
 use super::timed::Timed;
 
 /// What a strategy does in a state if nothing else happens.

@@ -9,7 +9,8 @@ use std::collections::HashMap;
 use crate::ir::{Network, Predicate};
 
 use super::concrete::Semantics;
-use super::moves::{Error, Move, Part, State};
+use super::machine::Machine;
+use super::moves::{Error, Move, Part, State, is_same_entry};
 
 /// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,31 +45,6 @@ impl Decision {
         };
         self.zones.iter().any(|zone| zone.iter().all(holds))
     }
-}
-
-/// What is chosen of a move, where the rest is chance: its edges with their `select` values,
-/// without the branches; of legs that are edges the entry. If the sender's leg has the
-/// synchronisation, it says who takes part.
-pub(super) fn entry(network: &Network, parts: &[Part]) -> Vec<(u32, u32, u32)> {
-    let mut entry = Vec::with_capacity(parts.len());
-    for part in parts {
-        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
-        let Some(leg) = &edge.leg else {
-            entry.push((part.process, part.edge, part.select));
-            continue;
-        };
-        let is_first = entry.is_empty();
-        entry.push((part.process, leg.first.0, part.select / leg.combinations));
-        if is_first && !leg.follows_sync {
-            break;
-        }
-    }
-    entry
-}
-
-/// Whether the same is chosen of two moves.
-pub(super) fn is_same_entry(network: &Network, one: &[Part], other: &[Part]) -> bool {
-    entry(network, one) == entry(network, other)
 }
 
 /// The decisions of the states with some words, in order: the first whose zones contain the clock
@@ -174,6 +150,8 @@ pub(super) struct Rules<'a> {
     pub(super) semantics: Semantics<'a>,
     strategy: HashMap<&'a [i32], &'a Decisions>,
     under: HashMap<&'a [i32], &'a Decisions>,
+    /// What is followed instead of a strategy, if the controller goes by observations.
+    pub(super) machine: Option<Machine<'a>>,
     pub(super) claim: &'a Claim<'a>,
 }
 
@@ -203,7 +181,16 @@ impl<'a> Rules<'a> {
             semantics: Semantics::new(network, ticks_per_unit),
             strategy: by_words(strategy),
             under: by_words(claim.under.map_or(&[], |(under, _)| under)),
+            machine: None,
             claim,
+        }
+    }
+
+    /// The same rules for a machine.
+    pub(super) fn with_machine(self, machine: Machine<'a>) -> Rules<'a> {
+        Rules {
+            machine: Some(machine),
+            ..self
         }
     }
 

@@ -12,6 +12,7 @@ use super::zone::{Comparison, Zone};
 /// A move from the states with some words.
 pub(super) struct Possible {
     pub(super) parts: Vec<Part>,
+    pub(super) channel: Option<u32>,
     /// The priority of its channel, then the greatest of its participants.
     pub(super) level: (u32, u32),
     /// The words after it, and what it assigns to clocks.
@@ -119,6 +120,7 @@ impl<'a> Symbolic<'a> {
             };
             found.push(Possible {
                 parts: one.parts.clone(),
+                channel: one.channel,
                 level: self.code.level(&one.parts, one.channel),
                 enabled: within_all(&guard, &effect.needed),
                 effect,

@@ -34,6 +34,7 @@ use crate::exec::EmittedAssignment;
 
 use super::courses::courses;
 use super::effort::{Effort, GivenUp};
+use super::machine::Machine;
 use super::moves::Error;
 use super::outcome::Coverage;
 use super::place::{
@@ -41,6 +42,7 @@ use super::place::{
     without_conjunctions,
 };
 use super::rules::{Aim, Owner, Rules};
+use super::stages;
 use super::symbolic::{Symbolic, without_all, without_covered};
 use super::view::{Moment, Round, View};
 use super::waits::{last_moments, reaching};
@@ -53,7 +55,8 @@ pub(super) struct Winning<'r, 'a> {
     /// Whether all states count that the model may come to.
     is_everything: bool,
     places: Vec<Place<'a>>,
-    index: HashMap<Box<[i32]>, u32>,
+    /// By stage: the places by their words.
+    index: Vec<HashMap<Box<[i32]>, u32>>,
     /// By place: from which places a move may lead to it.
     sources: Vec<Vec<u32>>,
     coverage: Coverage,
@@ -76,13 +79,13 @@ impl<'r, 'a> Winning<'r, 'a> {
             rules,
             is_everything,
             places: Vec::new(),
-            index: HashMap::new(),
+            index: vec![HashMap::new(); rules.machine.as_ref().map_or(1, Machine::stages)],
             sources: Vec::new(),
             coverage: Coverage::default(),
             judged: 0,
             room: Room::default(),
         };
-        winning.place_of(words.into());
+        winning.place_of((0, words.into()));
         let mut next = 0;
         while next < winning.places.len() {
             if let Some(why) = effort.is_over(winning.coverage.parts) {
@@ -101,13 +104,16 @@ impl<'r, 'a> Winning<'r, 'a> {
         self.coverage
     }
 
-    fn place_of(&mut self, words: Box<[i32]>) -> u32 {
-        if let Some(&place) = self.index.get(&words) {
+    fn place_of(&mut self, (stage, words): (u32, Box<[i32]>)) -> u32 {
+        let index = &mut self.index[stage as usize];
+        if let Some(&place) = index.get(&words) {
             return place;
         }
         let place = self.places.len() as u32;
-        self.index.insert(words.clone(), place);
-        self.places.push(Place::unknown(words));
+        index.insert(words.clone(), place);
+        let mut unknown = Place::unknown(words);
+        unknown.stage = stage;
+        self.places.push(unknown);
         self.sources.push(Vec::new());
         place
     }
@@ -134,22 +140,37 @@ impl<'r, 'a> Winning<'r, 'a> {
         }
     }
 
+    /// What is said at a place.
+    fn described(&self, stage: u32, words: Box<[i32]>) -> Result<Place<'a>, Error> {
+        let (rest, outer) = (self.start(Round::Inner), self.start(Round::Outer));
+        let goes_on = (words, self.is_everything);
+        let mut known = Place::new(&self.symbolic, self.rules, goes_on, (&rest, &outer))?;
+        known.stage = stage;
+        if let Some(machine) = &self.rules.machine {
+            let pieces = stages::pieces(self.rules, machine, &self.symbolic, &known)?;
+            let pieces = pieces.into_iter().map(|(zones, kind)| Piece {
+                rank: 0,
+                zones,
+                kind,
+                rest: rest.clone(),
+                outer: outer.clone(),
+            });
+            known.pieces.extend(pieces);
+        }
+        Ok(known)
+    }
+
     /// Finds what is said at a place, and the places that moves lead to from there.
     fn look_at(&mut self, place: usize) -> Result<(), Error> {
+        let stage = self.places[place].stage;
         let words = self.places[place].words.clone();
-        let start = (&self.start(Round::Inner), &self.start(Round::Outer));
-        let known = Place::new(
-            &self.symbolic,
-            self.rules,
-            (words.clone(), self.is_everything),
-            start,
-        );
+        let known = self.described(stage, words.clone());
         let mut known = match known {
             Ok(known) => known,
             Err(Error::Unsupported(what)) => return Err(Error::Unsupported(what)),
             // Whether play comes to it is another question.
             Err(_) => {
-                let mut failing = Place::unknown(words);
+                let mut failing = Place::unknown(words.clone());
                 failing.pieces.push(Piece {
                     rank: 0,
                     zones: vec![Box::default()],
@@ -179,7 +200,7 @@ impl<'r, 'a> Winning<'r, 'a> {
                 for (index, _) in courses {
                     let is_own = known.moves[index].controllable
                         == (self.rules.claim.owner == Owner::Controller);
-                    if is_own && matches!(kind, Kind::Acts(_)) {
+                    if is_own && matches!(kind, Kind::Acts(_) | Kind::Proposes) {
                         self.coverage.own_moves += 1;
                     } else {
                         self.coverage.opponent_moves += 1;
@@ -192,16 +213,28 @@ impl<'r, 'a> Winning<'r, 'a> {
         targets.dedup();
         for index in targets {
             if let Target::Words(words) = &mut known.moves[index].target {
-                let target = self.place_of(std::mem::take(words));
+                let target = self.place_of((stage, std::mem::take(words)));
                 known.moves[index].target = Target::Place(target);
-                if self.sources[target as usize].last() != Some(&(place as u32)) {
-                    self.sources[target as usize].push(place as u32);
-                }
+                self.add_source(target, place);
+            }
+        }
+        for piece in &known.pieces {
+            if let Kind::Turns(next) = piece.kind {
+                let target = self.place_of((next, words.clone()));
+                self.add_source(target, place);
             }
         }
         self.room.take(known.bytes());
         self.places[place] = known;
         Ok(())
+    }
+
+    /// Notes that a place is judged by another one.
+    fn add_source(&mut self, target: u32, place: usize) {
+        let sources = &mut self.sources[target as usize];
+        if sources.last() != Some(&(place as u32)) {
+            sources.push(place as u32);
+        }
     }
 
     /// Judges until nothing changes; whether the owner wins from a state.
@@ -293,9 +326,9 @@ impl<'r, 'a> Winning<'r, 'a> {
         }
     }
 
-    /// Whether a state, with clock values in ticks, is known to be won.
+    /// Whether a state, with clock values in ticks, is known to be won; at the first stage.
     pub(super) fn wins(&self, words: &[i32], clocks: &[i64]) -> bool {
-        let Some(&place) = self.index.get(words) else {
+        let Some(&place) = self.index[0].get(words) else {
             return false;
         };
         let unit = self.rules.semantics.ticks_per_unit();
@@ -325,6 +358,12 @@ impl<'r, 'a> Winning<'r, 'a> {
         let hull = known.hull(self.symbolic.clocks);
         let zones = parts_in(&hull, &piece.zones);
         self.judged += zones.len() as u64;
+        if let Kind::Turns(next) = piece.kind {
+            let target = self.index[next as usize][&known.words];
+            let view = self.view(&self.places[target as usize], Moment::Now, Round::Inner);
+            let refused = zones.into_iter().flat_map(|zone| view.refused(zone));
+            return without_covered(self.outside_earlier(known, index, refused.collect()));
+        }
         let mut groups: [(Vec<Zone>, Vec<Zone>); 2] = Default::default();
         for zone in zones {
             let goals = if piece.kind == Kind::Anything || known.goal.is_empty() {

@@ -535,3 +535,91 @@ fn games_whose_knowledge_sets_contain_each_other_equal_the_subset_construction()
     let name = "games in rounds under partial observation";
     compare::run(name, 150, &rounds(), compare_rounds);
 }
+
+/// A belt that is stopped when it was seen to run long enough, and goes on after a rest; all
+/// constants are multiplied by a factor.
+fn belt(factor: i64) -> String {
+    let times = |value: i64| value * factor;
+    format!(
+        "
+clock move, load, rest;
+bool heavy;
+chan stop, go;
+process Belt() {{
+  state Rest, Loads {{ load <= {loaded} }}, Runs {{ move <= {far} }}, Full {{ load <= {kept} }}, Jam;
+  init Rest;
+  trans Rest -u-> Loads {{ guard rest >= {pause}; assign load = 0; }},
+        Loads -u-> Runs {{ guard load >= {slow}; assign move = 0; }},
+        Loads -u-> Runs {{ guard load < {quick}; assign move = 0, heavy = true; }},
+        Runs -> Full {{ guard move >= {near}; sync stop?; assign rest = 0; }},
+        Runs -u-> Jam {{ guard move >= {jam}; }},
+        Full -> Rest {{ guard rest >= {short}; sync go?; assign rest = 0, heavy = false; }},
+        Full -u-> Jam {{ guard rest >= {long}; }};
+}}
+process Hand() {{
+  state Ready;
+  init Ready;
+  trans Ready -> Ready {{ sync stop!; }}, Ready -> Ready {{ sync go!; }};
+}}
+system Belt, Hand;
+",
+        loaded = times(5),
+        far = times(9),
+        kept = times(11),
+        pause = times(3),
+        slow = times(2),
+        quick = times(2) - 1,
+        near = times(4),
+        jam = times(8),
+        short = times(1),
+        long = times(3),
+    )
+}
+
+#[test]
+fn checks_of_machines_do_not_count_up_to_constants() {
+    for factor in [2, 250_000] {
+        let mut model = load(&belt(factor));
+        let (near, rest) = (5 * factor, 2 * factor);
+        let query = format!(
+            "{{Belt.Runs, Belt.Full, move >= {near}, rest >= {rest}}} control: A[] not Belt.Jam"
+        );
+        let options = Options {
+            verify: true,
+            ..compare::options()
+        };
+        let answer = try_ask(&mut model, &query, &options).expect("it is answered");
+        assert_eq!(answer.verdict, Verdict::Satisfied, "{factor}");
+        let check = answer.evidence.verification.expect("it was asked for");
+        assert!(
+            matches!(&check, Ok(Outcome::Verified(_))),
+            "{factor}: {check:?}"
+        );
+        let text = model.add_query(&query);
+        let (compiled, _) = model.compile(text.span).expect("it was answered");
+        let QueryKind::Control {
+            objective,
+            observations: Some(observations),
+            ..
+        } = &compiled.kind
+        else {
+            panic!("it is a game with observations");
+        };
+        let mut states =
+            machine_json::to_check(&answer.evidence.machine.expect("there is a machine"));
+        let acting = states.iter_mut().find(|one| one.action != Action::Wait);
+        acting.expect("it stops the belt").action = Action::Wait;
+        let asked = ObservedGame {
+            objective,
+            observations: &observations[..],
+        };
+        let rules = options.rules();
+        let network = model.network();
+        let effort = &mut Effort::up_to(2_000_000);
+        let checked = partial_observation::verify(network, asked, &states, rules, effort);
+        assert!(
+            matches!(&checked, Ok(Outcome::Violated(..))),
+            "{factor}: {checked:?}"
+        );
+    }
+}
