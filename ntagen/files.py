@@ -232,13 +232,13 @@ def read_file(path: str | Path, limit_bytes: int) -> bytes:
     return whole.getvalue()
 
 
-def json_of(text: str | bytes) -> Any:  # noqa: ANN401  any document
+def json_of(text: str | bytes, most_values: int = MOST_VALUES) -> Any:  # noqa: ANN401  any document
     """The value of a text in JSON that anybody may have written.
 
     Seven bytes of JSON can take 240 bytes of memory, so the number of values is limited.
 
     Raises:
-        ValueError: It is no JSON, or has more than `MOST_VALUES` values.
+        ValueError: It is no JSON, or has more values.
         RecursionError: It is nested too deeply.
     """
     import json
@@ -247,8 +247,8 @@ def json_of(text: str | bytes) -> Any:  # noqa: ANN401  any document
         count = text.count(",") + text.count("[") + text.count("{")
     else:
         count = text.count(b",") + text.count(b"[") + text.count(b"{")
-    if count > MOST_VALUES:
-        raise ValueError(f"it has more than {MOST_VALUES:,} values")
+    if count > most_values:
+        raise ValueError(f"it has more than {most_values:,} values")
     return json.loads(text)
 
 

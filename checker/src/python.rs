@@ -5,6 +5,7 @@
 
 mod answer;
 mod convert;
+mod long_text;
 mod model;
 mod options;
 mod plans;

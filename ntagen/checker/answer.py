@@ -429,7 +429,7 @@ class Answer:
         """
         from ntagen.checker.machine import Machine
 
-        text = self._raw.strategy_json()
+        text = self.strategy_json()
         return None if text is None or self.strategy is not None else Machine.from_json(text)
 
     def strategy_json(self) -> str | None:
@@ -437,7 +437,8 @@ class Answer:
 
         ``None`` if none was asked for or found.
         """
-        return self._raw.strategy_json()
+        text = self._raw.strategy_json()
+        return None if text is None else str(text)
 
     def decisions_of(
         self, process: str, variables: Sequence[str]
@@ -467,7 +468,27 @@ class Answer:
 
     def strategy_text(self) -> str | None:
         """The strategy as text in the form of TIGA; ``None`` if none was asked for or found."""
-        return self._raw.strategy_text()
+        text = self._raw.strategy_text()
+        return None if text is None else str(text)
+
+    def strategy_pieces(self, form: Literal["json", "text"]) -> Iterator[str]:
+        """The text of `strategy_json` or `strategy_text` in pieces; none without a strategy.
+
+        A large strategy is in memory once then, and not three times.
+        """
+        raw = self._raw
+        text = raw.strategy_json() if form == "json" else raw.strategy_text()
+        index = 0
+        while text is not None and (piece := text.piece(index)) is not None:
+            yield piece
+            index += 1
+
+    def trajectories_json(self) -> Iterator[str]:
+        """The runs of `trajectories` as JSON objects with ``run`` and ``points``."""
+        index = 0
+        while (text := self._raw.shown_run_json(index)) is not None:
+            yield text
+            index += 1
 
     def controller_c(self) -> str | None:
         """The strategy as a controller in C99; ``None`` if none was asked for or found.

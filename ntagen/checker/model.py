@@ -416,7 +416,7 @@ class Model:
 
     def verify(
         self,
-        text: str,
+        text: str | bytes,
         path: str = "",
         *,
         forced: ForcedRule = "tiga",
@@ -426,7 +426,7 @@ class Model:
 
         Args:
             text: The file, as `Answer.trace_json`, `Answer.certificate_text` and
-                `Answer.strategy_json` give it.
+                `Answer.strategy_json` give it; a large one is in memory once as bytes.
             path: The name of the file in messages.
             forced: For strategies: when the environment must move because time cannot pass.
             priorities: For strategies: whether priorities of channels and processes count.
@@ -437,9 +437,10 @@ class Model:
         from ntagen.checker.strategy import Verification
 
         name = path or "evidence"
+        data = text.encode() if isinstance(text, str) else text
         try:
             with rejecting():
-                holds, lines = self._raw.verify(name, text, forced, priorities)
+                holds, lines = self._raw.verify(name, data, forced, priorities)
         except RejectedError as error:
             if name in str(error):
                 raise

@@ -7,7 +7,6 @@ there; a JUnit or SARIF report is one document at the end.
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -19,7 +18,7 @@ from ntagen.cli.terminal import echo, safe
 from ntagen.version import VERSION
 
 if TYPE_CHECKING:
-    from ntagen.checker import Model, Trajectory
+    from ntagen.checker import Model
 
 FORMATS: Final = ("human", "json", "github", "junit", "sarif")
 """The formats of answers, by their names on the command line."""
@@ -54,28 +53,31 @@ class JsonLines:
         """Prints the line of a query."""
         if outcome.answer is None:
             echo(outcome.refusal, err=True)
-        echo(_line(outcome))
+        # They are all there before the first is printed, so that no limit leaves half of a line.
+        for piece in _line(outcome):
+            echo(piece, nl=False)
+        echo()
 
     def end(self, outcomes: Sequence[Outcome]) -> None:
         """Prints nothing."""
 
 
-def _line(outcome: Outcome) -> str:
-    """The answer as the JSON object that the command line promises.
+def _line(outcome: Outcome) -> list[str]:
+    """The pieces of the JSON object that the command line promises.
 
     Runs that are shown may be long: each is written by itself, so that limits and Ctrl-C hold
-    between two of them.
+    between two of them, and is in memory once.
     """
     text = json.dumps(_record(outcome))
     answer = outcome.answer
     if answer is None or not outcome.shows_runs:
-        return text
-    runs = answer.trajectories
-    shown = ", ".join([json.dumps(_trajectory(one)) for one in runs])
-    parts = [text[:-1], f'"trajectories": [{shown}]']
+        return [text]
+    runs = list(answer.trajectories_json())
+    separated = [piece for run in runs for piece in (", ", run)]
+    pieces = [text[:-1], ', "trajectories": [', *separated[1:], "]"]
     if len(runs) > 1:
-        parts.append(f'"over_time": {json.dumps(answer.frequency_over_time().to_json())}')
-    return ", ".join(parts) + "}"
+        pieces.append(f', "over_time": {json.dumps(answer.frequency_over_time().to_json())}')
+    return [*pieces, "}"]
 
 
 def _record(outcome: Outcome) -> dict[str, object]:
@@ -109,15 +111,6 @@ def _record(outcome: Outcome) -> dict[str, object]:
     if outcome.is_compared:
         record |= {"expected": outcome.is_as_expected, "expectation": outcome.expected}
     return record
-
-
-def _trajectory(trajectory: Trajectory) -> dict[str, object]:
-    """A run with its points; JSON has no infinite numbers."""
-    points = {
-        text: [(time, value if math.isfinite(value) else None) for time, value in line]
-        for text, line in trajectory.points.items()
-    }
-    return {"run": trajectory.run, "points": points}
 
 
 class GitHub:

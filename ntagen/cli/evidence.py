@@ -26,6 +26,8 @@ from ntagen.files import write_files
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ntagen.checker import Answer, Model
     from ntagen.loading import Loaded
     from ntagen.nsl import Task
@@ -112,8 +114,9 @@ def _write_evidence(
                 notes.append(f"certificate of {states} states written to {outputs.certificate}")
     if outputs.strategy:
         with doing("the strategy was found; writing it"):
-            if (text := _strategy_text(answer, query, outputs.strategy)) is not None:
-                notes += _write_strategy(answer, outputs.strategy, text)
+            pieces = _strategy_pieces(answer, query, outputs.strategy)
+            if (first := next(pieces, None)) is not None:
+                notes += _write_strategy(answer, outputs.strategy, chain([first], pieces))
                 outputs.written.add("--strategy")
     if outputs.controller:
         with doing("the strategy was found; writing its controller"):
@@ -153,20 +156,26 @@ def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: 
     return f"{text}\n"
 
 
-def _strategy_text(answer: Answer, query: Asked, target: str) -> str | None:
+def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterator[str]:
     """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
     is_json = Path(target).suffix == ".json"
-    text = answer.strategy_json() if is_json else answer.strategy_text()
-    if text is None or target == "-":
-        return text
-    return f"{text}\n" if is_json else f"{query.text}\n\n{text}"
+    pieces = answer.strategy_pieces("json" if is_json else "text")
+    if (first := next(pieces, None)) is None:
+        return
+    if target != "-" and not is_json:
+        yield f"{query.text}\n\n"
+    yield first
+    yield from pieces
+    if target != "-" and is_json:
+        yield "\n"
 
 
-def _write_strategy(answer: Answer, target: str, text: str) -> list[str]:
+def _write_strategy(answer: Answer, target: str, pieces: Iterator[str]) -> list[str]:
     if target == "-":
-        echo(text, nl=False)
+        for piece in pieces:
+            echo(piece, nl=False)
         return []
-    write_files({Path(target): text})
+    write_files({Path(target): pieces})
     whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
     return [f"{whose} written to {target}"]
 

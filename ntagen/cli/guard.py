@@ -29,7 +29,10 @@ from ntagen.cli.signals import Limit, LimitReached, handled
 from ntagen.errors import LimitError
 
 _LOOK_EVERY_S: Final = 0.01
-"""So often the memory is looked at: a process may take ten megabytes meanwhile."""
+_LOOK_CLOSELY_EVERY_S: Final = 0.002
+_CLOSE_BYTES: Final = 64 << 20
+"""So often the memory is looked at, and when so much is left: a process may take two gigabytes a
+second."""
 
 _LEFT: Final = 0.05
 """So much of a limit is left for what comes after an answer."""
@@ -130,7 +133,10 @@ class Guard:
                     self.reached = self._limit(now_s)
                     if self.reached is not None:
                         system.alarm(self._main_thread)
-                waits = [_LOOK_EVERY_S] if self._most_bytes is not None else []
+                waits = []
+                if self._most_bytes is not None:
+                    is_close = self._most_bytes - (resident_bytes() or 0) < _CLOSE_BYTES
+                    waits.append(_LOOK_CLOSELY_EVERY_S if is_close else _LOOK_EVERY_S)
                 if self._deadline_s is not None:
                     waits.append(max(0.0, self._deadline_s - now_s))
                 self._wake.wait(None if self.reached else min(waits))

@@ -90,7 +90,8 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
     if folder is not None:
         write_files(_pictures(model.templates, folder))
     if as_json:
-        text = model.facts_json()
+        with doing("describing the model"):
+            text = model.facts_json()
         if loaded.task is not None and configuration is not None:
             from ntagen.cli.precision import precision_facts
             from ntagen.cli.region_rows import region_facts

@@ -24,6 +24,9 @@ _UNSAFE: Final = re.compile(
 """Control characters except line feeds and tabs, characters that change the direction of writing,
 and the bytes of file names that are not text."""
 
+_PLAIN: Final = bytes(range(0x20, 0x7F))
+"""The characters of ASCII that are printed."""
+
 _UNBOUNDED_WIDTH: Final = 10_000
 
 
@@ -43,6 +46,9 @@ class Styled(NamedTuple):
 
 def safe(text: str) -> str:
     r"""The text with unsafe characters written as ``\u001b``, which JSON reads as the same."""
+    # Long texts are mostly of these, and looking at each character for others takes seconds.
+    if text.isascii() and not text.encode("ascii").translate(None, _PLAIN):
+        return text
     text = text.replace("\r\n", "\n")
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 

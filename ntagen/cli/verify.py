@@ -14,7 +14,6 @@ from ntagen.cli.limits import bounded
 from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import echo
-from ntagen.errors import InputError
 from ntagen.files import EVIDENCE_BYTES, read_file
 
 VIOLATED: Final = 1
@@ -23,7 +22,7 @@ VIOLATED: Final = 1
 NOT_COVERED: Final = 3
 """Exit code where the check does not cover the model or the query."""
 
-_WITHOUT_RULES: Final = re.compile(r'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certificate)"')
+_WITHOUT_RULES: Final = re.compile(rb'\s*\{\s*"format"\s*:\s*"ntagen-(trace|certificate)"')
 """The start of a file whose check does not depend on the rules of games."""
 
 
@@ -84,22 +83,12 @@ def command(
         with doing("loading the model"):
             loaded = load_model(model_path, include, overflow, constants)
         with doing(f"checking {file}"):
-            text = _read(file)
-            checked = loaded.model.verify(text, str(file), forced=forced, priorities=priorities)
-    kind = _WITHOUT_RULES.match(text)
+            data = read_file(file, EVIDENCE_BYTES)
+            checked = loaded.model.verify(data, str(file), forced=forced, priorities=priorities)
+    kind = _WITHOUT_RULES.match(data)
     if kind:
         idle = {"forced": "--forced", "priorities": "--priorities"}
-        say_idle(idle, f"here: it is a rule for strategies, and the file is a {kind[1]}")
+        say_idle(idle, f"here: it is a rule for strategies, and the file is a {kind[1].decode()}")
     for line in checked.lines:
         echo(line)
     return {True: 0, False: VIOLATED, None: NOT_COVERED}[checked.holds]
-
-
-def _read(file: Path) -> str:
-    try:
-        return read_file(file, EVIDENCE_BYTES).decode()
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{file}: this is not text in UTF-8: {error.reason}\n"
-            "hint: give a trace, certificate or strategy as JSON, which `ntagen check` wrote"
-        ) from None

@@ -6,13 +6,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from ntagen.errors import InputError
 from ntagen.experiment.report import report_of
 from ntagen.experiment.table import FORMAT_VERSION
 from ntagen.experiment.writing import csv_of, flat, latex_of, markdown_of
-from ntagen.files import MODEL_BYTES, read_file, write_files
+from ntagen.files import MODEL_BYTES, json_of, read_file, write_files
 from ntagen.frames import frame_of
 from ntagen.scene import Scene
 
@@ -76,6 +76,10 @@ class Campaign:
         write_files({self.folder / name: text for name, text in zip(FILES, texts, strict=True)})
 
 
+_MOST_VALUES: Final = 4_000_000
+"""A table may have so many values: some ten thousand runs."""
+
+
 def read_table(folder: Path) -> Campaign:
     """A campaign from the table in its folder; its scenes are not known.
 
@@ -84,7 +88,7 @@ def read_table(folder: Path) -> Campaign:
     """
     path = folder / "table.json"
     try:
-        document = json.loads(read_file(path, MODEL_BYTES))
+        document = json_of(read_file(path, MODEL_BYTES), _MOST_VALUES)
         if document["format"] != FORMAT_VERSION:
             raise InputError(f"{path} has the format {document['format']}, not {FORMAT_VERSION}")
     except (OSError, ValueError, KeyError, RecursionError, TypeError) as error:

@@ -53,9 +53,9 @@ impl std::fmt::Debug for Limits {
     }
 }
 
-/// How often the observer is shown the counters: a process that takes a gigabyte a second takes ten
-/// megabytes meanwhile.
-const SHOW_EVERY: Duration = Duration::from_millis(10);
+/// How often the observer is shown the counters: a process that takes a gigabyte a second takes
+/// three megabytes meanwhile.
+const SHOW_EVERY: Duration = Duration::from_millis(3);
 
 /// Watches a search for the limits.
 #[derive(Debug)]

@@ -6,14 +6,17 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use super::convert::{RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal};
+use super::convert::{
+    RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal, until_signal_apart,
+};
+use super::long_text::LongText;
 use super::model::{BoundRow, Model, bound_rows};
 use super::options;
 use super::plans::Plans;
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::{
     decisions, distribution_json, json, machine_c, machine_json, strategy_c, strategy_json,
-    strategy_text, text,
+    strategy_text, text, trajectory_json,
 };
 use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, LoadedModel, Options, Rejection, Verdict, Wanted};
@@ -206,6 +209,15 @@ impl Answer {
         Some((one.run, items.collect()))
     }
 
+    /// The same as JSON: an object with the number and the points, by item.
+    fn shown_run_json(&self, py: Python<'_>, index: usize) -> PyResult<Option<String>> {
+        until_signal(py, || {
+            let simulated = self.inner.simulated.as_ref()?;
+            let run = simulated.runs.get(index)?;
+            Some(trajectory_json::write(&simulated.items, run))
+        })
+    }
+
     /// How the values of runs are distributed, as JSON; `None` for queries whose runs have no
     /// values.
     fn distribution_json(&self) -> Option<String> {
@@ -351,13 +363,13 @@ impl Answer {
     }
 
     /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
-    fn trace_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.trace_text_or_none())
+    fn trace_text(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
+        written(slf, Answer::trace_text_or_none)
     }
 
     /// The traces as JSON; `None` without a trace.
-    fn trace_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.trace_json_or_none())
+    fn trace_json(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
+        written(slf, Answer::trace_json_or_none)
     }
 
     /// Of each trace, the zones of its states as matrices.
@@ -408,8 +420,10 @@ impl Answer {
     }
 
     /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
-    fn strategy_json(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.strategy_json_or_none())
+    fn strategy_json(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
+        written(slf, |answer| {
+            answer.strategy_json_or_none().map(LongText::new)
+        })
     }
 
     /// The decisions of the strategy in which a process moves: for each the values of variables by
@@ -425,16 +439,27 @@ impl Answer {
 
     /// The strategy, or the machine of a game with observations, as a controller in C; `None`
     /// without any.
-    fn controller_c(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let text = until_signal(py, || self.controller_c_or_reason())?;
+    fn controller_c(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
+        let text = written(slf, Answer::controller_c_or_reason)?;
         text.map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
     }
 
     /// The strategy as text in TIGA's form, or the machine of a game with observations; `None`
     /// without any.
-    fn strategy_text(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        until_signal(py, || self.strategy_text_or_none())
+    fn strategy_text(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
+        written(slf, |answer| {
+            answer.strategy_text_or_none().map(LongText::new)
+        })
     }
+}
+
+/// Writes something of an answer, perhaps something long, unless a signal comes.
+fn written<T: Send + 'static>(
+    answer: &Bound<'_, Answer>,
+    write: impl FnOnce(&Answer) -> T + Send + 'static,
+) -> PyResult<T> {
+    let held = answer.clone().unbind();
+    until_signal_apart(answer.py(), move || write(held.get()))
 }
 
 /// A decision: the values of variables, each with all elements, and the edges of its move.

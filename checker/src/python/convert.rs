@@ -143,7 +143,7 @@ pub(super) fn reason_of(py: Python<'_>, raised: &PyErr) -> StopReason {
 }
 
 /// How often signals are looked for: see the observer of `engine::limits`.
-const LOOK_FOR_SIGNALS_EVERY: Duration = Duration::from_millis(10);
+const LOOK_FOR_SIGNALS_EVERY: Duration = Duration::from_millis(3);
 
 /// Does work without the interpreter, which a signal ends: Ctrl-C, or a limit that Python watches.
 /// The error is what the handler of the signal raised.

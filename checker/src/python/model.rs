@@ -5,20 +5,25 @@ use std::thread;
 
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 
 use super::convert::{
     FailedError, StepEntry, code_engine, observer, overflow_rule, rejected, rules, step_entry,
-    stop_name, time_limit, until_signal,
+    stop_name, time_limit, until_signal, until_signal_apart,
 };
 use crate::cancellation;
 use crate::engine::format::{json, model_json, network_json, text};
-use crate::engine::{Limits, LoadedModel};
+use crate::engine::{Limits, LoadedModel, Rejection};
 use crate::ir::{Network, Overflow};
 use crate::network::Failure;
 use crate::search::limits::StopReason;
 use crate::search::optimum::best_first::Met;
 use crate::zones::Zone;
+
+/// Which files are evidence.
+const EVIDENCE: &str =
+    "hint: give a trace, certificate or strategy as JSON, which `ntagen check` wrote";
 
 /// A loaded model.
 #[pyclass(frozen, module = "ntagen._checker")]
@@ -160,17 +165,21 @@ impl Model {
 
     /// What is in the model, as JSON; see `engine::facts`.
     fn facts_json(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let model = slf.get();
-        until_signal(slf.py(), || {
-            model.with(|model| json::written(&model_json::facts(model)))
+        let model = slf.clone().unbind();
+        until_signal_apart(slf.py(), move || {
+            model
+                .get()
+                .with(|model| json::written(&model_json::facts(model)))
         })
     }
 
     /// The network, as JSON; see `engine::format::network_json`.
     fn network_json(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let model = slf.get();
-        until_signal(slf.py(), || {
-            model.with(|model| json::written(&network_json::network(model)))
+        let model = slf.clone().unbind();
+        until_signal_apart(slf.py(), move || {
+            model
+                .get()
+                .with(|model| json::written(&network_json::network(model)))
         })
     }
 
@@ -265,15 +274,24 @@ impl Model {
     /// check does not cover it), and what was looked at.
     fn verify(
         slf: &Bound<'_, Self>,
-        path: &str,
-        text: &str,
+        path: String,
+        data: PyBackedBytes,
         forced: &str,
         priorities: &str,
     ) -> PyResult<(Option<bool>, Vec<String>)> {
         let rules = rules(forced, priorities)?;
-        let model = slf.get();
-        let verify = || model.with(|model| model.verify_evidence(path, text, rules));
-        let checked = until_signal(slf.py(), verify)?.map_err(rejected)?;
+        let model = slf.clone().unbind();
+        let verify = move || {
+            let text = str::from_utf8(&data).map_err(|_| Rejection {
+                diagnostics: Vec::new(),
+                rendered: vec![format!(
+                    "error: {path}: this is not text in UTF-8\n{EVIDENCE}"
+                )],
+            })?;
+            let verify = |model: &mut LoadedModel| model.verify_evidence(&path, text, rules);
+            model.get().with(verify)
+        };
+        let checked = until_signal_apart(slf.py(), verify)?.map_err(rejected)?;
         Ok((checked.holds, checked.lines))
     }
 }

@@ -62,12 +62,15 @@ pub(super) fn pieces(
     Ok(pieces)
 }
 
+/// What is seen, and where.
+type Look = (Vec<bool>, Vec<Zone>);
+
 /// The parts of a zone by what is seen in them.
 fn looks(
     machine: &Machine<'_>,
     symbolic: &Symbolic<'_>,
     (words, zone): (&[i32], &Zone),
-) -> Result<Vec<(Vec<bool>, Vec<Zone>)>, Error> {
+) -> Result<Vec<Look>, Error> {
     let deadlock = |_: &Zone| Err(Error::Unsupported("the predicate deadlock"));
     let mut parts = vec![(Vec::new(), vec![zone.clone()])];
     for observation in machine.observations() {

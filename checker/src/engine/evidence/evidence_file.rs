@@ -65,7 +65,7 @@ impl LoadedModel {
             certificate::FORMAT => certificate::check_file(network, &compiled.kind, &header, text),
             json::TRACE_FORMAT => trace_file::check_file(network, &compiled.kind, &header),
             MACHINE_FORMAT => check_machine(network, &compiled.kind, &header, rules),
-            _ => strategy_json::read(network, text.as_bytes())
+            _ => strategy_json::read_parsed(network, &header)
                 .map_err(|mismatch| mismatch.to_string())
                 .and_then(|(_, strategy)| {
                     check_strategy(network, &compiled.kind, &strategy, rules)

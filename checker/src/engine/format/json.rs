@@ -45,8 +45,17 @@ pub fn part(network: &Network, part: Part) -> Json {
 
 /// The text of a value. Large ones take long, so that their bytes are counted.
 pub fn written(json: &Json) -> String {
+    counted(|text| serde_json::to_writer(text, json))
+}
+
+/// The text of pairs of numbers; those that are not finite become null.
+pub fn written_pairs(pairs: &[(f64, f64)]) -> String {
+    counted(|text| serde_json::to_writer(text, pairs))
+}
+
+fn counted(write: impl FnOnce(&mut Counted) -> serde_json::Result<()>) -> String {
     let mut text = Counted(Vec::new());
-    serde_json::to_writer(&mut text, json).expect("memory can be written to");
+    write(&mut text).expect("memory can be written to");
     String::from_utf8(text.0).expect("JSON is UTF-8")
 }
 

@@ -14,3 +14,4 @@ pub mod strategy_c;
 pub mod strategy_json;
 pub mod strategy_text;
 pub mod text;
+pub mod trajectory_json;

@@ -27,6 +27,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::cancellation;
 use crate::diagnostics::{SourceMap, Span};
 use crate::engine::loaded_model::LoadedModel;
 use crate::ir::{Features, Network, ProcessId, Shape, Urgency};
@@ -38,6 +39,9 @@ use crate::syntax::{print_dimension, print_type};
 
 /// The range of `int` without bounds.
 const INT_RANGE: (i32, i32) = (-32768, 32767);
+
+/// What it takes to write a location or an edge: see [`cancellation::work`].
+const UNITS_FOR_OBJECT: usize = 2_000;
 
 /// What is in a model.
 pub fn facts(model: &LoadedModel) -> Json {
@@ -123,6 +127,7 @@ fn parameter(parameter: &Parameter) -> String {
 }
 
 fn location(location: &Location, initial: Option<&str>, sources: &SourceMap) -> Json {
+    cancellation::work(UNITS_FOR_OBJECT);
     let kind = if location.committed {
         "committed"
     } else if location.urgent {
@@ -144,6 +149,7 @@ fn location(location: &Location, initial: Option<&str>, sources: &SourceMap) -> 
 }
 
 fn edge(edge: &Edge, sources: &SourceMap) -> Json {
+    cancellation::work(UNITS_FOR_OBJECT);
     let select = match (edge.select.first(), edge.select.last()) {
         (Some((first, _)), Some((_, last))) => sources.text(first.span.to(last.span)),
         _ => "",
@@ -213,6 +219,7 @@ fn trimmed_lines(text: &str) -> String {
 
 fn processes(network: &Network) -> Vec<Json> {
     let processes = network.processes.iter().map(|process| {
+        cancellation::work(UNITS_FOR_OBJECT);
         let edges = process.edges.iter().enumerate();
         let entries = edges.filter(|(number, edge)| {
             let leg = edge.leg.as_ref();

@@ -171,7 +171,15 @@ pub fn read(network: &Network, bytes: &[u8]) -> Result<(String, Strategy), Misma
         message: format!("this is no JSON: {error}"),
         help: Some(WRITE_ONE),
     })?;
-    read_whole(network, &At::whole(&file))
+    read_parsed(network, &file)
+}
+
+/// Reads a strategy as [`read`] does, after its JSON was parsed.
+///
+/// # Errors
+/// It is not of the format, or names what the network does not have.
+pub fn read_parsed(network: &Network, file: &Json) -> Result<(String, Strategy), Mismatch> {
+    read_whole(network, &At::whole(file))
 }
 
 fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), Mismatch> {

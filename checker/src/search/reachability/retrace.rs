@@ -1,6 +1,6 @@
 //! Computes the states of a path from its moves: the moves are taken again, without extrapolation.
 
-use crate::cancellation::Room;
+use crate::cancellation::{self, Room};
 use crate::network::{Failure, Moves, Part, Permutation, Symbolic};
 use crate::zones::Zone;
 
@@ -8,15 +8,33 @@ use super::canonical::unfold;
 use super::goal::Goal;
 use crate::search::outcome::{Step, Trace};
 
-/// A step, and the permutation of members between its state and the state of the trace, if there is
-/// one.
-type Taken = (Step, Option<Permutation>);
+/// The steps of the path. They are many: nothing is held beside them that is not needed.
+#[derive(Clone, Copy)]
+enum Path<'s> {
+    /// Of states as they are.
+    Same(&'s [Step]),
+    /// Each with the permutation of members between its state and the state of the trace.
+    Exchanged(&'s [(Step, Permutation)]),
+}
+
+impl<'s> Path<'s> {
+    fn get(self, index: usize) -> Option<(Step, Option<&'s Permutation>)> {
+        match self {
+            Path::Same(steps) => steps.get(index).map(|&step| (step, None)),
+            Path::Exchanged(steps) => steps.get(index).map(|(step, one)| (*step, Some(one))),
+        }
+    }
+}
 
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
 
 /// A state is in the trace, and among those from which other ways are open.
 const STATES_AT_HAND: usize = 2;
+
+/// What a state of the trace takes beside its words and bounds: six blocks of memory with their
+/// vectors.
+const BYTES_OF_A_STEP: usize = 6 * 40;
 
 /// Takes the steps from the initial state. If a state has several zones, it takes the first one
 /// from which the rest of the path is possible, up to a state that the goal confirms if there is
@@ -28,22 +46,18 @@ pub(in crate::search) fn retrace(
     goal: Option<&mut dyn Goal>,
 ) -> Trace {
     let mut trace = Trace::default();
-    let steps: Vec<Taken> = match symbolic.symmetry() {
-        None => steps.iter().map(|&step| (step, None)).collect(),
-        Some(symmetry) => {
-            let steps = unfold(symmetry, steps).into_iter();
-            steps
-                .map(|(step, exchanged)| (step, Some(exchanged)))
-                .collect()
-        }
+    let unfolded = symbolic.symmetry().map(|symmetry| unfold(symmetry, steps));
+    let path = match &unfolded {
+        None => Path::Same(steps),
+        Some(steps) => Path::Exchanged(steps),
     };
-    let _ = take_all(symbolic, &steps, goal, &mut trace);
+    let _ = take_all(symbolic, path, goal, &mut trace);
     trace
 }
 
 fn take_all(
     symbolic: &mut Symbolic<'_>,
-    steps: &[Taken],
+    path: Path<'_>,
     mut goal: Option<&mut dyn Goal>,
     trace: &mut Trace,
 ) -> Result<(), Failure> {
@@ -59,10 +73,12 @@ fn take_all(
             continue;
         };
         let mut words = words.clone();
-        room.take(STATES_AT_HAND * (size_of_val(&*words) + size_of_val(zone.bounds())));
+        let bytes = size_of_val(&*words) + size_of_val(zone.bounds());
+        room.take(STATES_AT_HAND * bytes + BYTES_OF_A_STEP);
+        cancellation::work(bytes);
         trace.states.truncate(open.len() - 1);
         trace.states.push((words.clone(), zone.clone()));
-        let Some(step) = steps.get(open.len() - 1) else {
+        let Some(step) = path.get(open.len() - 1) else {
             let is_end = match &mut goal {
                 None => true,
                 Some(goal) => goal.confirms(symbolic, &mut words, &zone)?,
@@ -85,7 +101,7 @@ fn take_all(
 /// to, the last first.
 fn take(
     symbolic: &mut Symbolic<'_>,
-    (step, exchanged): &Taken,
+    (step, exchanged): (Step, Option<&Permutation>),
     mut words: Vec<i32>,
     zone: &Zone,
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
@@ -94,8 +110,8 @@ fn take(
     // The zone is within that of the search, in which extrapolation made some impossible moves look
     // possible.
     let one = match exchanged {
-        None => moves.with_rank(*step),
-        Some(exchanged) => original(symbolic, (*step, exchanged), (&words, zone), &moves)?
+        None => moves.with_rank(step),
+        Some(exchanged) => original(symbolic, (step, exchanged), (&words, zone), &moves)?
             .map(|index| moves.get(index)),
     };
     let Some(one) = one else {
