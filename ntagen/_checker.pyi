@@ -12,6 +12,7 @@ __all__ = [
     "ExactWalk",
     "FailedError",
     "InterruptedError",
+    "LongText",
     "Model",
     "Plans",
     "Play",

@@ -80,6 +80,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<play::Strategy>()?;
     module.add_class::<play::Play>()?;
     module.add_class::<plans::Plans>()?;
+    module.add_class::<long_text::LongText>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
     module.add(
         "InterruptedError",
