@@ -9,12 +9,15 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ntagen.drive.learning import Learner
+from ntagen.drive.prospect import by_prospect, prefers
 from ntagen.drive.records import Journal, Synthesised, Timed
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
+from ntagen.drive.timing import timed
 from ntagen.errors import LimitError
 from ntagen.plan.actions import Plan, Roll
+from ntagen.plan.extract import step_length_mm
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
 
@@ -107,12 +110,16 @@ class Planner:
         """
         scene = self._learner.scene(tip, self._needle.known.radius_mm, depth_mm)
         self._listen()
-        whole = self._synthesise(scene)
-        if rest is not None:
-            whole = whole.with_plan(rest)
-        synthesis = self._in_time(whole, self._needle.depth_mm - depth_mm)
+        back_mm = self._needle.depth_mm - depth_mm
+        whole = self._found(scene, rest)
         self.lack.found |= whole.found > 0
         self.lack.held |= bool(whole.candidates)
+        synthesis = self._in_time(whole, back_mm)
+        if whole.candidates and not synthesis.candidates:
+            # The engine gives the best plans. A shorter one may end in time.
+            shorter = self._shorter(scene, back_mm)
+            if shorter.needle.length_mm > step_length_mm(scene):
+                synthesis = self._in_time(self._found(shorter, rest), back_mm)
         number, best = self.count + 1, synthesis.best
         self._journal.synthesised(number, synthesis)
         clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
@@ -135,6 +142,24 @@ class Planner:
         self._journal.record(Timed(self.asked_s, number, synthesis.seconds, synthesis.loop_seconds))
         return synthesis
 
+    def _found(self, scene: Scene, rest: Plan | None) -> Synthesis:
+        """The plans of a scene, and the rest of a plan if that holds, best first."""
+        found = self._synthesise(scene)
+        if rest is not None:
+            found = found.with_plan(rest)
+        if not prefers(self._settings):
+            return found
+        estimate, left_s = self._needle.known, self.left_s()
+        return timed(found, lambda one: by_prospect(one, estimate, self._settings, left_s))
+
+    def _shorter(self, scene: Scene, back_mm: float) -> Scene:
+        """The scene with a needle so short that its plans, with all their rolls, end in time."""
+        angles_rad = (abs(angle_rad) for angle_rad in scene.limits.roll_angles_rad)
+        turned_rad = (scene.limits.max_rolls + 1) * max(angles_rad, default=0.0)
+        seconds = self._left_after_s(scene, back_mm) - turned_rad / self._settings.roll_rad_per_s
+        length_mm = max(0.0, min(scene.needle.length_mm, seconds * scene.needle.speed_mm_per_s))
+        return replace(scene, needle=replace(scene.needle, length_mm=length_mm))
+
     def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:
         """The synthesis without the plans that cannot end within the time limit.
 
@@ -142,19 +167,23 @@ class Planner:
             synthesis: The synthesis.
             back_mm: How far the needle must be pulled back before.
         """
-        left_s = self.left_s()
-        speed_mm_per_s = synthesis.scene.needle.speed_mm_per_s
-        if back_mm > 0.0:
-            # Beyond the place, and again up to it, in the open channel.
-            again_mm = self._settings.push_mm
-            left_s -= (back_mm + again_mm) / (self._settings.pull_speed_ratio * speed_mm_per_s)
-            left_s -= again_mm / speed_mm_per_s
+        left_s = self._left_after_s(synthesis.scene, back_mm)
         kept = tuple(
             candidate
             for candidate in synthesis.candidates
             if self._seconds(candidate.plan, synthesis.scene) <= left_s
         )
         return replace(synthesis, candidates=kept)
+
+    def _left_after_s(self, scene: Scene, back_mm: float) -> float:
+        """The time that is left after the needle was pulled back, and pushed again."""
+        left_s, speed_mm_per_s = self.left_s(), scene.needle.speed_mm_per_s
+        if back_mm > 0.0:
+            # Beyond the place, and again up to it, in the open channel.
+            again_mm = self._settings.push_mm
+            left_s -= (back_mm + again_mm) / (self._settings.pull_speed_ratio * speed_mm_per_s)
+            left_s -= again_mm / speed_mm_per_s
+        return left_s
 
     def _seconds(self, plan: Plan, scene: Scene) -> float:
         """How long a plan takes: its pushes, its rolls and its waits.

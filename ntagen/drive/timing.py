@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ntagen.plan.best_plan import BestPlanSynthesiser
@@ -25,3 +26,11 @@ class TimedSynthesiser:
         start_s = time.perf_counter()
         synthesis = self.inner(scene)
         return replace(synthesis, loop_seconds=time.perf_counter() - start_s)
+
+
+def timed(synthesis: Synthesis, work: Callable[[Synthesis], Synthesis]) -> Synthesis:
+    """What further work makes of a synthesis, with the time of that work."""
+    start_s = time.perf_counter()
+    done = work(synthesis)
+    seconds = synthesis.loop_seconds + time.perf_counter() - start_s
+    return replace(done, loop_seconds=seconds)

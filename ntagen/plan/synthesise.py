@@ -84,6 +84,10 @@ class Synthesis:
         """The plan to be driven, or None if there is no strategy."""
         return self.candidates[0] if self.candidates else None
 
+    def with_candidates(self, candidates: Iterable[Candidate]) -> Synthesis:
+        """The same with other plans that hold, best first."""
+        return replace(self, candidates=tuple(candidates))
+
     def with_plan(self, plan: Plan) -> Synthesis:
         """The same with a plan from elsewhere among the candidates, if it holds."""
         more = select([plan], self.scene, self.margins, self.ranking)

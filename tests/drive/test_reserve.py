@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import random
+from dataclasses import replace
+
+import pytest
+
 from ntagen.drive.configure import configure
 from ntagen.drive.records import Synthesised, Transition
 from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import Event, State
 from ntagen.scene import Scene
 from tests.drive.runs import Diary
-from tests.steering import PAPER, scene, sphere
+from tests.steering import ENTRY, PAPER, scene, sphere
 
 NEAR = scene(targets=[sphere("T1", "target", (0.0, -20.0, 0.0), 8.0)], name="near")
 
@@ -46,3 +51,24 @@ def test_a_plan_with_little_reserve_is_renewed_while_it_holds() -> None:
     renewed = [one for one in diary.of(Synthesised) if one.depth_mm > 5.0]
     assert len(renewed) >= events.count(Event.PLAN_IS_THIN.value)
     assert all(one.plan for one in renewed)
+
+
+def bending(number: int) -> Scene:
+    """A random task: a needle that bends little or much, and a target that is small and deep."""
+    draw = random.Random(f"bending {number}")
+    depth_mm = draw.uniform(45.0, 75.0)
+    middle = (draw.uniform(-6.0, 6.0), -depth_mm, draw.uniform(-6.0, 6.0))
+    critical = sphere(
+        "C", "critical", (draw.uniform(-10.0, 10.0), -0.5 * depth_mm, draw.uniform(5.0, 10.0)), 3.0
+    )
+    task = scene(critical, targets=[sphere("T", "target", middle, draw.choice([4.0, 5.0]))])
+    return replace(task.with_needle(ENTRY, draw.choice([30.0, 45.0, 60.0, 100.0])), name="bending")
+
+
+@pytest.mark.slow
+def test_random_tasks_are_reached_with_a_needle_that_is_not_exact() -> None:
+    ends = [phantom_drive(bending(number), seed=number)[0] for number in range(16)]
+    assert all(end.clearance_mm > 0.0 for end in ends)
+    reached = [end for end in ends if end.ended.outcome == State.TARGET_REACHED.value]
+    assert len(reached) >= 15, [end.ended for end in ends]
+    assert all(end.target_distance_mm <= 0.1 for end in reached)

@@ -1,0 +1,117 @@
+"""Which plan to follow: one after whose first part the target can still be reached if it fails.
+
+Plans are ranked by the `Prospects` of the place at which the driver looks at its plan again, and
+among those that are alike as before. Beside the plans that the engine has found, those are looked
+at that begin with each roll, at once or half way to that place: the engine lists few plans, and
+they often begin alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Final
+
+import numpy as np
+
+from ntagen.drive.settings import Settings
+from ntagen.needle.estimate import Estimate
+from ntagen.plan.actions import Plan, Push, Roll
+from ntagen.plan.certify import certify
+from ntagen.plan.prospects import Judged, Prospects, first_part
+from ntagen.plan.rank import Candidate, rank
+from ntagen.plan.synthesise import Synthesis
+from ntagen.scene import Scene
+
+_MOST_RATIO: Final = 0.5
+"""The driver looks at a plan again when half of the way is left, at the latest."""
+
+_STEP: Final = 0.04
+"""Prospects are compared in steps of this size: two errors of the end in 48."""
+
+
+def prefers(settings: Settings) -> bool:
+    """Whether plans are ranked by prospects: for needles that do not bend exactly as planned."""
+    return settings.ranking[0] == "reserve"
+
+
+def by_prospect(
+    synthesis: Synthesis, estimate: Estimate, settings: Settings, left_s: float
+) -> Synthesis:
+    """The plans, those with the best prospect first.
+
+    Args:
+        synthesis: The plans that were found.
+        estimate: What is known of the needle.
+        settings: How to drive.
+        left_s: The time that is left.
+    """
+    scene = synthesis.scene
+    if not Prospects.suits(scene):
+        return synthesis
+    judge = _Judge(scene, estimate, settings, left_s)
+    candidates = list(synthesis.candidates)
+    for first in _firsts(scene, judge.look_mm):
+        plan = judge.whole(first)
+        if plan is None:
+            continue
+        certificate = certify(plan, scene)
+        if settings.margins.allow(certificate):
+            candidates.append(Candidate(plan, certificate))
+    ranked = rank(candidates, synthesis.ranking)
+    prospects = [-round(judge.prospect(one.plan) / _STEP) for one in ranked]
+    order = sorted(range(len(ranked)), key=lambda index: (prospects[index], index))
+    return synthesis.with_candidates(ranked[index] for index in order)
+
+
+def _firsts(scene: Scene, length_mm: float) -> Iterator[Plan]:
+    """What a plan may do until the driver looks at it again."""
+    yield Plan.of([Push(length_mm)])
+    for before_mm in (0.0, 0.5 * length_mm):
+        for angle_rad in scene.limits.roll_angles_rad:
+            yield Plan.of([Push(before_mm), Roll(angle_rad), Push(length_mm - before_mm)])
+
+
+class _Judge:
+    """The prospects of a scene, each computed once.
+
+    Attributes:
+        look_mm: The driver looks at a plan again after this length.
+    """
+
+    def __init__(self, scene: Scene, estimate: Estimate, settings: Settings, left_s: float) -> None:
+        needle = scene.needle
+        straight_mm = math.dist(needle.tip.position_mm, scene.targets[-1].center_mm)
+        self.look_mm = min(settings.review_mm, _MOST_RATIO * straight_mm)
+        self._scene = scene
+        self._prospects = Prospects(scene, settings.margins.depth_mm)
+        self._left_mm = min(needle.length_mm, left_s * needle.speed_mm_per_s) - self.look_mm
+        covariance = estimate.position_covariance_mm2(straight_mm - self.look_mm)
+        noise_mm2 = settings.priors.noise_mm**2 + settings.priors.distortion_mm**2
+        self._covariance_mm2 = covariance + noise_mm2 * np.eye(3)
+        self._known: dict[Plan, Judged] = {}
+
+    def prospect(self, plan: Plan) -> float:
+        """The prospect after the first part of a plan."""
+        return self._judged(first_part(plan, self.look_mm)).prospect
+
+    def whole(self, first: Plan) -> Plan | None:
+        """A plan that begins like this; None if there is none."""
+        way = self._judged(first).way
+        return None if way is None else Plan.of([*first.actions, *way.actions])
+
+    def _judged(self, first: Plan) -> Judged:
+        if first not in self._known:
+            rolled = [isinstance(action, Roll) for action in first.actions]
+            since_mm = math.inf
+            if any(rolled):
+                last = len(rolled) - 1 - rolled[::-1].index(True)
+                since_mm = Plan(first.actions[last:]).length_mm
+            self._known[first] = self._prospects.judge(
+                first.end(self._scene.needle),
+                self._left_mm,
+                self._covariance_mm2,
+                since_roll_mm=since_mm,
+                way_rolls=self._scene.limits.max_rolls - sum(rolled),
+            )
+        return self._known[first]

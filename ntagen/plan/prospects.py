@@ -1,0 +1,339 @@
+"""How likely a needle still arrives from a place, if it is steered by what will be measured.
+
+A needle that is not exact ends off every plan. What matters then is whether another plan leads to
+the target. From a place, all ways with the rolls that are allowed are arcs that branch off from
+each other. What is off at the end moves the target relative to all of them by about the same. So
+the *prospect* of a place is the share of the errors, as the estimator expects them, after which
+some way that touches nothing still passes through the target.
+
+A place from which one way alone leads to the middle of the target has a worse prospect than one
+from which ways lead to all sides of it: at the greatest bend, nothing makes up for a needle that
+bends a little less. The prospect is no probability: errors show little by little, and what is done
+about the first ones is not undone for the last. It says which of two places is better.
+
+Rolls are looked at in a few places (`ROLL_PLACES`), and ways are sampled for what they touch; so a
+way of a prospect still needs its certificate.
+
+Cost: 2 to 4 ms for a place with two rolls left, of five angles.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from statistics import NormalDist
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ntagen.plan.actions import Action, Plan, Push, Roll
+from ntagen.scene import Pose, Scene
+
+_Array = NDArray[np.float64]
+_Rows = NDArray[np.intp]
+_Flags = NDArray[np.bool_]
+
+ERRORS: Final = 48
+"""So many errors of the end are looked at, always the same ones."""
+
+ROLL_PLACES: Final = (14, 8)
+"""Along an arc, the first roll is looked at in so many places, and each later one."""
+
+_LEAST_APART_MM: Final = 4.0
+"""Two rolls that are nearer to each other are much like one."""
+
+_SAMPLE_MM: Final = 2.0
+"""Ways are sampled this densely for what they touch."""
+
+SOFT_MM: Final = 1.0
+"""Over this length at the surface of the target, an error counts in part: a prospect that jumps
+would make the driver jump."""
+
+_FARTHEST_SIGMAS: Final = 4.0
+"""Ways that miss the target by more standard deviations are of no use."""
+
+_LONGEST_RATIO: Final = 1.5
+"""Ways are at most this much longer than the straight one."""
+
+_TINY_MM: Final = 1e-9
+
+_LEAST_MM: Final = 0.2
+"""A target is at least this wide."""
+
+
+def _normal_points(count: int) -> _Array:
+    """Points that are spread like a normal distribution in three dimensions.
+
+    One half are those of the additive recurrence with the powers of the root of ``x^4 = x + 1``
+    (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018); the other half
+    lies opposite. Mean and covariance are exactly 0 and 1.
+    """
+    root = 1.2207440846057596
+    normal = NormalDist()
+    half = [
+        [normal.inv_cdf((0.5 + number / root**power) % 1.0) for power in (1, 2, 3)]
+        for number in range(1, count // 2 + 1)
+    ]
+    points = np.concatenate([np.array(half), -np.array(half)])
+    # So few points have another covariance; with this, it is exact.
+    factor = np.linalg.cholesky(points.T @ points / len(points))
+    return np.asarray(np.linalg.solve(factor, points.T).T)
+
+
+ERROR_POINTS: Final = _normal_points(ERRORS)
+"""The errors, in standard deviations along three axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What is ahead of a place.
+
+    Attributes:
+        prospect: From 0 to 1.
+        way: The way that passes nearest to the middle of the target, of those that touch nothing;
+            None if none passes through the target.
+    """
+
+    prospect: float
+    way: Plan | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Arcs:
+    """Arcs as rows: their starts, how long they may be, and where they branch off from which."""
+
+    position: _Array
+    heading: _Array
+    bevel: _Array
+    length_mm: _Array
+    parent: _Rows
+    branch_mm: _Array
+
+    def pushed(self, rows: _Rows, length_mm: _Array, radius_mm: float) -> tuple[_Array, ...]:
+        """Position, heading and bevel on arcs; see `ntagen.needle.kinematics.push`."""
+        turn = length_mm / radius_mm
+        cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
+        heading, bevel = self.heading[rows], self.bevel[rows]
+        # 1 - cos t, without a difference of numbers that are nearly equal.
+        versine = 2.0 * np.sin(0.5 * turn)[:, None] ** 2
+        position = self.position[rows] + radius_mm * (sine * heading - versine * bevel)
+        return position, cosine * heading - sine * bevel, cosine * bevel + sine * heading
+
+    def nearest(self, rows: _Rows, radius_mm: float, places: _Array) -> tuple[_Array, _Array]:
+        """The least distance of arcs to places, and where; see `Arc.nearest_to`."""
+        start, heading, bevel = self.position[rows], self.heading[rows], self.bevel[rows]
+        center = start - radius_mm * bevel
+        # As products of matrices: there may be a hundred thousand pairs.
+        sine = heading @ places.T - np.einsum("ni,ni->n", heading, center)[:, None]
+        cosine = bevel @ places.T - np.einsum("ni,ni->n", bevel, center)[:, None]
+        at_mm = np.arctan2(sine, cosine) * radius_mm
+        at_mm = np.where(at_mm < 0.0, at_mm + 2.0 * math.pi * radius_mm, at_mm)
+        in_plane = np.hypot(sine, cosine)
+        across = np.maximum(0.0, _squares(center, places) - in_plane**2)
+        away = np.sqrt(across + (in_plane - radius_mm) ** 2)
+        length_mm = self.length_mm[rows]
+        # Where the circle comes nearest beyond the arc, one of its ends is the nearest place.
+        beyond = np.flatnonzero((at_mm >= length_mm[:, None]).any(axis=1))
+        if len(beyond):
+            end = self.pushed(rows[beyond], length_mm[beyond], radius_mm)[0]
+            first = np.sqrt(np.maximum(0.0, _squares(start[beyond], places)))
+            last = np.sqrt(np.maximum(0.0, _squares(end, places)))
+            is_beyond = at_mm[beyond] >= length_mm[beyond, None]
+            is_last = last < first
+            away[beyond] = np.where(is_beyond, np.where(is_last, last, first), away[beyond])
+            ends_mm = np.where(is_last, length_mm[beyond, None], 0.0)
+            at_mm[beyond] = np.where(is_beyond, ends_mm, at_mm[beyond])
+        return away, at_mm
+
+
+def _squares(points: _Array, places: _Array) -> _Array:
+    """The squares of the distances of all points to all places."""
+    squares = np.einsum("ni,ni->n", points, points)[:, None] - 2.0 * points @ places.T
+    return np.asarray(squares + np.einsum("ki,ki->k", places, places))
+
+
+class Prospects:
+    """Judges places in a scene.
+
+    Args:
+        scene: The scene; `suits` says of which ones places can be judged.
+        depth_mm: How deep in the target a way must end.
+    """
+
+    def __init__(self, scene: Scene, depth_mm: float) -> None:
+        self._scene = scene
+        self._radius_mm = scene.needle.radius_mm
+        target = scene.targets[-1]
+        self._middle = np.array(target.center_mm)
+        self._reach_mm = target.shape.reach_mm()
+        self._inside_mm = max(_LEAST_MM, target.shape.depth_mm - depth_mm)
+
+    @staticmethod
+    def suits(scene: Scene) -> bool:
+        """Whether places can be judged: nothing moves, and one target is left."""
+        return scene.breath is None and len(scene.targets) == 1
+
+    def judge(
+        self,
+        place: Pose,
+        left_mm: float,
+        covariance_mm2: _Array,
+        *,
+        since_roll_mm: float = math.inf,
+        way_rolls: int | None = None,
+    ) -> Judged:
+        """What is ahead of a place.
+
+        Args:
+            place: The pose of the tip there.
+            left_mm: How far the needle may still be inserted.
+            covariance_mm2: That of the error of the end, along x, y and z.
+            since_roll_mm: How far the last roll is behind.
+            way_rolls: The way has at most so many rolls; by default as many as the scene allows.
+        """
+        straight_mm = float(np.linalg.norm(self._middle - np.array(place.position_mm)))
+        left_mm = min(left_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
+        if left_mm <= 0.0:
+            return Judged(0.0, None)
+        variances, axes = np.linalg.eigh(covariance_mm2)
+        spread = axes * np.sqrt(np.maximum(variances, 0.0))
+        places = self._middle - ERROR_POINTS @ spread.T
+        useful_mm = self._inside_mm + SOFT_MM
+        useful_mm += _FARTHEST_SIGMAS * math.sqrt(max(0.0, float(variances[-1])))
+        best_mm, middle_mm, way = np.full(len(places), math.inf), self._inside_mm, None
+        levels = self._levels(place, left_mm, since_roll_mm, useful_mm)
+        clear: _Flags = np.ones(1, dtype=bool)
+        for index, arcs in enumerate(levels):
+            rows = np.flatnonzero(clear)
+            near = arcs.nearest(rows, self._radius_mm, self._middle[None])
+            useful = near[0][:, 0] <= useful_mm
+            rows, away_mm, foot_mm = rows[useful], near[0][useful, 0], near[1][useful, 0]
+            free = foot_mm < self._touched_at(arcs, rows, foot_mm)
+            rows, away_mm, foot_mm = rows[free], away_mm[free], foot_mm[free]
+            if len(rows):
+                found_mm = arcs.nearest(rows, self._radius_mm, places)[0]
+                best_mm = np.minimum(best_mm, found_mm.min(axis=0))
+                one = int(np.argmin(away_mm))
+                if away_mm[one] < middle_mm and (way_rolls is None or index <= way_rolls):
+                    middle_mm = float(away_mm[one])
+                    way = (index, int(rows[one]), float(foot_mm[one]))
+            if index + 1 < len(levels):
+                branches = levels[index + 1]
+                touched_mm = np.zeros(len(clear))
+                all_rows = np.flatnonzero(clear)
+                touched_mm[all_rows] = self._touched_at(arcs, all_rows, arcs.length_mm[all_rows])
+                clear = branches.branch_mm < touched_mm[branches.parent]
+        counted = np.clip((self._inside_mm - best_mm) / SOFT_MM + 0.5, 0.0, 1.0)
+        return Judged(float(counted.mean()), None if way is None else self._plan(levels, *way))
+
+    def _levels(
+        self, place: Pose, left_mm: float, since_roll_mm: float, useful_mm: float
+    ) -> list[_Arcs]:
+        """All arcs: straight from the place, then those after one roll, two rolls and so on.
+
+        Those that come no nearer to the target than `useful_mm`, however they bend, are left out.
+        """
+        limits = self._scene.limits
+        levels = [
+            _Arcs(
+                position=np.array([place.position_mm]),
+                heading=np.array([place.heading]),
+                bevel=np.array([place.bevel]),
+                length_mm=np.array([left_mm]),
+                parent=np.zeros(1, dtype=np.intp),
+                branch_mm=np.zeros(1),
+            )
+        ]
+        apart_mm = limits.min_roll_distance_mm
+        first_mm = max(0.0, apart_mm - since_roll_mm)
+        for number in range(limits.max_rolls):
+            before = levels[-1]
+            count = ROLL_PLACES[min(number, len(ROLL_PLACES) - 1)]
+            spacing_mm = left_mm / count
+            along_mm: _Array = first_mm + spacing_mm * np.arange(count, dtype=np.float64)
+            rows, places = np.nonzero(along_mm < before.length_mm[:, None] - _TINY_MM)
+            if not len(rows):
+                break
+            at_mm: _Array = along_mm[places]
+            position, heading, bevel = before.pushed(rows, at_mm, self._radius_mm)
+            rest_mm = before.length_mm[rows] - at_mm
+            kept = self._can_reach(position, heading, rest_mm, useful_mm)
+            rows, at_mm = rows[kept], at_mm[kept]
+            position, heading, bevel = position[kept], heading[kept], bevel[kept]
+            if not len(rows):
+                break
+            sideways = np.cross(heading, bevel)
+            angles = limits.roll_angles_rad
+            turned = [np.cos(one) * bevel + np.sin(one) * sideways for one in angles]
+            # All branches of the first angle come first, then those of the next one.
+            again = (len(angles), 1)
+            levels.append(
+                _Arcs(
+                    position=np.tile(position, again),
+                    heading=np.tile(heading, again),
+                    bevel=np.concatenate(turned),
+                    length_mm=np.tile(before.length_mm[rows] - at_mm, len(angles)),
+                    parent=np.tile(rows, len(angles)),
+                    branch_mm=np.tile(at_mm, len(angles)),
+                )
+            )
+            first_mm = max(apart_mm, _LEAST_APART_MM)
+        return levels
+
+    def _can_reach(
+        self, position: _Array, heading: _Array, rest_mm: _Array, useful_mm: float
+    ) -> _Flags:
+        """Whether the greatest bend from places leads near the middle of the target.
+
+        What is farther ahead than the radius, or than a right angle of the bend, is not told.
+        """
+        ahead = self._middle - position
+        along_mm = np.einsum("ni,ni->n", ahead, heading)
+        aside_mm = np.linalg.norm(ahead - along_mm[:, None] * heading, axis=1)
+        radius_mm = self._radius_mm
+        chord_mm2 = np.maximum(0.0, radius_mm**2 - np.maximum(0.0, along_mm) ** 2)
+        is_far = (along_mm >= radius_mm) | (rest_mm > 0.5 * math.pi * radius_mm)
+        bend_mm = np.where(is_far, math.inf, radius_mm - np.sqrt(chord_mm2))
+        return np.asarray((along_mm > -useful_mm) & (aside_mm <= bend_mm + useful_mm))
+
+    def _touched_at(self, arcs: _Arcs, rows: _Rows, length_mm: _Array) -> _Array:
+        """Where arcs touch something first, if they are not longer than this; else infinite."""
+        regions = self._scene.avoided
+        if not regions or not len(rows):
+            return np.full(len(rows), math.inf)
+        counts = np.maximum(1, np.ceil(length_mm / _SAMPLE_MM)).astype(np.intp)
+        starts = np.cumsum(counts) - counts
+        number = np.arange(1, counts.sum() + 1) - np.repeat(starts, counts)
+        at_mm = np.minimum(_SAMPLE_MM * number, np.repeat(length_mm, counts))
+        points = arcs.pushed(np.repeat(rows, counts), at_mm, self._radius_mm)[0]
+        touches = np.zeros(len(points), dtype=bool)
+        for region in regions:
+            touches |= region.shape.distance_mm(points) <= 0.0
+        return np.asarray(np.minimum.reduceat(np.where(touches, at_mm, math.inf), starts))
+
+    def _plan(self, levels: list[_Arcs], index: int, row: int, foot_mm: float) -> Plan:
+        """The way that ends on this arc of a level."""
+        angles = self._scene.limits.roll_angles_rad
+        actions: list[Action] = [Push(foot_mm)]
+        while index > 0:
+            arcs = levels[index]
+            number = row // (len(arcs.length_mm) // len(angles))
+            actions = [Push(float(arcs.branch_mm[row])), Roll(angles[number]), *actions]
+            index, row = index - 1, int(arcs.parent[row])
+        return Plan.of(actions)
+
+
+def first_part(plan: Plan, length_mm: float) -> Plan:
+    """What a plan does until the needle was pushed this far."""
+    actions: list[Action] = []
+    left_mm = length_mm
+    for action in plan.actions:
+        if left_mm <= _TINY_MM:
+            break
+        if isinstance(action, Push):
+            actions.append(Push(min(left_mm, action.length_mm)))
+            left_mm -= action.length_mm
+        else:
+            actions.append(action)
+    return Plan.of(actions)
