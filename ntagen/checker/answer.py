@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from itertools import accumulate
+from collections.abc import Callable, Iterator, Sequence
+from itertools import accumulate, count
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen import _checker
@@ -404,10 +404,7 @@ class Answer:
 
     def certificate_pieces(self) -> Iterator[str]:
         """The text of the file of the certificate, in pieces; none without a certificate."""
-        index = 0
-        while (piece := self._raw.certificate_piece(index)) is not None:
-            yield piece
-            index += 1
+        return _until_none(self._raw.certificate_piece)
 
     def certificate_text(self) -> str | None:
         """The certificate as the text of a file; ``None`` if none was asked for or found."""
@@ -478,17 +475,11 @@ class Answer:
         """
         raw = self._raw
         text = raw.strategy_json() if form == "json" else raw.strategy_text()
-        index = 0
-        while text is not None and (piece := text.piece(index)) is not None:
-            yield piece
-            index += 1
+        return iter(()) if text is None else _until_none(text.piece)
 
     def trajectories_json(self) -> Iterator[str]:
         """The runs of `trajectories` as JSON objects with ``run`` and ``points``."""
-        index = 0
-        while (text := self._raw.shown_run_json(index)) is not None:
-            yield text
-            index += 1
+        return _until_none(self._raw.shown_run_json)
 
     def controller_c(self) -> str | None:
         """The strategy as a controller in C99; ``None`` if none was asked for or found.
@@ -500,3 +491,12 @@ class Answer:
         """
         with rejecting():
             return self._raw.controller_c()
+
+
+def _until_none(part: Callable[[int], str | None]) -> Iterator[str]:
+    """The parts with the numbers 0, 1 and so on, as long as there are some."""
+    for number in count():
+        text = part(number)
+        if text is None:
+            return
+        yield text

@@ -26,7 +26,7 @@ from ntagen.files import write_files
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable
 
     from ntagen.checker import Answer, Model
     from ntagen.loading import Loaded
@@ -114,9 +114,8 @@ def _write_evidence(
                 notes.append(f"certificate of {states} states written to {outputs.certificate}")
     if outputs.strategy:
         with doing("the strategy was found; writing it"):
-            pieces = _strategy_pieces(answer, query, outputs.strategy)
-            if (first := next(pieces, None)) is not None:
-                notes += _write_strategy(answer, outputs.strategy, chain([first], pieces))
+            if (pieces := _strategy_pieces(answer, query, outputs.strategy)) is not None:
+                notes += _write_strategy(answer, outputs.strategy, pieces)
                 outputs.written.add("--strategy")
     if outputs.controller:
         with doing("the strategy was found; writing its controller"):
@@ -156,21 +155,20 @@ def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: 
     return f"{text}\n"
 
 
-def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterator[str]:
+def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str] | None:
     """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
     is_json = Path(target).suffix == ".json"
     pieces = answer.strategy_pieces("json" if is_json else "text")
     if (first := next(pieces, None)) is None:
-        return
-    if target != "-" and not is_json:
-        yield f"{query.text}\n\n"
-    yield first
-    yield from pieces
-    if target != "-" and is_json:
-        yield "\n"
+        return None
+    if target == "-":
+        return chain([first], pieces)
+    return (
+        chain([first], pieces, ["\n"]) if is_json else chain([f"{query.text}\n\n", first], pieces)
+    )
 
 
-def _write_strategy(answer: Answer, target: str, pieces: Iterator[str]) -> list[str]:
+def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[str]:
     if target == "-":
         for piece in pieces:
             echo(piece, nl=False)

@@ -102,16 +102,17 @@ class _Judge:
 
     def _judged(self, first: Plan) -> Judged:
         if first not in self._known:
-            rolled = [isinstance(action, Roll) for action in first.actions]
             since_mm = math.inf
-            if any(rolled):
-                last = len(rolled) - 1 - rolled[::-1].index(True)
-                since_mm = Plan(first.actions[last:]).length_mm
+            for action in first.actions:
+                if isinstance(action, Push):
+                    since_mm += action.length_mm
+                elif isinstance(action, Roll):
+                    since_mm = 0.0
             self._known[first] = self._prospects.judge(
                 first.end(self._scene.needle),
                 self._left_mm,
                 self._covariance_mm2,
                 since_roll_mm=since_mm,
-                way_rolls=self._scene.limits.max_rolls - sum(rolled),
+                way_rolls=self._scene.limits.max_rolls - first.roll_count,
             )
         return self._known[first]

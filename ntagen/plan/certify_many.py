@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ntagen.needle.poses import Poses, lengths
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import Arrival, Certificate, Clearance, certify, clearance
 from ntagen.scene import Region, Scene, Vector
@@ -49,50 +50,6 @@ def _balls(regions: Sequence[Region]) -> tuple[_Array, _Array]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Poses:
-    """Poses as rows."""
-
-    position: _Array
-    heading: _Array
-    bevel: _Array
-
-    def at(self, rows: NDArray[np.intp]) -> _Poses:
-        return _Poses(self.position[rows], self.heading[rows], self.bevel[rows])
-
-    def rolled(self, angle_rad: _Array) -> _Poses:
-        """The poses after rolls; see `ntagen.needle.kinematics.roll`."""
-        cosine, sine = np.cos(angle_rad)[:, None], np.sin(angle_rad)[:, None]
-        turned = cosine * self.bevel + sine * np.cross(self.heading, self.bevel)
-        bevel = np.where(angle_rad[:, None] == 0.0, self.bevel, turned)
-        return _Poses(self.position, self.heading, bevel)
-
-    def pushed(self, radius_mm: float, length_mm: _Array) -> _Poses:
-        """The poses after pushes; see `ntagen.needle.kinematics.push`."""
-        turn = length_mm / radius_mm
-        cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
-        return _Poses(
-            self.places(radius_mm, length_mm),
-            cosine * self.heading - sine * self.bevel,
-            cosine * self.bevel + sine * self.heading,
-        )
-
-    def places(self, radius_mm: float, length_mm: _Array) -> _Array:
-        """The places after pushes."""
-        half = 0.5 * (length_mm / radius_mm)
-        chord = length_mm * np.sinc(half / math.pi)
-        ahead, aside = (chord * np.cos(half))[:, None], (chord * np.sin(half))[:, None]
-        return np.asarray(self.position + ahead * self.heading - aside * self.bevel)
-
-    def away(self, middles: _Array) -> _Array:
-        """The distance of each position to each point."""
-        return _lengths(self.position[:, None] - middles)
-
-
-def _lengths(vectors: _Array) -> _Array:
-    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors)))
-
-
-@dataclass(frozen=True, slots=True)
 class _Level:
     """What is known at the ends of all arcs that come after the same number of others.
 
@@ -104,7 +61,7 @@ class _Level:
         entered_mm: For each path and target, where it is entered; not a number if it is not.
     """
 
-    end: _Poses
+    end: Poses
     length_mm: _Array
     near_mm: _Array
     near_at_mm: _Array
@@ -127,7 +84,7 @@ class _Batch:
     def _start(self) -> _Level:
         tip = self._scene.needle.tip
         vectors = (tip.position_mm, tip.heading, tip.bevel)
-        pose = _Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
+        pose = Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
         near = pose.away(self._middles)
         entered = np.full((1, len(self._scene.targets)), math.nan)
         return _Level(pose, np.zeros(1), near, np.zeros_like(near), entered)
@@ -174,7 +131,7 @@ class _Batch:
         )
 
     def _nearest(
-        self, start: _Poses, end: _Poses, length_mm: _Array, middles: _Array
+        self, start: Poses, end: Poses, length_mm: _Array, middles: _Array
     ) -> tuple[_Array, _Array]:
         """The least distance of each arc to each point, and where; see `Arc.nearest_to`."""
         radius_mm = self._scene.needle.radius_mm
@@ -185,7 +142,7 @@ class _Batch:
         foot_mm = turn * radius_mm
         aside = np.cos(turn)[..., None] * start.bevel[:, None]
         aside += np.sin(turn)[..., None] * start.heading[:, None]
-        foot_away = _lengths(from_center - radius_mm * aside)
+        foot_away = lengths(from_center - radius_mm * aside)
         first, last = start.away(middles), end.away(middles)
         best = np.where(last < first, last, first)
         best_at = np.where(last < first, length_mm[:, None], 0.0)
@@ -193,7 +150,7 @@ class _Batch:
         return np.where(is_foot, foot_away, best), np.where(is_foot, foot_mm, best_at)
 
     def _entered(
-        self, known_mm: _Array, start: _Poses, start_mm: _Array, length_mm: _Array
+        self, known_mm: _Array, start: Poses, start_mm: _Array, length_mm: _Array
     ) -> _Array:
         """Where each target is entered, after the one before it; see `certify`."""
         entered = known_mm.copy()
@@ -209,7 +166,7 @@ class _Batch:
             since_mm = entered[:, number]
         return entered
 
-    def _enters(self, start: _Poses, length_mm: _Array, number: int) -> _Array:
+    def _enters(self, start: Poses, length_mm: _Array, number: int) -> _Array:
         """Where arcs first touch a target; not a number if they never do; see `Arc.enters_at`."""
         first = len(self._avoided) + number
         middle, target_mm = self._middles[first : first + 1], self._radii[first]
@@ -224,7 +181,7 @@ class _Batch:
         low = np.maximum(0.0, high - math.pi * radius_mm)
         for _ in range(_BISECTIONS):
             half = 0.5 * (low + high)
-            is_inside = _lengths(start.places(radius_mm, half) - middle) <= target_mm
+            is_inside = lengths(start.places(radius_mm, half) - middle) <= target_mm
             low, high = np.where(is_inside, low, half), np.where(is_inside, half, high)
         found[rows] = high
         return found

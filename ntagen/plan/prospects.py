@@ -27,6 +27,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ntagen.needle.poses import Poses, lengths
 from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.scene import Pose, Scene
 
@@ -103,27 +104,16 @@ class Judged:
 class _Arcs:
     """Arcs as rows: their starts, how long they may be, and where they branch off from which."""
 
-    position: _Array
-    heading: _Array
-    bevel: _Array
+    start: Poses
     length_mm: _Array
     parent: _Rows
     branch_mm: _Array
 
-    def pushed(self, rows: _Rows, length_mm: _Array, radius_mm: float) -> tuple[_Array, ...]:
-        """Position, heading and bevel on arcs; see `ntagen.needle.kinematics.push`."""
-        turn = length_mm / radius_mm
-        cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
-        heading, bevel = self.heading[rows], self.bevel[rows]
-        # 1 - cos t, without a difference of numbers that are nearly equal.
-        versine = 2.0 * np.sin(0.5 * turn)[:, None] ** 2
-        position = self.position[rows] + radius_mm * (sine * heading - versine * bevel)
-        return position, cosine * heading - sine * bevel, cosine * bevel + sine * heading
-
     def nearest(self, rows: _Rows, radius_mm: float, places: _Array) -> tuple[_Array, _Array]:
         """The least distance of arcs to places, and where; see `Arc.nearest_to`."""
-        start, heading, bevel = self.position[rows], self.heading[rows], self.bevel[rows]
-        center = start - radius_mm * bevel
+        start = self.start.at(rows)
+        heading, bevel = start.heading, start.bevel
+        center = start.position - radius_mm * bevel
         # As products of matrices: there may be a hundred thousand pairs.
         sine = heading @ places.T - np.einsum("ni,ni->n", heading, center)[:, None]
         cosine = bevel @ places.T - np.einsum("ni,ni->n", bevel, center)[:, None]
@@ -136,8 +126,9 @@ class _Arcs:
         # Where the circle comes nearest beyond the arc, one of its ends is the nearest place.
         beyond = np.flatnonzero((at_mm >= length_mm[:, None]).any(axis=1))
         if len(beyond):
-            end = self.pushed(rows[beyond], length_mm[beyond], radius_mm)[0]
-            first = np.sqrt(np.maximum(0.0, _squares(start[beyond], places)))
+            missing = start.at(beyond)
+            end = missing.places(radius_mm, length_mm[beyond])
+            first = np.sqrt(np.maximum(0.0, _squares(missing.position, places)))
             last = np.sqrt(np.maximum(0.0, _squares(end, places)))
             is_beyond = at_mm[beyond] >= length_mm[beyond, None]
             is_last = last < first
@@ -235,16 +226,11 @@ class Prospects:
         Those that come no nearer to the target than `useful_mm`, however they bend, are left out.
         """
         limits = self._scene.limits
-        levels = [
-            _Arcs(
-                position=np.array([place.position_mm]),
-                heading=np.array([place.heading]),
-                bevel=np.array([place.bevel]),
-                length_mm=np.array([left_mm]),
-                parent=np.zeros(1, dtype=np.intp),
-                branch_mm=np.zeros(1),
-            )
-        ]
+        vectors = (place.position_mm, place.heading, place.bevel)
+        start = Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
+        none = np.zeros(1, dtype=np.intp)
+        levels = [_Arcs(start, np.array([left_mm]), none, np.zeros(1))]
+        angles_rad = np.array(limits.roll_angles_rad)
         apart_mm = limits.min_roll_distance_mm
         first_mm = max(0.0, apart_mm - since_roll_mm)
         for number in range(limits.max_rolls):
@@ -256,41 +242,26 @@ class Prospects:
             if not len(rows):
                 break
             at_mm: _Array = along_mm[places]
-            position, heading, bevel = before.pushed(rows, at_mm, self._radius_mm)
+            start = before.start.at(rows).pushed(self._radius_mm, at_mm)
             rest_mm = before.length_mm[rows] - at_mm
-            kept = self._can_reach(position, heading, rest_mm, useful_mm)
-            rows, at_mm = rows[kept], at_mm[kept]
-            position, heading, bevel = position[kept], heading[kept], bevel[kept]
-            if not len(rows):
+            kept = np.flatnonzero(self._can_reach(start, rest_mm, useful_mm))
+            if not len(kept):
                 break
-            sideways = np.cross(heading, bevel)
-            angles = limits.roll_angles_rad
-            turned = [np.cos(one) * bevel + np.sin(one) * sideways for one in angles]
             # All branches of the first angle come first, then those of the next one.
-            again = (len(angles), 1)
-            levels.append(
-                _Arcs(
-                    position=np.tile(position, again),
-                    heading=np.tile(heading, again),
-                    bevel=np.concatenate(turned),
-                    length_mm=np.tile(before.length_mm[rows] - at_mm, len(angles)),
-                    parent=np.tile(rows, len(angles)),
-                    branch_mm=np.tile(at_mm, len(angles)),
-                )
-            )
+            each = np.tile(kept, len(angles_rad))
+            rolled = start.at(each).rolled(np.repeat(angles_rad, len(kept)))
+            levels.append(_Arcs(rolled, rest_mm[each], rows[each], at_mm[each]))
             first_mm = max(apart_mm, _LEAST_APART_MM)
         return levels
 
-    def _can_reach(
-        self, position: _Array, heading: _Array, rest_mm: _Array, useful_mm: float
-    ) -> _Flags:
+    def _can_reach(self, start: Poses, rest_mm: _Array, useful_mm: float) -> _Flags:
         """Whether the greatest bend from places leads near the middle of the target.
 
         What is farther ahead than the radius, or than a right angle of the bend, is not told.
         """
-        ahead = self._middle - position
-        along_mm = np.einsum("ni,ni->n", ahead, heading)
-        aside_mm = np.linalg.norm(ahead - along_mm[:, None] * heading, axis=1)
+        ahead = self._middle - start.position
+        along_mm = np.einsum("ni,ni->n", ahead, start.heading)
+        aside_mm = lengths(ahead - along_mm[:, None] * start.heading)
         radius_mm = self._radius_mm
         chord_mm2 = np.maximum(0.0, radius_mm**2 - np.maximum(0.0, along_mm) ** 2)
         is_far = (along_mm >= radius_mm) | (rest_mm > 0.5 * math.pi * radius_mm)
@@ -306,7 +277,7 @@ class Prospects:
         starts = np.cumsum(counts) - counts
         number = np.arange(1, counts.sum() + 1) - np.repeat(starts, counts)
         at_mm = np.minimum(_SAMPLE_MM * number, np.repeat(length_mm, counts))
-        points = arcs.pushed(np.repeat(rows, counts), at_mm, self._radius_mm)[0]
+        points = arcs.start.at(np.repeat(rows, counts)).places(self._radius_mm, at_mm)
         touches = np.zeros(len(points), dtype=bool)
         for region in regions:
             touches |= region.shape.distance_mm(points) <= 0.0
