@@ -445,7 +445,7 @@ class Controller:
         """Makes a move, at whose end the tip is predicted."""
         if isinstance(action, Roll):
             self._is_short = False
-            self._needle.roll(action.angle_rad)
+            self._needle.roll(action.turn_rad)
         elif isinstance(action, Wait):
             self._is_short = False
             self._needle.wait(max(0.0, action.seconds - self._pace.late_s))

@@ -154,7 +154,7 @@ class Planner:
 
     def _shorter(self, scene: Scene, back_mm: float) -> Scene:
         """The scene with a needle so short that its plans, with all their rolls, end in time."""
-        angles_rad = (abs(angle_rad) for angle_rad in scene.limits.roll_angles_rad)
+        angles_rad = (abs(Roll(one).turn_rad) for one in scene.limits.roll_angles_rad)
         turned_rad = (scene.limits.max_rolls + 1) * max(angles_rad, default=0.0)
         seconds = self._left_after_s(scene, back_mm) - turned_rad / self._settings.roll_rad_per_s
         length_mm = max(0.0, min(scene.needle.length_mm, seconds * scene.needle.speed_mm_per_s))
@@ -194,5 +194,5 @@ class Planner:
         if scene.breath is not None:
             periods_s = scene.breath.period_s * plan.roll_count
             return plan.length_mm / speed_mm_per_s + periods_s + plan.waits_s
-        rolls_rad = sum(abs(one.angle_rad) for one in plan.actions if isinstance(one, Roll))
+        rolls_rad = sum(abs(one.turn_rad) for one in plan.actions if isinstance(one, Roll))
         return plan.length_mm / speed_mm_per_s + rolls_rad / self._settings.roll_rad_per_s

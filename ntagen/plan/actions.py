@@ -28,6 +28,11 @@ class Roll:
 
     angle_rad: float
 
+    @property
+    def turn_rad(self) -> float:
+        """The shorter way to this angle: at most half a turn, to either side."""
+        return math.remainder(self.angle_rad, 2.0 * math.pi)
+
 
 @dataclass(frozen=True, slots=True)
 class Wait:

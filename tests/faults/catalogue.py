@@ -58,6 +58,15 @@ def _controller(act: Callable[[Rig], object]) -> Strike:
     return strike
 
 
+def _soft_reset(rig: Rig) -> None:
+    """Resets the controller.
+
+    It is no fault if the driver is about to do the same, as it does after a jog was ended.
+    """
+    rig.is_struck = rig.emulator._machine._state != "Hold"
+    rig.emulator.feed(b"\x18")
+
+
 def _sensor(make: Callable[[Rig, random.Random], Reading]) -> Strike:
     def strike(rig: Rig, draw: random.Random) -> None:
         rig.distort = make(rig, draw)
@@ -215,7 +224,7 @@ FAULTS: Final = (
         "limit switch was hit",
     ),
     Fault("ALARM:3", _controller(lambda r: r.emulator.raise_alarm(3)), _FAULTED, "reset|alarm"),
-    Fault("soft reset", _controller(lambda r: r.emulator.feed(b"\x18")), _FAULTED, "reset|alarm"),
+    Fault("soft reset", _controller(_soft_reset), _FAULTED, "reset|alarm"),
     Fault(
         "power cut",
         _controller(lambda r: r.emulator.power_on()),
