@@ -264,6 +264,12 @@ PARAMETERS: Final = (
         1e-6,
     ),
     Parameter(
+        "felt_clearance_mm",
+        "felt clearance",
+        "length",
+        "A needle that feels a region goes on while the force says that it is farther away.",
+    ),
+    Parameter(
         "false_alarm",
         "false alarm",
         "ratio",

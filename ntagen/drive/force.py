@@ -16,6 +16,10 @@ allowed in a run, by Siegmund's formula for the mean number of readings until a 
     readings = (exp(2 slack b) - 2 slack b - 1) / (2 slack^2),   b = bound + 1.166
 
 When the sum leaves zero for the last time before an alarm, the rise began: there a region is near.
+
+How near, the force tells: within its sensing margin it rises by at least `force_rise_n_per_mm` for
+each mm. So a needle that feels a region may pass it. It must stop when the rise is so great that
+the region may be nearer than `felt_clearance_mm`.
 """
 
 from __future__ import annotations
@@ -44,6 +48,9 @@ _LEAST_SPACING_MM: Final = 0.05
 """Pushes are not made shorter than this: no stepper is asked for less."""
 
 
+_STOP_SIGMAS: Final = 3.0
+"""A reading at the place where the needle must stop may be too small by this much noise."""
+
 _OPEN_STDS: Final = 6.0
 """A reading this far below the line is that of an open channel, not of noise."""
 
@@ -57,8 +64,8 @@ class Rise:
 
     Attributes:
         began_mm: The insertion depth at which it began.
-        felt_mm: The insertion depth at which it was sure.
-        force_n: The force above plain insertion when it was sure.
+        felt_mm: The insertion depth at which it was sure, and too great to go on.
+        force_n: The force above plain insertion there.
     """
 
     began_mm: float
@@ -119,6 +126,12 @@ def _bound(slack: float, readings: float) -> float:
     return high
 
 
+def stop_force_n(settings: Settings) -> float:
+    """The needle stops at a rise of this size; 0 if it stops as soon as it feels one."""
+    shell_mm = settings.sensing_margin_mm - settings.felt_clearance_mm - settings.overrun_mm
+    return max(0.0, shell_mm) * settings.force_rise_n_per_mm
+
+
 class _Line:
     """The line of plain insertion: offset and slope with their precision, from readings."""
 
@@ -156,19 +169,22 @@ class ForceMonitor:
 
     def __init__(self, settings: Settings, length_mm: float) -> None:
         self._test = PageTest.of(settings, length_mm)
+        self._stop_n = stop_force_n(settings)
         self._line = _Line(self._test.noise_n)
         # The line when the sum was 0 for the last time.
         self._before = copy(self._line)
         self._sum = 0.0
         self._began_mm = 0.0
         self._deepest_mm = 0.0
+        # Whether the tip is in the margin of a region.
+        self._is_near = False
 
     def expected_n(self, depth_mm: float) -> float:
         """The force of plain insertion at a depth."""
         return self._line.at(depth_mm)[0]
 
     def note(self, depth_mm: float, force_n: float, allowed_n: float = 0.0) -> Rise | None:
-        """Takes a reading of a push; returns the rise if it is now sure.
+        """Takes a reading of a push; returns the rise if the needle must stop.
 
         A push after a pull may follow the old channel, where nothing is cut and the force is
         smaller. Such readings tell nothing about plain insertion: if they counted, the force of
@@ -184,20 +200,40 @@ class ForceMonitor:
         above_n = force_n - expected_n - allowed_n
         self._sum = max(0.0, self._sum + above_n / std_n - self._test.slack)
         if self._sum > self._test.bound:
-            return Rise(self._began_mm, depth_mm, above_n)
+            # What was learned of plain insertion since the rise began is wrong.
+            self._line = copy(self._before)
+            above_n = force_n - self.expected_n(depth_mm) - allowed_n
+            if above_n >= self._stop_n:
+                return Rise(self._began_mm, depth_mm, above_n)
+            self._sum, self._is_near = self._test.bound, True
         was_here = depth_mm <= self._deepest_mm + _OPEN_BEYOND_MM
         self._deepest_mm = max(self._deepest_mm, depth_mm)
         is_open = was_here and above_n < -_OPEN_STDS * std_n
-        if allowed_n <= 0.0 and not is_open:
+        if self._sum == 0.0:
+            self._is_near = False
+        if allowed_n <= 0.0 and not is_open and not self._is_near:
             self._line.learn(depth_mm, force_n)
         if self._sum == 0.0:
             self._began_mm = depth_mm
             self._before = copy(self._line)
         return None
 
+    def note_in_channel(
+        self, depth_mm: float, force_n: float, allowed_n: float = 0.0
+    ) -> Rise | None:
+        """Takes a reading in a channel that was cut before; see `note`.
+
+        Nothing is cut there, so the reading tells nothing about plain insertion. But the tip may
+        have left the channel.
+        """
+        above_n = force_n - self.expected_n(depth_mm) - allowed_n
+        if self._stop_n <= 0.0 or above_n < self._stop_n:
+            return None
+        return Rise(depth_mm, depth_mm, above_n)
+
     def forget_rise(self) -> None:
         """Starts again after an alarm, with the line from before the rise."""
-        self._sum = 0.0
+        self._sum, self._is_near = 0.0, False
         self._line = copy(self._before)
 
 
@@ -220,9 +256,11 @@ def fitting_spacing_mm(settings: Settings, margin_mm: float, length_mm: float) -
     while spacing_mm >= _LEAST_SPACING_MM - 1e-12:
         # Shorter pushes mean more readings, and so a higher bound.
         test = PageTest.of(settings.with_spacing(spacing_mm), length_mm)
-        reach_mm = settings.overrun_mm + test.felt_after_mm(
-            settings.force_rise_n_per_mm, spacing_mm
-        )
+        rise_n_per_mm = settings.force_rise_n_per_mm
+        felt_mm = test.felt_after_mm(rise_n_per_mm, spacing_mm)
+        # The reading before the one at which the needle stops was just too small.
+        sure_n = stop_force_n(settings) + _STOP_SIGMAS * test.noise_n
+        reach_mm = settings.overrun_mm + max(felt_mm, sure_n / rise_n_per_mm + spacing_mm)
         if reach_mm < margin_mm:
             return spacing_mm
         if spacing_mm == _LEAST_SPACING_MM:

@@ -5,11 +5,12 @@
 and is always an assumption. This module hides regions of a scene from the driver, and turns
 contacts into learned regions.
 
-At a contact the force begins to rise. So the surface of a critical region is one sensing margin
-away. The region lies ahead, because there was no force before. The driver assumes a ball straight
-ahead whose shell just touches the tip; its true size is unknown. If its shell overlaps the shell of
+Where the force begins to rise, the surface of a critical region is one sensing margin away, and
+where it has risen, less. The region lies ahead, because there was no force before. The driver
+assumes a ball straight ahead whose surface is as far away; its true size is unknown. Its shell is
+as wide as the distance at which the needle may pass it. If its shell overlaps the shell of
 an earlier ball, no plan can pass between the two, and one ball replaces them: the one that explains
-all contacts and the silence of the channels (`ntagen.needle.contact`), else the smallest ball
+all contacts and the channels that were cut (`ntagen.needle.contact`), else the smallest ball
 around both. The shell of a learned region contains all its contacts, so the driver cannot try the
 same path for ever. No learned region is put over a channel that was cut safely, or a safe region.
 """
@@ -22,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.errors import InputError
-from ntagen.needle.contact import Contact, ball_of
+from ntagen.needle.contact import Assumed, Contact, ball_of
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.path import sample_poses
 from ntagen.needle.vectors import add, combine, distance, scale
@@ -50,6 +51,13 @@ _OUTSIDE_MM = 0.1
 def position_unsure_mm(settings: Settings) -> float:
     """How far the tip may be from where it seems to be, when a force is explained, in mm."""
     return min(_EXPLAINED_MM, _SURELY_KNOWN_MM + settings.priors.noise_mm)
+
+
+def assumed_of(settings: Settings) -> Assumed:
+    """What the settings say of regions that nobody told."""
+    margin_mm = settings.sensing_margin_mm
+    clearance_mm = min(margin_mm, settings.felt_clearance_mm)
+    return Assumed(margin_mm, clearance_mm, settings.learned_radius_mm)
 
 
 def obstacles_of(scene: Scene, otherwise_mm: float) -> tuple[Obstacle, ...]:
@@ -170,9 +178,8 @@ class Knowledge:
 
     def with_contact(
         self,
-        tip: Pose,
-        margin_mm: float,
-        radius_mm: float,
+        contact: Contact,
+        assumed: Assumed,
         channels: tuple[Arc, ...] = (),
         unsure_mm: float = _EXPLAINED_MM,
         clock_s: float = 0.0,
@@ -180,55 +187,50 @@ class Knowledge:
         """The knowledge after the force rose.
 
         Args:
-            tip: The tip's pose where the force began to rise.
-            margin_mm: The expected distance from a region at which the force rises.
-            radius_mm: The first radius of an unknown region.
-            channels: What was cut before without a rise: the safe region of the paper. No learned
-                region is put over it.
+            contact: Where the needle stopped, or began to feel something.
+            assumed: What is assumed of the region.
+            channels: What was cut before safely: the safe region of the paper. No learned region
+                is put over it.
             unsure_mm: A contact this near to the shell of a known region is explained by it.
             clock_s: The time of the breath.
         """
-        contacts = self.contacts + 1
-        felt = self._felt(tip, margin_mm, unsure_mm, clock_s)
+        contacts, place = self.contacts + 1, contact.position_mm
+        felt = self._felt(place, assumed.margin_mm, unsure_mm, clock_s)
         if felt is not None:
-            learned = self._with_wider_shell(felt, tip, margin_mm, clock_s)
-        else:
-            contact = Contact(tip.position_mm, tip.heading)
-            center = combine(1.0, tip.position_mm, margin_mm + radius_mm, tip.heading)
-            ball = Region.ball(f"learned {contacts}", "critical", center, radius_mm)
-            return replace(
-                self._with_ball(_Felt(ball, (contact,)), margin_mm, radius_mm, channels),
-                contacts=contacts,
-            )
-        return replace(self, learned=learned, contacts=contacts)
+            learned = self._with_wider_shell(felt, place, assumed.margin_mm, clock_s)
+            return replace(self, learned=learned, contacts=contacts)
+        ahead_mm = contact.away_mm + assumed.radius_mm
+        center = combine(1.0, place, ahead_mm, contact.heading)
+        ball = Region.ball(f"learned {contacts}", "critical", center, assumed.radius_mm)
+        known = self._with_ball(_Felt(ball, (contact,)), assumed, channels)
+        return replace(known, contacts=contacts)
 
-    def _felt(self, tip: Pose, margin_mm: float, unsure_mm: float, clock_s: float) -> Region | None:
+    def _felt(
+        self, place: Vector, margin_mm: float, unsure_mm: float, clock_s: float
+    ) -> Region | None:
         """The a-priori critical region that explains a contact, if there is one."""
         for region in self.a_priori.criticals:
             shells = shells_of(region, self.a_priori.detections + self.learned)
-            if region.distance_at_mm(tip.position_mm, clock_s) <= (
-                _felt_at_mm(region, shells, margin_mm) + unsure_mm
-            ):
+            reach_mm = _felt_at_mm(region, shells, margin_mm) + unsure_mm
+            if region.distance_at_mm(place, clock_s) <= reach_mm:
                 return region
         return None
 
     def _with_wider_shell(
-        self, felt: Region, tip: Pose, margin_mm: float, clock_s: float
+        self, felt: Region, place: Vector, margin_mm: float, clock_s: float
     ) -> tuple[Region, ...]:
         """Makes the shell of a known region wider: it was felt farther away than expected."""
         shells = shells_of(felt, self.a_priori.detections + self.learned)
         reach_mm = _felt_at_mm(felt, shells, margin_mm)
-        reach_mm = max(reach_mm, felt.distance_at_mm(tip.position_mm, clock_s)) + _GROWTH_MM
+        reach_mm = max(reach_mm, felt.distance_at_mm(place, clock_s)) + _GROWTH_MM
         name = f"{felt.name} felt"
         shell = Region(name, "detection", felt.shape.grown(reach_mm), felt.name, felt.motion)
         return (*(region for region in self.learned if region.name != name), shell)
 
-    def _with_ball(
-        self, ball: _Felt, margin_mm: float, radius_mm: float, channels: tuple[Arc, ...]
-    ) -> Knowledge:
+    def _with_ball(self, ball: _Felt, assumed: Assumed, channels: tuple[Arc, ...]) -> Knowledge:
         """Adds a ball and its shell; balls whose shells overlap become one.
 
-        That one explains the contacts of all and the silence of the channels, if there is such a
+        That one explains the contacts of all and the channels, if there is such a
         ball. Else it is the smallest ball around them; if that would cover what was cut safely,
         they stay apart.
         """
@@ -242,8 +244,9 @@ class Knowledge:
         pending = [ball]
         while pending:
             current = pending.pop()
-            near = [one for one in balls if _overlap(current.region, one.region, margin_mm)]
-            joined = _joined([current, *near], margin_mm, radius_mm, channels) if near else None
+            reach_mm = assumed.clearance_mm
+            near = [one for one in balls if _overlap(current.region, one.region, reach_mm)]
+            joined = _joined([current, *near], assumed, channels) if near else None
             if joined is None:
                 apart.append(current)
             else:
@@ -257,7 +260,7 @@ class Knowledge:
                 f"{one.region.name} shell",
                 "detection",
                 one.region.center_mm,
-                one.reach_mm(margin_mm),
+                one.reach_mm(assumed.clearance_mm),
                 one.region.name,
             )
             for one in kept
@@ -289,25 +292,23 @@ class _Felt:
         region = replace(self.region, shape=shape)
         return replace(self, region=region)
 
-    def reach_mm(self, margin_mm: float) -> float:
+    def reach_mm(self, clearance_mm: float) -> float:
         """The radius of its shell, which contains all its contacts: none is tried again."""
-        reach_mm = self.region.radius_mm + margin_mm + min(_MOST_UNSURE_MM, self.unsure_mm)
+        reach_mm = self.region.radius_mm + clearance_mm + min(_MOST_UNSURE_MM, self.unsure_mm)
         center_mm = self.region.center_mm
         return max([reach_mm, *(distance(one.position_mm, center_mm) for one in self.contacts)])
 
 
-def _joined(
-    balls: Sequence[_Felt], margin_mm: float, radius_mm: float, channels: tuple[Arc, ...]
-) -> _Felt | None:
+def _joined(balls: Sequence[_Felt], assumed: Assumed, channels: tuple[Arc, ...]) -> _Felt | None:
     """One ball in the place of several; None if they must stay apart."""
     contacts = tuple(contact for one in balls for contact in one.contacts)
     around = _around([one.region for one in balls])
-    quiet = [
+    passed = [
         pose.position_mm
-        for pose in sample_poses(channels, _QUIET_SPACING_MM)
+        for pose in sample_poses(channels, _PASSED_SPACING_MM)
         if all(distance(pose.position_mm, c.position_mm) > _NEAR_CONTACT_MM for c in contacts)
     ]
-    found = ball_of(contacts, quiet, margin_mm, radius_mm)
+    found = ball_of(contacts, passed, assumed)
     if found is not None:
         region = replace(around, shape=Sphere(found.center_mm, found.radius_mm))
         return _Felt(region, contacts, found.center_std_mm)
@@ -333,8 +334,8 @@ def _felt_at_mm(region: Region, shells: Sequence[Region], otherwise_mm: float) -
     return max(widths, default=otherwise_mm)
 
 
-_QUIET_SPACING_MM = 2.0
-"""Channels are sampled this densely for places that were passed in silence."""
+_PASSED_SPACING_MM = 2.0
+"""Channels are sampled this densely for places that were passed."""
 
 _LEAST_RADIUS_MM = 0.1
 """A learned region is at least this large, also if it was felt at a safe one."""
@@ -351,8 +352,8 @@ def _covers(ball: Region, channels: tuple[Arc, ...]) -> bool:
     return any(arc.nearest_to(ball.center_mm).distance_mm <= ball.radius_mm for arc in channels)
 
 
-def _overlap(one: Region, other: Region, margin_mm: float) -> bool:
-    reach_mm = one.radius_mm + other.radius_mm + 2.0 * margin_mm
+def _overlap(one: Region, other: Region, clearance_mm: float) -> bool:
+    reach_mm = one.radius_mm + other.radius_mm + 2.0 * clearance_mm
     return distance(one.center_mm, other.center_mm) < reach_mm
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from ntagen.drive.force import ForceMonitor, Rise
-from ntagen.drive.knowledge import Knowledge, position_unsure_mm
+from ntagen.drive.force import ForceMonitor, Rise, stop_force_n
+from ntagen.drive.knowledge import Knowledge, assumed_of, position_unsure_mm
 from ntagen.drive.records import Breathed, Forgotten, Journal, Learned, Visited
 from ntagen.drive.settings import Settings
 from ntagen.drive.steering import Steering
+from ntagen.needle.contact import Contact
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.scene import Pose, Scene, Vector
@@ -84,11 +85,12 @@ class Learner:
 
     def feels(self, measurement: Measurement) -> bool:
         """Whether the force rises more than plain insertion and known regions explain."""
-        if not self._settings.force_sensing or not self._needle.cuts:
+        if not self._settings.force_sensing:
             return False
         tip_mm = self._needle.path.tip.position_mm
         allowed_n = self._explained_n(tip_mm)
-        self._rise = self._force.note(self._needle.depth_mm, measurement.force_n, allowed_n)
+        note = self._force.note if self._needle.cuts else self._force.note_in_channel
+        self._rise = note(self._needle.depth_mm, measurement.force_n, allowed_n)
         return self._rise is not None
 
     def learn(self) -> None:
@@ -97,13 +99,10 @@ class Learner:
         if rise is None:
             return
         self._force.forget_rise()
-        path = self._needle.glance().path
-        began = path.pull(rise.felt_mm - rise.began_mm)
         before = self.knowledge.learned
         self.knowledge = self.knowledge.with_contact(
-            orthonormal(began.tip),
-            self._settings.sensing_margin_mm,
-            self._settings.learned_radius_mm,
+            self._contact(rise),
+            assumed_of(self._settings),
             self._needle.channels,
             position_unsure_mm(self._settings),
             self.clock_s(self._needle.seen_s),
@@ -115,6 +114,20 @@ class Learner:
         for region in before:
             if (region.kind, region.name) not in kept:
                 self._journal.record(Forgotten(self._needle.now_s(), region.name, region.kind))
+
+    def _contact(self, rise: Rise) -> Contact:
+        """Where a region was felt, and how far it is away from there.
+
+        A needle that stops as soon as it feels a region has just felt it, where the rise began.
+        """
+        path, risen_mm = self._needle.glance().path, 0.0
+        if stop_force_n(self._settings) > 0.0:
+            risen_mm = rise.force_n / self._settings.force_rise_n_per_mm
+        else:
+            path = path.pull(rise.felt_mm - rise.began_mm)
+        tip = orthonormal(path.tip)
+        away_mm = max(0.0, self._settings.sensing_margin_mm - risen_mm)
+        return Contact(tip.position_mm, tip.heading, away_mm)
 
     def visit(self, position_mm: Vector, *, last_too: bool) -> None:
         """Counts targets that the tip has reached; the last one only with `last_too`."""

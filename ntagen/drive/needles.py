@@ -7,6 +7,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.drive.fitting import overrun_mm, settings_for, settings_for_phantom
+from ntagen.drive.force import stop_force_n
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
 from ntagen.extensions import DEVICES, described, names
@@ -37,6 +38,16 @@ _NOT_VIRTUAL: Final = frozenset({"lag_rad", "latency_s"})
 
 _NOT_PHANTOM: Final = frozenset({"roll_rad"})
 """Rolls of the phantom's base are exact; what its tip does follows from the friction."""
+
+_SURE_RISE_RATIO: Final = 0.9
+"""Near a region, the force rises by at least this part of what was measured before; ours."""
+
+_FELT_CLEARANCE_MM: Final = 0.75
+"""A needle whose force was measured before passes a region that it feels at this distance; ours:
+the way between two readings, and as much again for each of noise and latency."""
+
+_HALT_ABOVE_N: Final = 0.5
+"""A push is ended at once at this much more than the rise at which the needle stops after it."""
 
 _LAYER_SIGMAS: Final = 3.0
 """Differences of layers are no alarm up to this many standard deviations; ours."""
@@ -126,12 +137,16 @@ class Chosen:
             return settings
         # Half of the rise to be detected is slack: layers never add to the sum of the test.
         layers_n = self.parameters.forces.layers_n(_LAYER_SIGMAS)
-        return replace(
+        settings = replace(
             settings,
             compensated_lag_rad=_usual_phantom().torsion.lag_rad,
             force_n=max(settings.force_n, 2.0 * layers_n),
+            force_rise_n_per_mm=_SURE_RISE_RATIO * self.parameters.forces.region_n_per_mm,
+            felt_clearance_mm=_FELT_CLEARANCE_MM,
             ranking=ROBUST_RANKING,
         )
+        halt_n = stop_force_n(settings) + _HALT_ABOVE_N
+        return replace(settings, halt_force_n=max(settings.halt_force_n, halt_n))
 
     def fitting(self, settings: Settings, scene: Scene, known: str) -> Settings:
         """The settings that fit this needle and the scene, as after a calibration.

@@ -12,6 +12,7 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
+from ntagen.drive.force import stop_force_n
 from ntagen.drive.settings import Settings
 from ntagen.scene import Scene
 
@@ -63,7 +64,8 @@ def relies_on(settings: Settings, scene: Scene, course: Course | None = None) ->
         f"of {settings.deviation_count} or more readings"
     )
     if settings.force_sensing:
-        force = f"on the force: stops when it rises by {settings.force_n:g} N"
+        felt_n = max(settings.force_n, stop_force_n(settings))
+        force = f"on the force: stops when it rises by {felt_n:g} N"
     else:
         force = "not on the force: unknown regions are not felt"
     margin_mm = settings.margins.clearance_mm

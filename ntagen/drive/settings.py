@@ -50,6 +50,9 @@ class Settings:
             so that a force that stays the same is not that of a dead sensor.
         force_rise_n_per_mm: The least rise of the force on the way towards a region, once it rises;
             ours.
+        felt_clearance_mm: A needle that feels a region goes on while the force says that it is
+            farther than this from its surface. With the sensing margin or more, it stops as soon
+            as it feels one, as in the paper.
         false_alarm: The probability that noise alone stops a run, for the force and for the
             deviation each; ours.
         overrun_mm: How far the needle moves on after it was told to stop. 0 for needles that are
@@ -84,6 +87,7 @@ class Settings:
     halt_force_n: float = 1.0
     force_noise_n: float = 0.01
     force_rise_n_per_mm: float = 0.5
+    felt_clearance_mm: float = 3.0
     false_alarm: float = 0.001
     overrun_mm: float = 0.0
     pull_mm: float = 10.0

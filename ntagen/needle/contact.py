@@ -1,10 +1,10 @@
 """Where a region lies that was felt: the ball that explains all contacts, and all silence.
 
-A region is felt at a known distance from its surface. So each contact tells how far its centre is
-from the tip, and each place that the tip passed without a rise tells how far it is at least. One
+At a contact the tip is at a known distance from a region's surface. So each contact tells how far
+its centre is from the tip, and each place that the tip passed tells how far it is at least. One
 contact leaves the direction open: then the region is assumed straight ahead. A second one on
-another side of the same region leaves a circle, a third one two points; the silence of the channels
-excludes most of the rest. The best ball is found by least squares.
+another side of the same region leaves a circle, a third one two points; the channels that were cut
+exclude most of the rest. The best ball is found by least squares.
 """
 
 from __future__ import annotations
@@ -30,22 +30,39 @@ _RADIUS_STD_MM: Final = 1.5
 """How well the radius of a region is guessed."""
 
 _EXPLAINED_MM: Final = 1.0
-"""A ball explains contacts and silence if no distance is wrong by more than this."""
+"""A ball explains contacts and channels if no distance is wrong by more than this."""
 
 _LEAST_RADIUS_MM: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+class Assumed:
+    """What is assumed of regions that nobody told.
+
+    Attributes:
+        margin_mm: The force begins to rise at this distance from the surface.
+        clearance_mm: The needle passes them at this distance or more.
+        radius_mm: The radius of one that was felt once.
+    """
+
+    margin_mm: float
+    clearance_mm: float
+    radius_mm: float
+
+
+@dataclass(frozen=True, slots=True)
 class Contact:
-    """A place where the force began to rise.
+    """A place from which the needle did not go on, since the force rose.
 
     Attributes:
         position_mm: The tip.
         heading: Its direction of travel.
+        away_mm: Its distance from the surface of the region.
     """
 
     position_mm: Vector
     heading: Vector
+    away_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,28 +80,26 @@ class Ball:
     center_std_mm: float
 
 
-def ball_of(
-    contacts: Sequence[Contact], quiet: Sequence[Vector], margin_mm: float, radius_mm: float
-) -> Ball | None:
-    """The ball that explains these contacts and the silence of these places; None without one.
+def ball_of(contacts: Sequence[Contact], passed: Sequence[Vector], assumed: Assumed) -> Ball | None:
+    """The ball that explains these contacts and these places; None without one.
 
     Args:
         contacts: One or more contacts with the same region.
-        quiet: Places that the tip passed without a rise.
-        margin_mm: The distance from a region's surface at which the force rises.
-        radius_mm: The expected radius.
+        passed: Places that the tip passed.
+        assumed: What is assumed of the region.
     """
     points = np.array([one.position_mm for one in contacts])
     headings = np.array([one.heading for one in contacts])
-    silent = np.array(quiet).reshape(-1, 3)
-    ahead = points + (margin_mm + radius_mm) * headings
+    away_mm = np.array([one.away_mm for one in contacts])
+    places = np.array(passed).reshape(-1, 3)
+    ahead = points + (away_mm + assumed.radius_mm)[:, None] * headings
 
     def parts(unknowns: _Array) -> tuple[_Array, _Array]:
-        """By how much the distances of contacts and of silent places are wrong."""
-        center, reach_mm = unknowns[:3], unknowns[3] + margin_mm
-        felt = np.linalg.norm(points - center, axis=1) - reach_mm
-        near = np.minimum(0.0, np.linalg.norm(silent - center, axis=1) - reach_mm)
-        return felt, near
+        """By how much the distances of contacts and of places that were passed are wrong."""
+        center, radius_mm = unknowns[:3], unknowns[3]
+        felt = np.linalg.norm(points - center, axis=1) - radius_mm - away_mm
+        away = np.linalg.norm(places - center, axis=1) - radius_mm
+        return felt, np.minimum(0.0, away - assumed.clearance_mm)
 
     def residuals(unknowns: _Array) -> _Array:
         felt, near = parts(unknowns)
@@ -93,12 +108,12 @@ def ball_of(
                 felt / _FELT_STD_MM,
                 near / _FELT_STD_MM,
                 ((unknowns[:3] - ahead) / (_AHEAD_STD_MM * len(contacts) ** 0.5)).ravel(),
-                [(unknowns[3] - radius_mm) / _RADIUS_STD_MM],
+                [(unknowns[3] - assumed.radius_mm) / _RADIUS_STD_MM],
             ]
         )
 
-    start = np.append(ahead.mean(axis=0), radius_mm)
-    lower = [-np.inf, -np.inf, -np.inf, min(_LEAST_RADIUS_MM, 0.5 * radius_mm)]
+    start = np.append(ahead.mean(axis=0), assumed.radius_mm)
+    lower = [-np.inf, -np.inf, -np.inf, min(_LEAST_RADIUS_MM, 0.5 * assumed.radius_mm)]
     # Few runs feel a region, and the import takes half a second.
     from scipy.optimize import least_squares  # type: ignore[import-untyped]
 

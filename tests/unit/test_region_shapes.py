@@ -17,6 +17,7 @@ from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.drive.supervisor import Guard
 from ntagen.drive.viewing import show_scene
 from ntagen.errors import InputError
+from ntagen.needle.contact import Assumed, Contact
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.nearest import TOLERANCE_MM, enters_at, nearest_to
@@ -26,7 +27,7 @@ from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import certify
 from ntagen.plan.stricter import stricter as narrower
 from ntagen.plot.picture import Picture, draw
-from ntagen.scene import Region
+from ntagen.scene import Pose, Region
 from ntagen.shapes import Box, Capsule, Cylinder, Ellipsoid, HalfSpace, Shape, Sphere, turning
 from tests.scenes import PAPER, paper
 
@@ -40,6 +41,7 @@ SHAPES: dict[str, Shape] = {
 }
 PLAN = Plan((Push(16.0), Roll(math.radians(90)), Push(30.0)))
 START = PAPER.needle.tip
+ASSUMED = Assumed(margin_mm=3.0, clearance_mm=3.0, radius_mm=2.0)
 
 
 def critical(shape: Shape) -> Region:
@@ -124,11 +126,11 @@ def test_the_driver_knows_the_shell_of_a_shape(name: str) -> None:
     assert hidden.criticals == hidden.detections == ()
     # A contact a little outside of the shell is explained by the region, and makes its shell wider.
     knowledge = Knowledge(scene)
-    known = knowledge.with_contact(_tip_at(region, 3.5), margin_mm=3.0, radius_mm=2.0)
+    known = knowledge.with_contact(_felt_at(region, 3.5), ASSUMED)
     assert [(one.name, one.kind) for one in known.learned] == [("C felt", "detection")]
     assert known.learned[0].shape.depth_mm == pytest.approx(region.shape.depth_mm + 4.5)
     # One that is far away is a new region.
-    new = knowledge.with_contact(_tip_at(region, 9.0), margin_mm=3.0, radius_mm=2.0)
+    new = knowledge.with_contact(_felt_at(region, 9.0), ASSUMED)
     assert [one.name for one in new.learned] == ["learned 1", "learned 1 shell"]
     # A shell in which the tip lies gets smaller.
     inside = knowledge.scene(_tip_at(region, 2.0), 30.0)
@@ -138,7 +140,12 @@ def test_the_driver_knows_the_shell_of_a_shape(name: str) -> None:
     assert knowledge.expected_force_n(_tip_at(region, 5.0).position_mm, settings) == 0.0
 
 
-def _tip_at(region: Region, away_mm: float) -> object:
+def _felt_at(region: Region, away_mm: float) -> Contact:
+    tip = _tip_at(region, away_mm)
+    return Contact(tip.position_mm, tip.heading, 3.0)
+
+
+def _tip_at(region: Region, away_mm: float) -> Pose:
     """A pose this far from the surface, straight above the middle."""
     x, y, z = region.center_mm
     low, high = 0.0, 200.0

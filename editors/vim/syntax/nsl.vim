@@ -62,6 +62,7 @@ syntax match nslSetting /\<force\s\+sensing\>/ contained
 syntax match nslSetting /\<force\s\+rise\>/ contained
 syntax match nslSetting /\<force\s\+noise\>/ contained
 syntax match nslSetting /\<false\s\+alarm\>/ contained
+syntax match nslSetting /\<felt\s\+clearance\>/ contained
 syntax match nslSetting /\<engine\s\+time\>/ contained
 syntax match nslSetting /\<engine\s\+memory\>/ contained
 syntax match nslSetting /\<deviation\s\+count\>/ contained

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ntagen.drive.force import ForceMonitor, PageTest, fitting_spacing_mm
+from ntagen.drive.force import ForceMonitor, PageTest, fitting_spacing_mm, stop_force_n
 from ntagen.drive.settings import Settings
 from ntagen.errors import InputError
 
@@ -96,6 +96,51 @@ def test_softer_tissue_is_learned_where_the_needle_has_not_been() -> None:
     for depth_mm in np.arange(0.0, 60.0, SETTINGS.spacing_mm):
         assert monitor.note(depth_mm, 1.0 if depth_mm < 10.0 else 0.2) is None
     assert monitor.expected_n(60.0) < 0.4
+
+
+PASSING = replace(SETTINGS, force_rise_n_per_mm=1.0, sensing_margin_mm=3.0, felt_clearance_mm=1.0)
+"""The needle stops at a rise of 2 N."""
+
+
+@pytest.mark.parametrize("most_n", [1.5, 3.0])
+def test_a_region_is_passed_unless_it_may_be_too_near(most_n: float) -> None:
+    assert stop_force_n(PASSING) == pytest.approx(2.0)
+    monitor = ForceMonitor(PASSING, LENGTH_MM)
+    forces = readings(3, 0.02)
+    for index, plain_n in enumerate(forces):
+        depth_mm = index * PASSING.spacing_mm
+        rise_n = max(0.0, most_n - abs(depth_mm - 50.0))
+        rise = monitor.note(depth_mm, float(plain_n) + rise_n)
+        if rise is not None:
+            assert rise_n == pytest.approx(2.0, abs=0.5)
+            assert rise.force_n == pytest.approx(rise_n, abs=0.3)
+            assert rise.felt_mm == depth_mm
+            assert rise.began_mm == pytest.approx(50.0 - most_n, abs=1.0)
+            break
+    assert (rise is not None) == (most_n > 2.0)
+    # What was felt in the margin tells nothing about plain insertion.
+    assert monitor.expected_n(80.0) == pytest.approx(0.3 + 0.02 * 80.0, abs=0.2)
+
+
+def test_a_tip_that_has_left_its_old_channel_is_noticed() -> None:
+    monitor = ForceMonitor(PASSING, LENGTH_MM)
+    for index, force_n in enumerate(readings(3, 0.02)[:100]):
+        assert monitor.note(index * PASSING.spacing_mm, float(force_n)) is None
+    assert monitor.note_in_channel(20.0, 0.4) is None
+    assert monitor.note_in_channel(20.25, 2.0) is None
+    rise = monitor.note_in_channel(20.5, 3.0)
+    assert rise is not None
+    assert rise.force_n == pytest.approx(3.0 - 0.3 - 0.41, abs=0.1)
+    # A needle that stops as soon as it feels a region does not get deep enough for that.
+    assert ForceMonitor(SETTINGS, LENGTH_MM).note_in_channel(20.5, 3.0) is None
+
+
+def test_the_way_after_a_stop_counts_as_clearance() -> None:
+    assert stop_force_n(replace(PASSING, overrun_mm=0.5)) == pytest.approx(1.5)
+    assert stop_force_n(SETTINGS) == 0.0
+    assert fitting_spacing_mm(PASSING, 3.0, LENGTH_MM) == PASSING.spacing_mm
+    near = replace(PASSING, felt_clearance_mm=0.3)
+    assert fitting_spacing_mm(near, 3.0, LENGTH_MM) < PASSING.spacing_mm
 
 
 def test_thin_margins_need_short_pushes_and_too_thin_ones_are_refused() -> None:

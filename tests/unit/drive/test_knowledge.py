@@ -13,6 +13,7 @@ from ntagen.drive.knowledge import Knowledge, told
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm, shells_of
 from ntagen.errors import InputError
+from ntagen.needle.contact import Assumed, Contact
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.vectors import distance
 from ntagen.scene import Pose, Region
@@ -21,10 +22,16 @@ from tests.steering import CRITICAL, DETECTION, ENTRY, PAPER, scene, sphere
 OTHER = sphere("C2", "critical", (20.0, -25.0, 0.0), 2.0)
 PLAIN_SHELL = sphere("D2", "detection", (20.0, -25.0, 0.0), 4.0)
 TWO = scene(CRITICAL, OTHER, DETECTION, PLAIN_SHELL)
+ASSUMED = Assumed(margin_mm=3.0, clearance_mm=3.0, radius_mm=2.0)
+"""The needle stops as soon as it feels a region."""
 
 
 def pose_at(x: float, y: float, z: float) -> Pose:
     return Pose((x, y, z), ENTRY.heading, ENTRY.bevel)
+
+
+def felt_at(tip: Pose, away_mm: float = 3.0) -> Contact:
+    return Contact(tip.position_mm, tip.heading, away_mm)
 
 
 def check_told(known: str, *names: str) -> None:
@@ -59,22 +66,31 @@ def test_the_sensing_margin_is_the_depth_of_the_shell() -> None:
 
 def test_a_contact_becomes_a_ball_ahead_whose_shell_touches_the_tip() -> None:
     tip = pose_at(0.0, -10.0, 0.0)
-    learned = Knowledge(scene()).with_contact(tip, 3.0, 2.0).learned
+    learned = Knowledge(scene()).with_contact(felt_at(tip), ASSUMED).learned
     ball, shell = learned
     assert (ball.kind, ball.center_mm, ball.radius_mm) == ("critical", (0.0, -15.0, 0.0), 2.0)
     assert (shell.kind, shell.around, shell.radius_mm) == ("detection", ball.name, 5.0)
     assert distance(tip.position_mm, shell.center_mm) == pytest.approx(shell.radius_mm)
 
 
+def test_a_region_that_may_be_passed_has_a_thin_shell() -> None:
+    assumed = replace(ASSUMED, clearance_mm=0.75)
+    contact = felt_at(pose_at(0.0, -10.0, 0.0), away_mm=1.0)
+    ball, shell = Knowledge(scene()).with_contact(contact, assumed).learned
+    assert (ball.center_mm, ball.radius_mm) == ((0.0, -13.0, 0.0), 2.0)
+    # The place of the contact is not tried again.
+    assert shell.radius_mm == pytest.approx(3.0)
+
+
 def test_contacts_far_apart_stay_two_regions() -> None:
-    knowledge = Knowledge(scene()).with_contact(pose_at(0.0, -10.0, 0.0), 3.0, 2.0)
-    knowledge = knowledge.with_contact(pose_at(15.0, -10.0, 0.0), 3.0, 2.0)
+    knowledge = Knowledge(scene()).with_contact(felt_at(pose_at(0.0, -10.0, 0.0)), ASSUMED)
+    knowledge = knowledge.with_contact(felt_at(pose_at(15.0, -10.0, 0.0)), ASSUMED)
     assert [r.kind for r in knowledge.learned].count("critical") == 2
 
 
 def test_contacts_with_nothing_between_them_become_one_region() -> None:
-    knowledge = Knowledge(scene()).with_contact(pose_at(0.0, -10.0, 0.0), 3.0, 2.0)
-    knowledge = knowledge.with_contact(pose_at(6.0, -10.0, 0.0), 3.0, 2.0)
+    knowledge = Knowledge(scene()).with_contact(felt_at(pose_at(0.0, -10.0, 0.0)), ASSUMED)
+    knowledge = knowledge.with_contact(felt_at(pose_at(6.0, -10.0, 0.0)), ASSUMED)
     (ball,) = (r for r in knowledge.learned if r.kind == "critical")
     for x in (0.0, 6.0):
         felt_at_mm = distance(ball.center_mm, (x, -10.0, 0.0)) - ball.radius_mm
@@ -83,10 +99,10 @@ def test_contacts_with_nothing_between_them_become_one_region() -> None:
 
 def test_a_contact_near_a_known_region_widens_its_shell() -> None:
     tip = pose_at(0.0, -20.2, 0.0)
-    knowledge = Knowledge(PAPER).with_contact(tip, 3.0, 2.0)
+    knowledge = Knowledge(PAPER).with_contact(felt_at(tip), ASSUMED)
     (shell,) = knowledge.learned
     assert (shell.kind, shell.center_mm) == ("detection", CRITICAL.center_mm)
-    again = knowledge.with_contact(tip, 3.0, 2.0)
+    again = knowledge.with_contact(felt_at(tip), ASSUMED)
     assert again.learned[0].radius_mm > shell.radius_mm > DETECTION.radius_mm
     assert len(again.learned) == 1
 
@@ -100,7 +116,7 @@ def test_learned_shells_cover_every_contact(
 ) -> None:
     knowledge = Knowledge(scene())
     for place in places:
-        knowledge = knowledge.with_contact(pose_at(*place), 3.0, 2.0)
+        knowledge = knowledge.with_contact(felt_at(pose_at(*place)), ASSUMED)
         assert covered(place, knowledge.learned)
     assert all(covered(place, knowledge.learned) for place in places)
 
@@ -121,7 +137,7 @@ def test_what_was_cut_safely_is_never_covered_by_a_learned_region() -> None:
     places = [(0.0, -10.0, 0.0), (8.0, -10.0, 0.0)]
     knowledge = Knowledge(scene())
     for place in places:
-        knowledge = knowledge.with_contact(pose_at(*place), 3.0, 2.0, channel)
+        knowledge = knowledge.with_contact(felt_at(pose_at(*place)), ASSUMED, channel)
     balls = [region for region in knowledge.learned if region.kind == "critical"]
     assert balls
     for ball in balls:
@@ -147,7 +163,7 @@ def test_known_regions_explain_a_rise_up_to_their_surface() -> None:
 def test_a_learned_region_does_not_reach_into_a_safe_one() -> None:
     tip = pose_at(0.0, -10.0, 0.0)
     safe = sphere("S", "safe", (3.0, -15.0, 0.0), 2.0)
-    knowledge = Knowledge(replace(scene(), safe=(safe,))).with_contact(tip, 3.0, 2.0)
+    knowledge = Knowledge(replace(scene(), safe=(safe,))).with_contact(felt_at(tip), ASSUMED)
     ball, shell = knowledge.learned
     assert ball.radius_mm == pytest.approx(1.0)
     assert distance(tip.position_mm, shell.center_mm) <= shell.radius_mm + 1e-9
