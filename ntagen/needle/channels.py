@@ -2,7 +2,7 @@
 
 A push cuts a channel. After a pull and a roll, the next push leaves it: a new channel begins there.
 Each channel is divided where the depth is a multiple of `STRETCH_MM`; at these places curvature and
-bend plane may change (`ntagen.needle.estimate`). Without such changes, a channel is one stretch.
+bend plane may change (`ntagen.needle.fluctuations`). Without changes, a channel is one stretch.
 
 The derivatives are exact. If an unknown changes by ``dx``, all that lies beyond it moves as a rigid
 body: a point ``x`` by ``w x x + v``, with a rotation vector ``w`` and a translation ``v`` that are
@@ -33,31 +33,32 @@ STRETCH_MM = 5.0
 """The length of the stretches. Longer ones predict worse: on phantom runs, the 95 % quantile of the
 error after 10 mm was 1.9 mm with 10 mm, 1.5 mm with 5 mm, and the same with 2.5 mm."""
 
-MEMORY_MM = 10.0
-"""A change of the curvature fades over this length: measured curvatures fluctuate around that of
-the whole insertion (`ntagen.needle.phantom_parameters`). On phantom runs, the median error after 20
-mm was 1.6 mm with changes that stay, and 1.4 mm with this."""
-
 _NOTHING_MM = 1e-9
+_NONE: _Array = np.zeros(0)
 
 
-_KEPT_RATIO = math.exp(-STRETCH_MM / MEMORY_MM)
-"""What is left of a change after one stretch."""
+def _none() -> _Array:
+    return _NONE
 
 
 @dataclass(slots=True)
 class Stretch:
     """A part of a channel with one curvature, in one plane.
 
+    What the tissue does there is a linear combination of unknowns, by its coefficients; it may have
+    fewer than there are unknowns (`ntagen.needle.fluctuations`).
+
     Attributes:
         offset_mm: Where it begins in its channel.
-        curvature: The index of the unknown change of the curvature's logarithm at its beginning.
-        turn: The index of the unknown turn of the bend plane there.
+        growth: The logarithm of its curvature, relative to that at the entry.
+        turn: The angle by which the tissue has turned the bend plane.
+        expected: What is added to `growth` whatever the unknowns are.
     """
 
     offset_mm: float
-    curvature: int | None = None
-    turn: int | None = None
+    growth: _Array = field(default_factory=_none)
+    turn: _Array = field(default_factory=_none)
+    expected: float = 0.0
 
 
 @dataclass(slots=True)
@@ -79,7 +80,7 @@ class Channel:
     depth_mm: float
     roll_rad: float
     rolls: tuple[int, ...]
-    stretches: list[Stretch] = field(default_factory=lambda: [Stretch(0.0)])
+    stretches: list[Stretch] = field(default_factory=list)
     extent_mm: float = 0.0
 
     def new_boundaries(self, extent_mm: float) -> list[float]:
@@ -87,8 +88,8 @@ class Channel:
         first = math.ceil((self.depth_mm + self.extent_mm) / STRETCH_MM - _NOTHING_MM)
         last = math.ceil((self.depth_mm + extent_mm) / STRETCH_MM - _NOTHING_MM)
         offsets_mm = [number * STRETCH_MM - self.depth_mm for number in range(first, last)]
-        # The channel's own beginning has a stretch already.
-        return [offset_mm for offset_mm in offsets_mm if offset_mm > _NOTHING_MM]
+        inner_mm = [offset_mm for offset_mm in offsets_mm if offset_mm > _NOTHING_MM]
+        return inner_mm if self.stretches else [0.0, *inner_mm]
 
     def stretch_at(self, offset_mm: float) -> int:
         """The index of the stretch in which a place lies; its end belongs to it."""
@@ -168,26 +169,48 @@ class Placed:
                 _turn_about(rotation, shift, unknown, start.heading, start.position_mm)
         return Placed(start, self.curvature_per_mm, rotation, shift, self.growth)
 
-    def faded(self, share: float, lasting: Placed) -> Placed:
-        """The same with this share of its curvature's difference from a lasting one.
+    def among(self, stretch: Stretch, entry: Placed, unknowns: _Array, before: _Array) -> Placed:
+        """The same with the curvature and the bend plane of a stretch.
 
-        The difference is that of the logarithms.
+        Args:
+            stretch: The stretch that begins here.
+            entry: What lasts: the curvature at the entry.
+            unknowns: The unknowns.
+            before: The coefficients of the bend plane's turn before, as `Stretch.turn`.
         """
-        difference = math.log(self.curvature_per_mm / lasting.curvature_per_mm)
+        placed = self
+        if len(stretch.turn) or len(before):
+            turn = padded(stretch.turn, len(unknowns)) - padded(before, len(unknowns))
+            placed = self.turned(turn, unknowns)
+        growth = padded(stretch.growth, len(unknowns))
+        change = float(growth @ unknowns) + stretch.expected
         return Placed(
-            self.start,
-            lasting.curvature_per_mm * math.exp(share * difference),
-            self.rotation,
-            self.shift,
-            lasting.growth + share * (self.growth - lasting.growth),
+            placed.start,
+            entry.curvature_per_mm * math.exp(change),
+            placed.rotation,
+            placed.shift,
+            entry.growth + growth,
         )
 
-    def bent(self, change: float, unknown: int) -> Placed:
-        """The same with another curvature, by an unknown change of its logarithm."""
-        growth = self.growth.copy()
-        growth[unknown] += 1.0
-        curvature_per_mm = self.curvature_per_mm * math.exp(change)
-        return Placed(self.start, curvature_per_mm, self.rotation, self.shift, growth)
+    def turned(self, turn: _Array, unknowns: _Array) -> Placed:
+        """The same after a turn of the bend plane with these coefficients."""
+        start = roll(self.start, float(turn @ unknowns))
+        heading = np.array(start.heading)
+        moved = np.array(cross(start.heading, start.position_mm))
+        return Placed(
+            start,
+            self.curvature_per_mm,
+            self.rotation + heading[:, None] * turn,
+            self.shift - moved[:, None] * turn,
+            self.growth,
+        )
+
+
+def padded(coefficients: _Array, width: int) -> _Array:
+    """The same coefficients for more unknowns."""
+    full = np.zeros(width)
+    full[: len(coefficients)] = coefficients
+    return full
 
 
 def placed_entry(entry: Pose, curvature_per_mm: float, unknowns: _Array) -> Placed:
@@ -223,6 +246,7 @@ def place(
     start = placed_entry(entry, curvature_per_mm, unknowns)
     placed: list[list[Placed]] = []
     for channel in channels:
+        before = _NONE
         if channel.parent == ENTRY:
             begin = start
         else:
@@ -230,17 +254,16 @@ def place(
             number = parent.stretch_at(channel.branch_mm)
             along_mm = channel.branch_mm - parent.stretches[number].offset_mm
             begin = placed[channel.parent][number].beyond(along_mm)
+            before = parent.stretches[number].turn
         error_rad = sum(float(unknowns[i]) for i in channel.rolls)
         current = begin.rolled(channel.roll_rad + error_rad, channel.rolls)
-        parts = [current]
-        for before, stretch in zip(channel.stretches, channel.stretches[1:], strict=False):
-            current = current.beyond(stretch.offset_mm - before.offset_mm)
-            if stretch.curvature is not None:
-                current = current.faded(_KEPT_RATIO, start)
-                current = current.bent(float(unknowns[stretch.curvature]), stretch.curvature)
-            if stretch.turn is not None:
-                current = current.rolled(float(unknowns[stretch.turn]), (stretch.turn,))
+        parts: list[Placed] = []
+        offset_mm = 0.0
+        for stretch in channel.stretches:
+            current = current.beyond(stretch.offset_mm - offset_mm)
+            current = current.among(stretch, start, unknowns, before)
             parts.append(current)
+            offset_mm, before = stretch.offset_mm, stretch.turn
         placed.append(parts)
     return start, placed
 

@@ -30,7 +30,7 @@ unknowns are then within 0.001 of their standard deviations."""
 
 def least_squares(
     problem: Callable[[_Array], tuple[_Array, _Array]], start: _Array, stds: _Array
-) -> tuple[_Array, _Array, _Array]:
+) -> tuple[_Array, _Array]:
     """The unknowns with the least sum of squared residuals, near a start.
 
     Args:
@@ -39,7 +39,7 @@ def least_squares(
         stds: The standard deviations of the unknowns' priors: the scales of the damping.
 
     Returns:
-        The unknowns, their residuals, and their covariance there.
+        The unknowns, and their covariance there.
     """
     unknowns = start
     residuals, slopes = problem(unknowns)
@@ -65,7 +65,7 @@ def least_squares(
         if promised <= _SMALL_GAIN * (1.0 + squares):
             break
     normal, _ = _normal_equations(residuals, slopes)
-    return unknowns, residuals, np.asarray(np.linalg.inv(normal), dtype=np.float64)
+    return unknowns, np.asarray(np.linalg.inv(normal), dtype=np.float64)
 
 
 def _normal_equations(residuals: _Array, slopes: _Array) -> tuple[_Array, _Array]:

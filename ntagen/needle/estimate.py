@@ -8,28 +8,29 @@ channels that were cut (`ntagen.needle.channels`), with a few unknowns:
 * the entry pose (three for the position, three small rotations),
 * the curvature at the entry, as a factor of the expected one,
 * the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base,
-* the changes of curvature and bend plane from one stretch of 5 mm to the next, if their priors
-  are not 0: the turn of the bend plane is a random walk, and a change of the curvature fades over
-  10 mm. So old measurements say less about the present curvature than new ones.
+* what curvature and bend plane do in each stretch of 5 mm, if their priors are not 0
+  (`ntagen.needle.fluctuations`). So old measurements say less about the present than new ones.
 
 Non-linear least squares finds the unknowns with the greatest posterior density. The noise weighs
 each measurement, and the prior weighs each unknown. Measurements in a channel that the needle has
-left still count: they tell about the entry, the curvature and the rolls.
+left still count: they tell about the entry, the curvature, the rolls and the tissue.
 
-Cost and errors on phantom needles: `tests/benchmarks/predictions.py` measures them.
+Cost and errors on phantom needles: `tests/benchmarks/predictions.py` measures them, and
+`tests/benchmarks/filters.py` compares with recursive filters.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, MEMORY_MM, STRETCH_MM, Channel, Placed, Stretch, place
+from ntagen.needle.channels import ENTRY, STRETCH_MM, Channel, Placed, Stretch, padded, place
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
+from ntagen.needle.fluctuations import Process, fluctuating, turning
 from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push, pushed_to
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
@@ -48,20 +49,12 @@ RECENT = 8
 """So many of the last measurements count for `Estimate.misfit_mm`; ours: those of a push of 2 mm in
 pieces of 0.25 mm."""
 
-_DRIFT_LENGTH_MM = 10.0
-"""The length for which drifts are given; over another length, a random walk goes with its root."""
-
 _AHEAD_MM = 30.0
 """Predictions are made for about this length: the usual one of a plan's rest."""
 
-_STAYING_RATIO = 2.0 * (
-    MEMORY_MM / _AHEAD_MM - (MEMORY_MM / _AHEAD_MM) ** 2 * (1.0 - math.exp(-_AHEAD_MM / MEMORY_MM))
-)
-"""The part of a change of curvature that would have the same effect on the position after
-`_AHEAD_MM` if it did not fade: the mean of exp(-u / memory), weighted with the length left."""
-
-_STRETCH_RATIO = math.sqrt(STRETCH_MM / _DRIFT_LENGTH_MM)
-"""The drift over one stretch, relative to that over `_DRIFT_LENGTH_MM`."""
+_STEP_MM = 5.0
+_STEPS = 20
+"""What lies ahead is divided into so many steps; the last one has no end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,17 +63,16 @@ class Estimate:
 
     Attributes:
         path: The estimated channel in which the needle lies now; its end is the tip.
-        radius_mm: The expected radius of the motion circle over the next 30 mm: of the present
-            change of the curvature, only a part stays. Without drift it is that of the whole path.
-        radius_std_mm: Its standard deviation.
+        radius_mm: The radius of the motion circle that is expected over the next 30 mm: the
+            present curvature does not stay. Without drift it is that of the whole path.
+        radius_std_mm: The standard deviation of the mean radius over these 30 mm.
         rms_mm: Root mean square of the distances between measured and estimated positions.
         misfit_mm: The length of the mean difference between the last measured positions and the
             estimated ones (`RECENT` of them): what no needle explains that was moved as commanded.
             0 while there are fewer.
         covariance: Of the tip, in seven rows: position (x, y, z in mm), rotation vector (about x,
-            y, z in rad), logarithm of the expected curvature.
-        curvature_drift: `Priors.curvature_drift`, for predictions.
-        turn_drift_rad: `Priors.turn_drift_rad`, for predictions.
+            y, z in rad), logarithm of the mean curvature over the next 30 mm.
+        ahead: What is known of the tissue ahead, for predictions.
     """
 
     path: Path
@@ -88,8 +80,7 @@ class Estimate:
     radius_std_mm: float
     rms_mm: float
     covariance: tuple[tuple[float, ...], ...]
-    curvature_drift: float = 0.0
-    turn_drift_rad: float = 0.0
+    ahead: Ahead = field(compare=False, repr=False)
     misfit_mm: float = 0.0
 
     @property
@@ -100,38 +91,16 @@ class Estimate:
     def position_covariance_mm2(self, length_mm: float) -> _Array:
         """The covariance of the tip's position after a further push, along x, y and z, in mm².
 
-        It contains what the estimator knows of its own errors: those of the tip's position,
-        direction and bend plane and of the curvature, with their correlations, and the drift of
-        curvature and bend plane during the push (`Priors`). It does not contain the noise of a
+        It is that of the end of an arc of the expected circle. It contains what the estimator knows
+        of its own errors: those of the tip's position and direction, and of curvature and bend
+        plane all along the push, with their correlations. It does not contain the noise of a
         measurement at that place, nor the error of a roll that is made before the push, nor what
         the priors do not say (layers, a moving target).
-
-        A drift that begins ``u`` mm before the end of the push displaces the end by ``k u^2 / 2``
-        times its size, to the side or out of the plane. For a random walk of variance ``q`` per mm
-        over ``s`` mm this gives the variance ``k^2 q s^5 / 20``. The curvature's changes fade, so
-        for them this is a little too much.
 
         Args:
             length_mm: The length of the push, at least 0.
         """
-        tip, curvature = self.tip, 1.0 / self.radius_mm
-        ahead = Placed(tip, curvature, np.zeros((3, 7)), np.zeros((3, 7)), np.zeros(7))
-        ahead.rotation[:, 3:6] = np.eye(3)
-        ahead.shift[:, :3] = np.eye(3)
-        x, y, z = tip.position_mm
-        # The rotation is about the tip, not about the origin.
-        ahead.shift[:, 3:6] = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        ahead.growth[6] = 1.0
-        slopes = ahead.positions(np.array([length_mm]))[1][0]
-        covariance = slopes @ np.array(self.covariance) @ slopes.T
-        end = push(tip, self.radius_mm, length_mm)
-        spread_mm2 = curvature**2 * length_mm**5 / (20.0 * _DRIFT_LENGTH_MM)
-        for drift, direction in (
-            (self.curvature_drift, np.array(end.bevel)),
-            (self.turn_drift_rad, np.array(bending_axis(end))),
-        ):
-            covariance += drift**2 * spread_mm2 * np.outer(direction, direction)
-        return np.asarray(covariance)
+        return self.ahead.position_covariance_mm2(self.tip, self.radius_mm, length_mm)
 
     def position_std_mm(self, length_mm: float) -> float:
         """The standard deviation of the tip's position after a further push, in mm.
@@ -145,6 +114,48 @@ class Estimate:
         """
         largest = np.linalg.eigvalsh(self.position_covariance_mm2(length_mm))[-1]
         return math.sqrt(max(0.0, float(largest)))
+
+
+@dataclass(frozen=True, slots=True)
+class Ahead:
+    """The tissue ahead of the tip, in steps, and how what is known of it depends on the pose.
+
+    Attributes:
+        covariance: Of the position, of the rotation vector of the tip without the turn of the bend
+            plane, and of the logarithm of the curvature and the turn of the bend plane in each step.
+        differences: How much more than on the expected circle the logarithm of the curvature and
+            the turn of the bend plane are expected to be, in each step.
+    """
+
+    covariance: _Array
+    differences: _Array
+
+    def position_covariance_mm2(self, tip: Pose, radius_mm: float, length_mm: float) -> _Array:
+        """The second moments of the error of a predicted position: `Estimate`.
+
+        If the curvature is more by a ratio over a short piece, all beyond it turns about its
+        bending axis, by this ratio of what the piece bends; if the bend plane turns by an angle, it
+        turns about the bevel.
+        """
+        slopes = np.zeros((3, len(self.covariance)))
+        slopes[:, :3] = np.eye(3)
+        end = np.array(pushed_to(tip, radius_mm, length_mm))
+        slopes[:, 3:6] = -_cross_matrix(end - np.array(tip.position_mm))
+        steps = len(self.differences) // 2
+        for step in range(steps):
+            begin_mm = step * _STEP_MM
+            if begin_mm > 0.0 and begin_mm >= length_mm:
+                break
+            piece_mm = length_mm - begin_mm
+            if step + 1 < steps:
+                piece_mm = min(piece_mm, _STEP_MM)
+            middle = push(tip, radius_mm, begin_mm + 0.5 * piece_mm)
+            way = end - np.array(middle.position_mm)
+            bend_rad = piece_mm / radius_mm
+            slopes[:, 6 + step] = bend_rad * np.cross(bending_axis(middle), way)
+            slopes[:, 6 + steps + step] = bend_rad * np.cross(middle.bevel, way)
+        off_mm = slopes[:, 6:] @ self.differences
+        return np.asarray(slopes @ self.covariance @ slopes.T + np.outer(off_mm, off_mm))
 
 
 class Estimator:
@@ -169,6 +180,9 @@ class Estimator:
         self._stds = [priors.position_mm] * 3
         self._stds += [priors.bevel_rad, priors.heading_rad, priors.heading_rad]
         self._stds += [priors.curvature_ratio]
+        drift, turn_rad = priors.curvature_drift, priors.turn_drift_rad
+        self._curvature = Process(fluctuating(drift)) if drift > 0.0 else None
+        self._turn = Process(turning(turn_rad)) if turn_rad > 0.0 else None
 
     @property
     def depth_mm(self) -> float:
@@ -182,7 +196,7 @@ class Estimator:
         channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
         if channel != ENTRY and not self._pending_rolls:
             self._inserted[-1] = (channel, inserted_mm + length_mm)
-            self._extend(self._channels[channel], inserted_mm + length_mm)
+            self._extend(channel, inserted_mm + length_mm)
             return
         depth_mm = self.depth_mm
         self._channels.append(
@@ -190,7 +204,7 @@ class Estimator:
         )
         self._inserted.append((len(self._channels) - 1, length_mm))
         self._pending_rad, self._pending_rolls = 0.0, ()
-        self._extend(self._channels[-1], length_mm)
+        self._extend(len(self._channels) - 1, length_mm)
 
     def roll(self, angle_rad: float) -> None:
         """Notes a roll."""
@@ -223,22 +237,20 @@ class Estimator:
         problem = Problem(self._readings, self._channels, self._priors, stds)
         expected = (self._entry, 1.0 / self._radius_mm)
 
-        self._solution, residuals, unknowns_covariance = least_squares(
+        self._solution, unknowns_covariance = least_squares(
             lambda unknowns: problem.at(unknowns, *expected), start, stds
         )
         begin, placed = place(self._channels, *expected, self._solution)
         path, present = self._path(self._solution, begin, placed)
-        tip = present.faded(_STAYING_RATIO, begin)
-        to_tip = _slopes_of(tip)
-        covariance = to_tip @ unknowns_covariance @ to_tip.T
+        tip, to_expected, ahead = self._ahead(present, begin, unknowns_covariance)
+        covariance = to_expected @ ahead.covariance @ to_expected.T
         return Estimate(
             path=path,
             radius_mm=tip.radius_mm,
             radius_std_mm=float(tip.radius_mm * math.sqrt(covariance[6, 6])),
-            rms_mm=problem.rms_mm(residuals),
+            rms_mm=problem.rms_mm(self._solution, *expected),
             covariance=tuple(tuple(float(value) for value in row) for row in covariance),
-            curvature_drift=self._priors.curvature_drift,
-            turn_drift_rad=self._priors.turn_drift_rad,
+            ahead=ahead,
             misfit_mm=self._misfit_mm(begin, placed),
         )
 
@@ -258,27 +270,81 @@ class Estimator:
             differences.append(subtract(reading.measurement.position_mm, expected_mm))
         return float(np.linalg.norm(np.mean(differences, axis=0)))
 
+    def _ahead(
+        self, tip: Placed, entry: Placed, unknowns_covariance: _Array
+    ) -> tuple[Placed, _Array, Ahead]:
+        """What is expected of the tissue ahead.
+
+        Returns:
+            The tip on the expected circle; the matrix from what `Ahead.covariance` is of to what
+            `Estimate.covariance` is of; and what is known ahead.
+        """
+        unknowns, width, depth_mm = self._solution, len(self._solution), self.depth_mm
+        channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
+        turn = np.zeros(width)
+        if channel != ENTRY:
+            parts = self._channels[channel]
+            turn = padded(parts.stretches[parts.stretch_at(inserted_mm)].turn, width)
+        if self._pending_rolls or channel == ENTRY:
+            channel = len(self._channels)
+        depths_mm = depth_mm + _STEP_MM * (np.arange(_STEPS) + 0.5)
+        rest = np.zeros((6 + 2 * _STEPS, 6 + 2 * _STEPS))
+        growths, turns = np.zeros((_STEPS, width)), np.tile(turn, (_STEPS, 1))
+        grown, turned = slice(6, 6 + _STEPS), slice(6 + _STEPS, None)
+        if self._curvature is not None:
+            growths, rest[grown, grown] = self._curvature.ahead(channel, depths_mm, width)
+        if self._turn is not None:
+            turns, rest[turned, turned] = self._turn.ahead(channel, depths_mm, width)
+        expected = np.array([self._expected(depth_mm) for depth_mm in depths_mm])
+        weights = _weights()
+        circle = Stretch(0.0, weights @ growths, weights @ turns, float(weights @ expected))
+        on_circle = tip.among(circle, entry, unknowns, turn)
+        heading = np.array(tip.start.heading)
+        rows = [tip.positions(np.zeros(1))[1][0], tip.rotation - np.outer(heading, turn)]
+        table = np.vstack([*rows, growths + entry.growth, turns])
+        differences = np.concatenate([growths @ unknowns + expected, turns @ unknowns])
+        differences[:_STEPS] -= weights @ differences[:_STEPS]
+        differences[_STEPS:] -= weights @ differences[_STEPS:]
+        to_expected = np.zeros((7, len(table)))
+        to_expected[:6, :6] = np.eye(6)
+        to_expected[3:6, turned] = np.outer(heading, weights)
+        to_expected[6, grown] = weights
+        ahead = Ahead(table @ unknowns_covariance @ table.T + rest, differences)
+        return on_circle, to_expected, ahead
+
+    def _expected(self, depth_mm: float) -> float:
+        """By how much the logarithm of the curvature differs at a depth, as expected."""
+        return 0.0
+
     def _unknown(self, std: float) -> int:
         """The index of a new unknown with this standard deviation."""
         self._stds.append(std)
         return len(self._stds) - 1
 
-    def _extend(self, channel: Channel, extent_mm: float) -> None:
+    def _extend(self, index: int, extent_mm: float) -> None:
         """Notes how far a channel was cut; new stretches get their unknowns."""
+        channel = self._channels[index]
         if extent_mm <= channel.extent_mm:
             return
-        drift = _STRETCH_RATIO * self._priors.curvature_drift
-        turn_rad = _STRETCH_RATIO * self._priors.turn_drift_rad
-        if drift > 0.0 or turn_rad > 0.0:
+        if self._curvature is None and self._turn is None:
+            channel.stretches = channel.stretches or [Stretch(0.0)]
+        else:
             for offset_mm in channel.new_boundaries(extent_mm):
-                channel.stretches.append(
-                    Stretch(
-                        offset_mm,
-                        curvature=self._unknown(drift) if drift > 0.0 else None,
-                        turn=self._unknown(turn_rad) if turn_rad > 0.0 else None,
-                    )
-                )
+                channel.stretches.append(self._stretch(index, channel.depth_mm, offset_mm))
         channel.extent_mm = extent_mm
+
+    def _stretch(self, channel: int, depth_mm: float, offset_mm: float) -> Stretch:
+        """A new stretch with its unknowns."""
+        stretch = Stretch(offset_mm)
+        begin_mm = depth_mm + offset_mm
+        end_mm = STRETCH_MM * (math.floor(begin_mm / STRETCH_MM + 1e-9) + 1.0)
+        middle_mm = 0.5 * (begin_mm + end_mm)
+        if self._curvature is not None:
+            stretch.growth = self._curvature.add(channel, middle_mm, self._unknown(1.0))
+        if self._turn is not None:
+            stretch.turn = self._turn.add(channel, middle_mm, self._unknown(1.0))
+        stretch.expected = self._expected(middle_mm)
+        return stretch
 
     def _path(
         self, unknowns: _Array, entry: Placed, placed: list[list[Placed]]
@@ -309,10 +375,18 @@ class Estimator:
         return Path(entry.start, tuple(stretches), pending_rad), tip
 
 
-def _slopes_of(tip: Placed) -> _Array:
-    """The derivatives of position, rotation vector and curvature at the tip by the unknowns."""
-    slopes = tip.positions(np.zeros(1))[1][0]
-    return np.vstack([slopes, tip.rotation, tip.growth])
+def _weights() -> _Array:
+    """How much each step counts for the place at the end of `_AHEAD_MM`: by the length left."""
+    begins_mm = _STEP_MM * np.arange(_STEPS)
+    left_mm = np.maximum(0.0, _AHEAD_MM - begins_mm) ** 2
+    left_mm -= np.maximum(0.0, _AHEAD_MM - begins_mm - _STEP_MM) ** 2
+    return np.asarray(left_mm / np.sum(left_mm))
+
+
+def _cross_matrix(vector: _Array) -> _Array:
+    """The matrix that gives the cross product of this vector with another one."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def pose_from_points(

@@ -9,14 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.needle.channels import ENTRY, Channel, Placed, place, positions
+from ntagen.needle.fluctuations import oscillation
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.priors import Priors
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
+_Indices = NDArray[np.intp]
 
-_DISTORTION_LENGTH_MM = 10.0
-"""The length over which `Priors.distortion_mm` is about the same error."""
+_DISTORTION_WAVELENGTH_MM = 20.0
+_DISTORTION_DAMPING = 0.7
+"""The distortion of a tracker along the depth is a damped oscillator, calibrated on measured
+insertions (`ntagen.needle.phantom_parameters`)."""
+
+_BIN_MM = 1.0
+"""Measurements on this length have about the same distortion, so that their mean says as much."""
 
 
 @dataclass(slots=True)
@@ -48,42 +55,44 @@ class Problem:
         self._priors = priors
         self._stds = stds
         self._directed: list[tuple[int, int, float, Measurement]] = []
-        places: dict[tuple[int, int], list[tuple[float, float, Measurement]]] = {}
-        noises_mm = _noises_mm(readings, priors)
-        for reading, noise_mm in zip(readings, noises_mm, strict=True):
-            number, along_mm = 0, reading.offset_mm
+        rows: list[tuple[int, int, float, float, Measurement]] = []
+        for reading in readings:
+            number, along_mm, depth_mm = 0, reading.offset_mm, 0.0
             if reading.channel != ENTRY:
                 channel = channels[reading.channel]
+                depth_mm = channel.depth_mm + along_mm
                 number = channel.stretch_at(reading.offset_mm)
                 along_mm -= channel.stretches[number].offset_mm
-            key = (reading.channel, number)
-            places.setdefault(key, []).append((along_mm, noise_mm, reading.measurement))
+            rows.append((reading.channel, number, depth_mm, along_mm, reading.measurement))
             if reading.measurement.heading is not None:
                 self._directed.append((reading.channel, number, along_mm, reading.measurement))
         # Rows are in the order of the stretches.
-        ordered = sorted(places.items(), key=lambda item: item[0])
-        self._parts = [part for part, _ in ordered]
-        self._part_of = np.repeat(
-            np.arange(len(ordered), dtype=np.intp), [len(group) for _, group in ordered]
-        )
-        rows = [row for _, group in ordered for row in group]
-        self._along_mm = np.array([along_mm for along_mm, _, _ in rows])
-        self._noise_mm = np.array([noise_mm for _, noise_mm, _ in rows])
-        self._measured = np.array([measurement.position_mm for _, _, measurement in rows])
+        rows.sort(key=lambda row: row[:2])
+        self._parts = list(dict.fromkeys((channel, number) for channel, number, *_ in rows))
+        index = {part: place for place, part in enumerate(self._parts)}
+        self._part_of = np.array([index[row[:2]] for row in rows], dtype=np.intp)
+        self._along_mm = np.array([along_mm for _, _, _, along_mm, _ in rows])
+        self._measured = np.array([row[-1].position_mm for row in rows]).reshape(-1, 3)
+        depths_mm = np.array([depth_mm for _, _, depth_mm, _, _ in rows])
+        self._begins, self._whiten = _weighed(self._part_of, depths_mm, priors)
+        self._counts = np.diff([*self._begins, len(rows)])
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
         """Residuals and derivatives."""
         begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
         return self._evaluated(unknowns, begin, placed)
 
-    def rms_mm(self, residuals: _Array) -> float:
-        """Root mean square of the distances between measured and predicted positions."""
-        count = 3 * len(self._noise_mm)
-        if not count:
+    def rms_mm(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> float:
+        """Root mean square of the distances between measured and expected positions."""
+        if not self._parts:
             return 0.0
-        noise_mm = np.repeat(self._noise_mm, 3)
-        squares = float(np.sum((noise_mm * residuals[:count]) ** 2))
-        return math.sqrt(3.0 * squares / count)
+        expected, _ = self._expected(*place(self._channels, entry, curvature_per_mm, unknowns))
+        return math.sqrt(float(np.mean(np.sum((self._measured - expected) ** 2, axis=1))))
+
+    def _expected(self, begin: Placed, placed: list[list[Placed]]) -> tuple[_Array, _Array]:
+        """The positions that are expected, and their derivatives."""
+        parts = [begin if one == ENTRY else placed[one][number] for one, number in self._parts]
+        return positions(parts, self._part_of, self._along_mm)
 
     def _evaluated(
         self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
@@ -93,11 +102,13 @@ class Problem:
 
         residuals, slopes = [], []
         if self._parts:
-            parts = [part(*one) for one in self._parts]
-            expected, moved = positions(parts, self._part_of, self._along_mm)
-            residuals.append(((self._measured - expected) / self._noise_mm[:, None]).ravel())
-            moved /= -self._noise_mm[:, None, None]
-            slopes.append(moved.reshape(-1, len(unknowns)))
+            expected, moved = self._expected(begin, placed)
+            off = np.add.reduceat(self._measured - expected, self._begins)
+            moved = np.add.reduceat(moved.reshape(len(expected), -1), self._begins)
+            off /= self._counts[:, None]
+            moved /= -self._counts[:, None]
+            residuals.append((self._whiten @ off).ravel())
+            slopes.append((self._whiten @ moved).reshape(-1, len(unknowns)))
         for channel, number, along, measurement in self._directed:
             pose, rotation = part(channel, number).directions(along)
             seen_and_expected = (
@@ -115,22 +126,28 @@ class Problem:
         return np.concatenate(residuals), np.vstack(slopes)
 
 
-def _noises_mm(readings: list[Reading], priors: Priors) -> list[float]:
-    """The noise that each measurement counts with.
+def _weighed(
+    part_of: _Indices, depths_mm: _Array, priors: Priors
+) -> tuple[_Indices, _Array]:
+    """How measurements are taken together, and what their means are multiplied by.
 
-    `n` measurements with the same error `d` and independent noise `s` tell as much as `n`
-    independent ones with the variance ``s^2 + n d^2``: that of their mean is ``s^2 / n + d^2``.
+    The error of a mean has independent noise and the tracker's distortion, which the means at near
+    depths share. Multiplied by the inverse Cholesky factor of their covariance, the means have
+    independent errors with the standard deviation 1.
+
+    Returns:
+        Where each group of rows begins, and the matrix.
     """
     if priors.distortion_mm <= 0.0:
-        return [priors.noise_mm] * len(readings)
-    channels = np.array([reading.channel for reading in readings])
-    offsets_mm = np.array([reading.offset_mm for reading in readings])
-    noises_mm = np.empty(len(readings))
-    for channel in set(channels.tolist()):
-        here = channels == channel
-        places = np.sort(offsets_mm[here])
-        ends = offsets_mm[here] + 0.5 * _DISTORTION_LENGTH_MM
-        near = np.searchsorted(places, ends)
-        near -= np.searchsorted(places, ends - _DISTORTION_LENGTH_MM)
-        noises_mm[here] = np.sqrt(priors.noise_mm**2 + near * priors.distortion_mm**2)
-    return [float(noise_mm) for noise_mm in noises_mm]
+        begins = np.arange(len(depths_mm), dtype=np.intp)
+        return begins, np.eye(len(depths_mm)) / priors.noise_mm
+    cells = np.floor(depths_mm / _BIN_MM)
+    is_new = np.ones(len(cells), dtype=bool)
+    is_new[1:] = (np.diff(part_of) != 0) | (np.diff(cells) != 0)
+    begins = np.flatnonzero(is_new)
+    counts = np.diff([*begins, len(cells)])
+    middles_mm = np.add.reduceat(depths_mm, begins) / counts if len(begins) else np.zeros(0)
+    apart_mm = middles_mm[:, None] - middles_mm[None, :]
+    shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
+    covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
+    return begins, np.linalg.inv(np.linalg.cholesky(covariance))
