@@ -394,6 +394,18 @@ PARAMETERS: Final = (
         "Assumed further error of each measured coordinate, about the same over 10 mm of a path.",
     ),
     Parameter(
+        "priors.first_ratio",
+        "prior first curvature",
+        "ratio",
+        "By how much more the needle bends on its first 10 mm, as a ratio.",
+    ),
+    Parameter(
+        "priors.bite_mm",
+        "prior bite",
+        "length",
+        "Length that seems straight at the beginning of a channel that leaves another one.",
+    ),
+    Parameter(
         "compensated_lag_rad",
         "lag compensation",
         "angle",

@@ -13,6 +13,7 @@ from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm
 from ntagen.needle.errors import Errors
+from ntagen.needle.fluctuations import DRIFT_LENGTH_MM, DRIFT_RATIO
 from ntagen.needle.priors import Priors
 from ntagen.scene import Scene, Tissue
 
@@ -24,12 +25,6 @@ _REACTION_S: Final = 0.07
 
 _SLOWEST_RAMP_MM_PER_S2: Final = 10.0
 """The acceleration that GRBL has if nobody sets another one."""
-
-_DRIFT_RATIO: Final = 1.4
-"""The change of a fluctuation over 10 mm, relative to its standard deviation."""
-
-_TURN_MM: Final = 20.0
-"""The drift of the bend plane over 10 mm, as a length at the rate at which it turns."""
 
 
 def overrun_mm(
@@ -87,23 +82,26 @@ def settings_for_phantom(
 ) -> Settings:
     """The settings that fit a phantom needle and the scene, as after a calibration.
 
-    The drifts were chosen on phantom runs, so that predictions 10 and 20 mm ahead err as much as
-    the estimator says (`tests/benchmarks/predictions.py`). If rolls are compensated, the spread of
-    the friction is left of the lag.
+    Predictions then err as much as the estimator says (`tests/benchmarks/filters.py`). If rolls are
+    compensated, the spread of the friction is left of the lag.
 
     Raises:
         InputError: No push is short enough to feel a hidden region before it is pierced.
     """
     sensing, torsion, shape = parameters.sensing, parameters.torsion, parameters.shape
-    turn_drift_rad = _DRIFT_RATIO * shape.turn_rad.std + _TURN_MM * shape.turn_rad_per_mm
+    wobble_rad = DRIFT_RATIO * shape.turn_rad.std
+    steady_rad = DRIFT_LENGTH_MM * shape.turn_rad_per_mm
     spread_rad = torsion.lag_rad * torsion.spread_ratio
+    reinsertion = parameters.reinsertion
     priors = replace(
         settings.priors,
         noise_mm=math.hypot(sensing.noise_mm, sensing.step_mm),
         distortion_mm=sensing.distortion_mm.std,
-        curvature_drift=_DRIFT_RATIO * shape.curvature.std,
-        turn_drift_rad=turn_drift_rad,
+        curvature_drift=DRIFT_RATIO * shape.curvature.std,
+        turn_drift_rad=math.hypot(wobble_rad, steady_rad),
         lag_rad=math.hypot(spread_rad, torsion.lag_rad - settings.compensated_lag_rad),
+        first_ratio=shape.first_ratio,
+        bite_mm=(1.0 - reinsertion.bite_ratio) * reinsertion.bite_mm,
     )
     calibrated = replace(settings, priors=priors, force_noise_n=sensing.noise_n)
     return settings_for(calibrated, Errors(), scene, known)

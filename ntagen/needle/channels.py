@@ -61,6 +61,21 @@ class Stretch:
     expected: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Bite:
+    """How much less a channel bends that leaves another one, as a length without bend.
+
+    Attributes:
+        expected_mm: The length that is expected.
+        std_mm: Its standard deviation.
+        unknown: The index of the unknown for its error, in standard deviations.
+    """
+
+    expected_mm: float
+    std_mm: float
+    unknown: int
+
+
 @dataclass(slots=True)
 class Channel:
     """Where a channel leaves its parent, the rolls made there, and its stretches.
@@ -73,6 +88,7 @@ class Channel:
         rolls: The indices of the unknown errors of these rolls.
         stretches: Its stretches in order.
         extent_mm: The greatest length that was cut.
+        bite: How much less it bends at its beginning; None if not at all.
     """
 
     parent: int
@@ -82,6 +98,7 @@ class Channel:
     rolls: tuple[int, ...]
     stretches: list[Stretch] = field(default_factory=list)
     extent_mm: float = 0.0
+    bite: Bite | None = None
 
     def new_boundaries(self, extent_mm: float) -> list[float]:
         """Where stretches begin in the part that is cut when the channel grows to this length."""
@@ -192,6 +209,26 @@ class Placed:
             entry.growth + growth,
         )
 
+    def bitten(self, bite: Bite, unknowns: _Array) -> Placed:
+        """The same without the bend of so much of its length."""
+        length_mm = bite.expected_mm + bite.std_mm * float(unknowns[bite.unknown])
+        angle_rad = -self.curvature_per_mm * length_mm
+        axis = bending_axis(self.start)
+        slopes = angle_rad * self.growth
+        slopes[bite.unknown] -= self.curvature_per_mm * bite.std_mm
+        moved = np.array(cross(axis, self.start.position_mm))
+        return Placed(
+            Pose(
+                self.start.position_mm,
+                rotate(self.start.heading, axis, angle_rad),
+                rotate(self.start.bevel, axis, angle_rad),
+            ),
+            self.curvature_per_mm,
+            self.rotation + np.array(axis)[:, None] * slopes,
+            self.shift - moved[:, None] * slopes,
+            self.growth,
+        )
+
     def turned(self, turn: _Array, unknowns: _Array) -> Placed:
         """The same after a turn of the bend plane with these coefficients."""
         start = roll(self.start, float(turn @ unknowns))
@@ -262,6 +299,8 @@ def place(
         for stretch in channel.stretches:
             current = current.beyond(stretch.offset_mm - offset_mm)
             current = current.among(stretch, start, unknowns, before)
+            if channel.bite is not None and not parts:
+                current = current.bitten(channel.bite, unknowns)
             parts.append(current)
             offset_mm, before = stretch.offset_mm, stretch.turn
         placed.append(parts)

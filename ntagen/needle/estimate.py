@@ -27,7 +27,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, STRETCH_MM, Channel, Placed, Stretch, padded, place
+from ntagen.needle.channels import (
+    ENTRY,
+    STRETCH_MM,
+    Bite,
+    Channel,
+    Placed,
+    Stretch,
+    padded,
+    place,
+)
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
 from ntagen.needle.fluctuations import Process, fluctuating, turning
@@ -38,7 +47,7 @@ from ntagen.needle.path import Stretch as PathStretch
 from ntagen.needle.priors import Priors as Priors
 from ntagen.needle.residuals import Problem, Reading
 from ntagen.needle.vectors import subtract
-from ntagen.scene import Pose
+from ntagen.scene import Pose, Vector
 
 _Array = NDArray[np.float64]
 
@@ -48,6 +57,12 @@ _POSE_UNKNOWNS = 7
 RECENT = 8
 """So many of the last measurements count for `Estimate.misfit_mm`; ours: those of a push of 2 mm in
 pieces of 0.25 mm."""
+
+_FIRST_MM = 10.0
+"""For so far from the entry, `Priors.first_ratio` holds."""
+
+_BITE_RATIO = 0.5
+"""The standard deviation of `Priors.bite_mm`, relative to it; ours."""
 
 _AHEAD_MM = 30.0
 """Predictions are made for about this length: the usual one of a plan's rest."""
@@ -133,29 +148,53 @@ class Ahead:
     def position_covariance_mm2(self, tip: Pose, radius_mm: float, length_mm: float) -> _Array:
         """The second moments of the error of a predicted position: `Estimate`.
 
-        If the curvature is more by a ratio over a short piece, all beyond it turns about its
-        bending axis, by this ratio of what the piece bends; if the bend plane turns by an angle, it
-        turns about the bevel.
+        Along each principal axis of the errors the position is followed to one standard deviation
+        on both sides. The differences of both give its covariance to second order (M. Nørgaard, N.
+        K. Poulsen, O. Ravn, "New developments in state estimation for nonlinear systems",
+        Automatica 36, 2000): on 30 mm of a bend the first order is not enough.
         """
-        slopes = np.zeros((3, len(self.covariance)))
-        slopes[:, :3] = np.eye(3)
-        end = np.array(pushed_to(tip, radius_mm, length_mm))
-        slopes[:, 3:6] = -_cross_matrix(end - np.array(tip.position_mm))
         steps = len(self.differences) // 2
-        for step in range(steps):
-            begin_mm = step * _STEP_MM
-            if begin_mm > 0.0 and begin_mm >= length_mm:
-                break
-            piece_mm = length_mm - begin_mm
-            if step + 1 < steps:
-                piece_mm = min(piece_mm, _STEP_MM)
-            middle = push(tip, radius_mm, begin_mm + 0.5 * piece_mm)
-            way = end - np.array(middle.position_mm)
-            bend_rad = piece_mm / radius_mm
-            slopes[:, 6 + step] = bend_rad * np.cross(bending_axis(middle), way)
-            slopes[:, 6 + steps + step] = bend_rad * np.cross(middle.bevel, way)
-        off_mm = slopes[:, 6:] @ self.differences
-        return np.asarray(slopes @ self.covariance @ slopes.T + np.outer(off_mm, off_mm))
+        used = min(steps, max(1, math.ceil(length_mm / _STEP_MM - 1e-9)))
+        chosen = np.r_[0:6, 6 : 6 + used, 6 + steps : 6 + steps + used]
+        differences = np.r_[self.differences[:used], self.differences[steps : steps + used]]
+        variances, axes = np.linalg.eigh(self.covariance[np.ix_(chosen, chosen)])
+        moved = (axes * np.sqrt(np.maximum(0.0, variances))).T
+        errors = np.concatenate([np.zeros_like(moved[:1]), moved, -moved])
+        errors[:, 6:] += differences
+        ends = _ends(tip, radius_mm, length_mm, errors)
+        middle, more, less = ends[0], ends[1 : 1 + len(moved)], ends[1 + len(moved) :]
+        first, second = 0.5 * (more - less), 0.5 * (more + less) - middle
+        off_mm = middle + second.sum(axis=0) - np.array(pushed_to(tip, radius_mm, length_mm))
+        covariance = first.T @ first + 2.0 * second.T @ second + np.outer(off_mm, off_mm)
+        return np.asarray(covariance)
+
+
+def _ends(tip: Pose, radius_mm: float, length_mm: float, errors: _Array) -> _Array:
+    """Where pushes end with these errors, as `Ahead` orders them; one row for each."""
+    steps = (errors.shape[1] - 6) // 2
+    angles = np.linalg.norm(errors[:, 3:6], axis=1)[:, None]
+    sine, versine = np.sinc(angles / math.pi), 0.5 * np.sinc(0.5 * angles / math.pi) ** 2
+
+    def rotated(direction: Vector) -> _Array:
+        once = np.cross(errors[:, 3:6], direction)
+        return np.asarray(direction + sine * once + versine * np.cross(errors[:, 3:6], once))
+
+    places = np.array(tip.position_mm) + errors[:, :3]
+    heading, bevel = rotated(tip.heading), rotated(tip.bevel)
+    turned = np.zeros((len(errors), 1))
+    for step in range(steps):
+        piece_mm = length_mm - step * _STEP_MM
+        if step + 1 < steps:
+            piece_mm = min(piece_mm, _STEP_MM)
+        turn = errors[:, 6 + steps + step, None] - turned
+        turned = turned + turn
+        bevel = np.cos(turn) * bevel + np.sin(turn) * np.cross(heading, bevel)
+        bend = piece_mm / radius_mm * np.exp(errors[:, 6 + step, None])
+        half, chord_mm = 0.5 * bend, piece_mm * np.sinc(0.5 * bend / math.pi)
+        places = places + chord_mm * (np.cos(half) * heading - np.sin(half) * bevel)
+        cosine, sine = np.cos(bend), np.sin(bend)
+        heading, bevel = cosine * heading - sine * bevel, cosine * bevel + sine * heading
+    return np.asarray(places)
 
 
 class Estimator:
@@ -173,6 +212,7 @@ class Estimator:
         self._priors = priors
         self._channels: list[Channel] = []
         self._inserted: list[tuple[int, float]] = []
+        self._pulled_from: list[tuple[int, float]] = []
         self._pending_rad = 0.0
         self._pending_rolls: tuple[int, ...] = ()
         self._readings: list[Reading] = []
@@ -183,6 +223,7 @@ class Estimator:
         drift, turn_rad = priors.curvature_drift, priors.turn_drift_rad
         self._curvature = Process(fluctuating(drift)) if drift > 0.0 else None
         self._turn = Process(turning(turn_rad)) if turn_rad > 0.0 else None
+        self._is_even = drift <= 0.0 and turn_rad <= 0.0 and priors.first_ratio <= 0.0
 
     @property
     def depth_mm(self) -> float:
@@ -199,9 +240,11 @@ class Estimator:
             self._extend(channel, inserted_mm + length_mm)
             return
         depth_mm = self.depth_mm
-        self._channels.append(
-            Channel(channel, inserted_mm, depth_mm, self._pending_rad, self._pending_rolls)
-        )
+        new = Channel(channel, inserted_mm, depth_mm, self._pending_rad, self._pending_rolls)
+        bite_mm = self._priors.bite_mm
+        if channel != ENTRY and inserted_mm < self._channels[channel].extent_mm and bite_mm > 0.0:
+            new.bite = Bite(bite_mm, _BITE_RATIO * bite_mm, self._unknown(1.0))
+        self._channels.append(new)
         self._inserted.append((len(self._channels) - 1, length_mm))
         self._pending_rad, self._pending_rolls = 0.0, ()
         self._extend(len(self._channels) - 1, length_mm)
@@ -214,6 +257,7 @@ class Estimator:
     def pull(self, length_mm: float) -> None:
         """Notes a pull along the channel; the shaft keeps its rolls (see `ntagen.needle.path`)."""
         left_mm = length_mm
+        self._pulled_from = list(self._inserted)
         while self._inserted and left_mm > 0.0:
             channel, inserted_mm = self._inserted.pop()
             if inserted_mm - left_mm > 1e-9:
@@ -224,10 +268,25 @@ class Estimator:
             self._pending_rad += passed.roll_rad
             self._pending_rolls = passed.rolls + self._pending_rolls
 
-    def measure(self, measurement: Measurement) -> None:
-        """Notes a measurement at the present place."""
-        channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
-        self._readings.append(Reading(channel, inserted_mm, measurement))
+    def measure(self, measurement: Measurement, depth_mm: float | None = None) -> None:
+        """Notes a measurement.
+
+        Args:
+            measurement: The measurement.
+            depth_mm: The depth at which the tip was at its time, if it was another one than now: a
+                tracker is late. A greater depth than now is one from before the last pull.
+        """
+        way = self._inserted
+        left_mm = self.depth_mm if depth_mm is None else depth_mm
+        if left_mm > self.depth_mm + 1e-9:
+            way = self._pulled_from
+        place = (ENTRY, 0.0)
+        for channel, inserted_mm in way:
+            if left_mm <= 0.0:
+                break
+            place = (channel, min(inserted_mm, left_mm))
+            left_mm -= inserted_mm
+        self._readings.append(Reading(*place, measurement))
 
     def estimate(self) -> Estimate:
         """The best estimate from everything noted so far; deterministic."""
@@ -314,7 +373,7 @@ class Estimator:
 
     def _expected(self, depth_mm: float) -> float:
         """By how much the logarithm of the curvature differs at a depth, as expected."""
-        return 0.0
+        return math.log1p(self._priors.first_ratio) if depth_mm < _FIRST_MM else 0.0
 
     def _unknown(self, std: float) -> int:
         """The index of a new unknown with this standard deviation."""
@@ -326,7 +385,7 @@ class Estimator:
         channel = self._channels[index]
         if extent_mm <= channel.extent_mm:
             return
-        if self._curvature is None and self._turn is None:
+        if self._is_even:
             channel.stretches = channel.stretches or [Stretch(0.0)]
         else:
             for offset_mm in channel.new_boundaries(extent_mm):
@@ -381,12 +440,6 @@ def _weights() -> _Array:
     left_mm = np.maximum(0.0, _AHEAD_MM - begins_mm) ** 2
     left_mm -= np.maximum(0.0, _AHEAD_MM - begins_mm - _STEP_MM) ** 2
     return np.asarray(left_mm / np.sum(left_mm))
-
-
-def _cross_matrix(vector: _Array) -> _Array:
-    """The matrix that gives the cross product of this vector with another one."""
-    x, y, z = vector
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def pose_from_points(

@@ -30,6 +30,9 @@ class Priors:
         distortion_mm: A further error of each coordinate of a measured position that is about the
             same for all measurements on 10 mm of a channel, as of a distorted magnetic field. More
             measurements do not reduce it.
+        first_ratio: By how much more the needle bends on the first 10 mm than deeper, as a ratio.
+        bite_mm: A channel that leaves another one bends less at its beginning, as if so much of
+            its length were straight.
     """
 
     position_mm: float = 0.2
@@ -43,6 +46,8 @@ class Priors:
     turn_drift_rad: float = 0.0
     lag_rad: float = 0.0
     distortion_mm: float = 0.0
+    first_ratio: float = 0.0
+    bite_mm: float = 0.0
 
     def roll_std_rad(self, depth_mm: float) -> float:
         """The standard deviation of the error of a roll at a depth."""

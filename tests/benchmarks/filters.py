@@ -86,7 +86,7 @@ class Smoother:
 
     def measure(self, measurement: Measurement, behind_mm: float = 0.0) -> None:
         """Takes a position."""
-        self._estimator.measure(measurement)
+        self._estimator.measure(measurement, self._estimator.depth_mm - behind_mm)
 
     def estimate(self) -> None:
         """Estimates from everything so far."""
