@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from ntagen.drive.deviation import DeviationMonitor, require_explained
+from ntagen.drive.deviation import DeviationMonitor, DivergenceMonitor, require_explained
 from ntagen.drive.device import Device
 from ntagen.drive.first_push import is_free
 from ntagen.drive.following import Course
@@ -109,6 +109,7 @@ class Controller:
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
         self._guide = Guide(course, scene, settings, self._needle, journal)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
+        self._divergence = DivergenceMonitor(settings)
         self._moves = Moves(scene)
         self._reviewed_mm = 0.0
         self._rest: Plan | None = None
@@ -171,6 +172,7 @@ class Controller:
     def _make_estimate(self) -> Event:
         estimate = self._needle.estimated()
         require_explained(estimate, self._settings, self._learner.a_priori.needle.radius_mm)
+        self._divergence.note(estimate)
         tip = estimate.tip
         self._learner.visit(tip.position_mm, last_too=True)
         if self._learner.has_visited_all:

@@ -13,6 +13,8 @@ import math
 from collections import deque
 from typing import Final
 
+import numpy as np
+
 from ntagen.drive.settings import Settings
 from ntagen.errors import DeviceError
 from ntagen.needle.estimate import RECENT, Estimate
@@ -31,6 +33,18 @@ _CAUSES: Final = "hint: does an axis jam or lose steps? Is the tracker mirrored,
 
 _LEAST_MISFIT_MM: Final = 1.0
 """Less than this is no misfit, whatever deviation is allowed; ours."""
+
+_DIVERGED_RATIO: Final = 0.5
+"""This part of the misfit that is allowed is too much in several estimates in a row; ours."""
+
+_DIVERGED_STDS: Final = 10.0
+"""It must also be so many standard deviations of what noise does to the mean; ours."""
+
+_DIVERGED_COUNT: Final = 3
+"""So many estimates in a row are several: 15 mm of a push; ours."""
+
+_ROUNDING: Final = 1e-6
+"""A computed correlation matrix may have eigenvalues that are negative by this much."""
 
 
 def window(settings: Settings, length_mm: float) -> int:
@@ -90,20 +104,82 @@ def require_explained(estimate: Estimate, settings: Settings, radius_mm: float) 
         radius_mm: The radius that was expected.
 
     Raises:
-        DeviceError: It does not.
+        DeviceError: It does not, or does not say how much it errs.
     """
-    priors = settings.priors
-    noise_mm = _SIGMAS * (priors.noise_mm / math.sqrt(RECENT) + priors.distortion_mm)
-    allowed_mm = max(_LEAST_MISFIT_MM, settings.deviation_mm) + noise_mm
+    _require_covariance(estimate)
+    allowed_mm = _allowed_mm(settings)
     if not estimate.misfit_mm <= allowed_mm:
         raise DeviceError(
             f"no needle that was moved as commanded is where the tracker sees this one: the last "
             f"positions are {estimate.misfit_mm:.1f} mm off, and {allowed_mm:.1f} mm is allowed\n"
             f"{_CAUSES}"
         )
+    priors = settings.priors
     log_ratio = math.log(estimate.radius_mm) - math.log(radius_mm)
     if math.isfinite(radius_mm) and abs(log_ratio) > _CURVATURE_STDS * priors.curvature_ratio:
         raise DeviceError(
             f"the tip moves as if the needle bent with a radius of {estimate.radius_mm:.1f} mm, "
             f"and {radius_mm:g} mm was expected\n{_CAUSES}"
+        )
+
+
+class DivergenceMonitor:
+    """Watches whether the estimates stay with the measurements.
+
+    A misfit that is less than `require_explained` refuses may be a curve of the tissue that the
+    next estimate knows. If it stays, measurements and estimates part.
+
+    Args:
+        settings: The noise, and what is allowed.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        priors = settings.priors
+        self._std_mm = math.hypot(priors.noise_mm / math.sqrt(RECENT), priors.distortion_mm)
+        self._most_mm = max(
+            _DIVERGED_STDS * self._std_mm, _DIVERGED_RATIO * _allowed_mm(settings)
+        )
+        self._count = 0
+
+    def note(self, estimate: Estimate) -> None:
+        """Takes an estimate.
+
+        Raises:
+            DeviceError: This one and those before it are too far from the measurements.
+        """
+        self._count = self._count + 1 if estimate.misfit_mm > self._most_mm else 0
+        if self._count >= _DIVERGED_COUNT:
+            stds = estimate.misfit_mm / self._std_mm
+            raise DeviceError(
+                f"the estimates leave the measurements: in {self._count} of them in a row the last "
+                f"positions are off, now by {estimate.misfit_mm:.1f} mm or {stds:.0f} standard "
+                f"deviations\n{_CAUSES}"
+            )
+
+
+def _allowed_mm(settings: Settings) -> float:
+    """How far the mean of the last positions may be from the needle that fits best."""
+    priors = settings.priors
+    noise_mm = _SIGMAS * (priors.noise_mm / math.sqrt(RECENT) + priors.distortion_mm)
+    return max(_LEAST_MISFIT_MM, settings.deviation_mm) + noise_mm
+
+
+def _require_covariance(estimate: Estimate) -> None:
+    """Refuses an estimate whose covariance is none.
+
+    Raises:
+        DeviceError: It is not finite, or not positive definite.
+    """
+    covariance = np.array(estimate.covariance)
+    variances = np.diag(covariance)
+    is_one = bool(np.all(np.isfinite(covariance))) and bool(np.all(variances > 0.0))
+    if is_one:
+        stds = np.sqrt(variances)
+        is_one = float(np.linalg.eigvalsh(covariance / np.outer(stds, stds))[0]) > -_ROUNDING
+    if not is_one:
+        raise DeviceError(
+            "the estimate of the needle does not say how much it errs: its covariance is not finite "
+            "or not positive definite\n"
+            "hint: are the priors and the noise of the tracker sensible "
+            "(`ntagen drive TASK --settings`)?"
         )

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import Final
 
 from ntagen.drive.device import Device, Halted, require_finite, rest
+from ntagen.drive.lateness import Lateness
 from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
@@ -51,6 +52,9 @@ class Steering:
         self._listen = listen
         self._estimator = Estimator(needle.tip, needle.radius_mm, settings.priors)
         self._reach = Reach(settings)
+        self._lateness = Lateness()
+        self._speed_mm_per_s = needle.speed_mm_per_s
+        self._pull_speed_mm_per_s = settings.pull_speed_ratio * needle.speed_mm_per_s
         self._radius_mm = needle.radius_mm
         self._cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
@@ -83,7 +87,7 @@ class Steering:
 
     def push(self, length_mm: float) -> bool:
         """Inserts the needle; returns whether it went all the way (`Halted`)."""
-        self._command("push", length_mm)
+        began_s = self._command("push", length_mm)
         self._reach.moved(length_mm)
         made_mm = length_mm
         try:
@@ -93,7 +97,11 @@ class Steering:
             self._journal.record(CutShort(self.now_s(), made_mm, str(halted)))
             return False
         finally:
+            from_mm = self._estimator.depth_mm
             self._estimator.push(made_mm)
+            self._lateness.note(
+                began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s
+            )
             self.path = self.path.push(self._radius_mm, made_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
             self._has_grown = True
@@ -125,9 +133,10 @@ class Steering:
         if self._has_grown:
             self._left += self.path.arcs
             self._has_grown = False
-        self._command("pull", length_mm)
+        began_s, from_mm = self._command("pull", length_mm), self._estimator.depth_mm
         self._reach.moved(length_mm)
         self._estimator.pull(length_mm)
+        self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._pull_speed_mm_per_s)
         self.path = self.path.pull(length_mm)
         self._device.pull(length_mm)
 
@@ -159,7 +168,7 @@ class Steering:
         measurement = self._device.measure()
         require_finite(measurement)
         self._reach.require(measurement)
-        self._estimator.measure(measurement)
+        self._estimator.measure(measurement, self._lateness.depth_mm(measurement.time_s))
         self.seen_s = measurement.time_s
         self._journal.record(
             Measured(
@@ -212,7 +221,9 @@ class Steering:
         """Stops the needle without a record: for ends in which the journal may fail."""
         self._device.stop()
 
-    def _command(self, kind: str, value: float) -> None:
-        """Records a motion that begins now, unless somebody wants the run to end."""
+    def _command(self, kind: str, value: float) -> float:
+        """Records a motion that begins now, unless somebody wants the run to end; when it began."""
         self._listen()
-        self._journal.record(Command(self.now_s(), kind, value))
+        began_s = self.now_s()
+        self._journal.record(Command(began_s, kind, value))
+        return began_s

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from ntagen.errors import DeviceError
 from ntagen.needle.channels import (
     ENTRY,
     STRETCH_MM,
@@ -70,6 +71,10 @@ _AHEAD_MM = 30.0
 _STEP_MM = 5.0
 _STEPS = 20
 """What lies ahead is divided into so many steps; the last one has no end."""
+
+
+_PAIRED = 6
+"""Of so many principal axes of what is not known ahead, two count together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,25 +153,28 @@ class Ahead:
     def position_covariance_mm2(self, tip: Pose, radius_mm: float, length_mm: float) -> _Array:
         """The second moments of the error of a predicted position: `Estimate`.
 
-        Along each principal axis of the errors the position is followed to one standard deviation
-        on both sides. The differences of both give its covariance to second order (M. Nørgaard, N.
-        K. Poulsen, O. Ravn, "New developments in state estimation for nonlinear systems",
-        Automatica 36, 2000): on 30 mm of a bend the first order is not enough.
+        Along the principal axes of the errors the position is followed to one standard deviation on
+        both sides, and along two of the greatest at a time. The differences give its covariance to
+        second order (M. Nørgaard, N. K. Poulsen, O. Ravn, "New developments in state estimation for
+        nonlinear systems", Automatica 36, 2000): on 30 mm of a bend the first is not enough.
         """
         steps = len(self.differences) // 2
         used = min(steps, max(1, math.ceil(length_mm / _STEP_MM - 1e-9)))
         chosen = np.r_[0:6, 6 : 6 + used, 6 + steps : 6 + steps + used]
-        differences = np.r_[self.differences[:used], self.differences[steps : steps + used]]
         variances, axes = np.linalg.eigh(self.covariance[np.ix_(chosen, chosen)])
         moved = (axes * np.sqrt(np.maximum(0.0, variances))).T
-        errors = np.concatenate([np.zeros_like(moved[:1]), moved, -moved])
-        errors[:, 6:] += differences
+        # The greatest come last.
+        one, other = np.triu_indices(_PAIRED, 1)
+        pairs = moved[-1 - one] + moved[-1 - other]
+        errors = np.concatenate([np.zeros_like(moved[:1]), moved, -moved, pairs])
+        errors[:, 6:] += np.r_[self.differences[:used], self.differences[steps : steps + used]]
         ends = _ends(tip, radius_mm, length_mm, errors)
-        middle, more, less = ends[0], ends[1 : 1 + len(moved)], ends[1 + len(moved) :]
+        middle, more, less, both = np.split(ends, [1, 1 + len(moved), 1 + 2 * len(moved)])
         first, second = 0.5 * (more - less), 0.5 * (more + less) - middle
-        off_mm = middle + second.sum(axis=0) - np.array(pushed_to(tip, radius_mm, length_mm))
-        covariance = first.T @ first + 2.0 * second.T @ second + np.outer(off_mm, off_mm)
-        return np.asarray(covariance)
+        mixed = both - more[-1 - one] - more[-1 - other] + middle
+        off_mm = (middle + second.sum(axis=0))[0] - np.array(pushed_to(tip, radius_mm, length_mm))
+        covariance = first.T @ first + 2.0 * second.T @ second + mixed.T @ mixed
+        return np.asarray(covariance + np.outer(off_mm, off_mm))
 
 
 def _ends(tip: Pose, radius_mm: float, length_mm: float, errors: _Array) -> _Array:
@@ -289,16 +297,26 @@ class Estimator:
         self._readings.append(Reading(*place, measurement))
 
     def estimate(self) -> Estimate:
-        """The best estimate from everything noted so far; deterministic."""
+        """The best estimate from everything noted so far; deterministic.
+
+        Raises:
+            DeviceError: The measurements leave no estimate that is a number.
+        """
         stds = np.array(self._stds)
         start = np.zeros(len(stds))
         start[: len(self._solution)] = self._solution
         problem = Problem(self._readings, self._channels, self._priors, stds)
         expected = (self._entry, 1.0 / self._radius_mm)
 
-        self._solution, unknowns_covariance = least_squares(
-            lambda unknowns: problem.at(unknowns, *expected), start, stds
-        )
+        try:
+            self._solution, unknowns_covariance = least_squares(
+                lambda unknowns: problem.at(unknowns, *expected), start, stds
+            )
+        except np.linalg.LinAlgError as error:
+            raise DeviceError(
+                f"no needle can be estimated from the measurements: {error}\n"
+                "hint: are they in mm, and the priors and the noise of the tracker sensible?"
+            ) from error
         begin, placed = place(self._channels, *expected, self._solution)
         path, present = self._path(self._solution, begin, placed)
         tip, to_expected, ahead = self._ahead(present, begin, unknowns_covariance)

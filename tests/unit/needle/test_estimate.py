@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -154,6 +155,7 @@ def test_without_drift_the_curvature_is_one_for_all() -> None:
 
 def test_the_derivatives_are_those_of_the_positions() -> None:
     priors = Priors(curvature_drift=0.1, turn_drift_rad=0.1, lag_rad=0.2)
+    priors = replace(priors, first_ratio=0.1, bite_mm=0.8)
     estimator = Estimator(ENTRY, 30.0, priors)
     for kind, value in PULLED:
         getattr(estimator, kind)(value)
@@ -167,7 +169,9 @@ def test_the_derivatives_are_those_of_the_positions() -> None:
 
     _, placed = place(estimator._channels, entry, 1.0 / 30.0, unknowns)
     exact = np.array([part.positions(np.array([7.0]))[1][0] for p in placed for part in p])
-    assert len(unknowns) == 7 + 3 + 5 * 2, "boundaries at 5, 10, 15 and 20 mm, and at 20 mm again"
+    # Stretches begin at 0, 5 and 10 mm, at the roll at 14 mm, at 15 and 20 mm, at the new channel at
+    # 12 mm, at the roll and the boundary at 15 mm, and at 20 mm; the new channel has a bite.
+    assert len(unknowns) == 7 + 3 + 9 * 2 + 1
     for index in range(len(unknowns)):
         step = np.zeros(len(unknowns))
         step[index] = 1e-6
@@ -228,7 +232,7 @@ def test_a_curvature_that_changes_on_the_way_is_followed() -> None:
             estimator.measure(Measurement(0.0, tip.position_mm, 0.0))
     estimates = [estimator.estimate() for estimator in memories]
     long, short = (abs(estimate.path.arcs[-1].radius_mm - 20.0) for estimate in estimates)
-    assert short < 0.5 < 2.0 < long
+    assert short < 1.0 < 2.0 < long
     # A part of the change may pass.
     assert 20.5 < estimates[1].radius_mm < 29.5
     assert distance(memories[1].estimate().tip.position_mm, tip.position_mm) < 0.02
