@@ -294,7 +294,7 @@ class Estimator:
                 break
             place = (channel, min(inserted_mm, left_mm))
             left_mm -= inserted_mm
-        self._readings.append(Reading(*place, measurement))
+        self._readings.append(Reading.at(self._channels, *place, measurement))
 
     def estimate(self) -> Estimate:
         """The best estimate from everything noted so far; deterministic.
@@ -321,31 +321,28 @@ class Estimator:
         path, present = self._path(self._solution, begin, placed)
         tip, to_expected, ahead = self._ahead(present, begin, unknowns_covariance)
         covariance = to_expected @ ahead.covariance @ to_expected.T
+        off_mm = self._differences_mm(begin, placed)
+        misfit_mm = 0.0
+        if len(off_mm) >= RECENT:
+            misfit_mm = float(np.linalg.norm(np.mean(off_mm[-RECENT:], axis=0)))
         return Estimate(
             path=path,
             radius_mm=tip.radius_mm,
             radius_std_mm=float(tip.radius_mm * math.sqrt(covariance[6, 6])),
-            rms_mm=problem.rms_mm(self._solution, *expected),
+            rms_mm=float(np.sqrt(np.mean(np.sum(off_mm**2, axis=1)))) if len(off_mm) else 0.0,
             covariance=tuple(tuple(float(value) for value in row) for row in covariance),
             ahead=ahead,
-            misfit_mm=self._misfit_mm(begin, placed),
+            misfit_mm=misfit_mm,
         )
 
-    def _misfit_mm(self, begin: Placed, placed: list[list[Placed]]) -> float:
-        """See `Estimate.misfit_mm`; 0 while there are fewer measurements."""
-        if len(self._readings) < RECENT:
-            return 0.0
+    def _differences_mm(self, begin: Placed, placed: list[list[Placed]]) -> _Array:
+        """By how much the measured positions differ from the estimated ones."""
         differences = []
-        for reading in self._readings[-RECENT:]:
-            part, along_mm = begin, reading.offset_mm
-            if reading.channel != ENTRY:
-                channel = self._channels[reading.channel]
-                number = channel.stretch_at(along_mm)
-                part = placed[reading.channel][number]
-                along_mm -= channel.stretches[number].offset_mm
-            expected_mm = pushed_to(part.start, part.radius_mm, along_mm)
+        for reading in self._readings:
+            part = begin if reading.channel == ENTRY else placed[reading.channel][reading.stretch]
+            expected_mm = pushed_to(part.start, part.radius_mm, reading.along_mm)
             differences.append(subtract(reading.measurement.position_mm, expected_mm))
-        return float(np.linalg.norm(np.mean(differences, axis=0)))
+        return np.array(differences).reshape(-1, 3)
 
     def _ahead(
         self, tip: Placed, entry: Placed, unknowns_covariance: _Array

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,23 +25,48 @@ _BIN_MM = 1.0
 """Measurements on this length have about the same distortion, so that their mean says as much."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Reading:
     """A measurement and its place.
 
     Attributes:
         channel: The index of the channel in which it was taken, or `ENTRY`.
-        offset_mm: The length from the beginning of the channel.
+        stretch: The index of the stretch in the channel.
+        along_mm: The length from the beginning of the stretch.
+        depth_mm: The depth.
         measurement: The measurement.
     """
 
     channel: int
-    offset_mm: float
+    stretch: int
+    along_mm: float
+    depth_mm: float
     measurement: Measurement
+
+    @staticmethod
+    def at(
+        channels: list[Channel], channel: int, offset_mm: float, measurement: Measurement
+    ) -> Reading:
+        """A measurement at a length from the beginning of a channel."""
+        if channel == ENTRY:
+            return Reading(channel, 0, offset_mm, 0.0, measurement)
+        here = channels[channel]
+        stretch = here.stretch_at(offset_mm)
+        along_mm = offset_mm - here.stretches[stretch].offset_mm
+        return Reading(channel, stretch, along_mm, here.depth_mm + offset_mm, measurement)
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """The stretch: its channel, and its index there."""
+        return self.channel, self.stretch
 
 
 class Problem:
-    """The least-squares problem: residuals in standard deviations, and their derivatives."""
+    """The least-squares problem: residuals in standard deviations, and their derivatives.
+
+    Measurements on 1 mm of a stretch count as one at their mean place, if the tracker has
+    distortion; what this leaves out of an arc is 0.001 mm.
+    """
 
     def __init__(
         self,
@@ -54,45 +78,25 @@ class Problem:
         self._channels = channels
         self._priors = priors
         self._stds = stds
-        self._directed: list[tuple[int, int, float, Measurement]] = []
-        rows: list[tuple[int, int, float, float, Measurement]] = []
-        for reading in readings:
-            number, along_mm, depth_mm = 0, reading.offset_mm, 0.0
-            if reading.channel != ENTRY:
-                channel = channels[reading.channel]
-                depth_mm = channel.depth_mm + along_mm
-                number = channel.stretch_at(reading.offset_mm)
-                along_mm -= channel.stretches[number].offset_mm
-            rows.append((reading.channel, number, depth_mm, along_mm, reading.measurement))
-            if reading.measurement.heading is not None:
-                self._directed.append((reading.channel, number, along_mm, reading.measurement))
+        self._directed = [one for one in readings if one.measurement.heading is not None]
         # Rows are in the order of the stretches.
-        rows.sort(key=lambda row: row[:2])
-        self._parts = list(dict.fromkeys((channel, number) for channel, number, *_ in rows))
+        ordered = sorted(readings, key=lambda one: one.part)
+        self._parts = list(dict.fromkeys(one.part for one in ordered))
         index = {part: place for place, part in enumerate(self._parts)}
-        self._part_of = np.array([index[row[:2]] for row in rows], dtype=np.intp)
-        self._along_mm = np.array([along_mm for _, _, _, along_mm, _ in rows])
-        self._measured = np.array([row[-1].position_mm for row in rows]).reshape(-1, 3)
-        depths_mm = np.array([depth_mm for _, _, depth_mm, _, _ in rows])
-        self._begins, self._whiten = _weighed(self._part_of, depths_mm, priors)
-        self._counts = np.diff([*self._begins, len(rows)])
+        part_of = np.array([index[one.part] for one in ordered], dtype=np.intp)
+        lengths_mm = np.array([(one.depth_mm, one.along_mm) for one in ordered]).reshape(-1, 2)
+        begins = _begins(part_of, lengths_mm[:, 0], priors)
+        counts = np.diff([*begins, len(ordered)])
+        self._part_of = part_of[begins]
+        depths_mm, self._along_mm = (_sums(lengths_mm, begins) / counts[:, None]).T
+        places = np.array([one.measurement.position_mm for one in ordered]).reshape(-1, 3)
+        self._measured = _sums(places, begins) / counts[:, None]
+        self._whiten = _whitening(depths_mm, counts, priors)
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
         """Residuals and derivatives."""
         begin, placed = place(self._channels, entry, curvature_per_mm, unknowns)
         return self._evaluated(unknowns, begin, placed)
-
-    def rms_mm(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> float:
-        """Root mean square of the distances between measured and expected positions."""
-        if not self._parts:
-            return 0.0
-        expected, _ = self._expected(*place(self._channels, entry, curvature_per_mm, unknowns))
-        return math.sqrt(float(np.mean(np.sum((self._measured - expected) ** 2, axis=1))))
-
-    def _expected(self, begin: Placed, placed: list[list[Placed]]) -> tuple[_Array, _Array]:
-        """The positions that are expected, and their derivatives."""
-        parts = [begin if one == ENTRY else placed[one][number] for one, number in self._parts]
-        return positions(parts, self._part_of, self._along_mm)
 
     def _evaluated(
         self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
@@ -102,15 +106,14 @@ class Problem:
 
         residuals, slopes = [], []
         if self._parts:
-            expected, moved = self._expected(begin, placed)
-            off = np.add.reduceat(self._measured - expected, self._begins)
-            moved = np.add.reduceat(moved.reshape(len(expected), -1), self._begins)
-            off /= self._counts[:, None]
-            moved /= -self._counts[:, None]
-            residuals.append((self._whiten @ off).ravel())
-            slopes.append((self._whiten @ moved).reshape(-1, len(unknowns)))
-        for channel, number, along, measurement in self._directed:
-            pose, rotation = part(channel, number).directions(along)
+            parts = [part(*one) for one in self._parts]
+            expected, moved = positions(parts, self._part_of, self._along_mm)
+            moved = self._whiten @ moved.reshape(len(expected), -1)
+            residuals.append((self._whiten @ (self._measured - expected)).ravel())
+            slopes.append(-moved.reshape(-1, len(unknowns)))
+        for reading in self._directed:
+            measurement = reading.measurement
+            pose, rotation = part(*reading.part).directions(reading.along_mm)
             seen_and_expected = (
                 (measurement.heading, pose.heading),
                 (measurement.bevel, pose.bevel),
@@ -126,28 +129,30 @@ class Problem:
         return np.concatenate(residuals), np.vstack(slopes)
 
 
-def _weighed(
-    part_of: _Indices, depths_mm: _Array, priors: Priors
-) -> tuple[_Indices, _Array]:
-    """How measurements are taken together, and what their means are multiplied by.
-
-    The error of a mean has independent noise and the tracker's distortion, which the means at near
-    depths share. Multiplied by the inverse Cholesky factor of their covariance, the means have
-    independent errors with the standard deviation 1.
-
-    Returns:
-        Where each group of rows begins, and the matrix.
-    """
+def _begins(part_of: _Indices, depths_mm: _Array, priors: Priors) -> _Indices:
+    """Where the groups of measurements begin that count as one."""
     if priors.distortion_mm <= 0.0:
-        begins = np.arange(len(depths_mm), dtype=np.intp)
-        return begins, np.eye(len(depths_mm)) / priors.noise_mm
+        return np.arange(len(depths_mm), dtype=np.intp)
     cells = np.floor(depths_mm / _BIN_MM)
     is_new = np.ones(len(cells), dtype=bool)
     is_new[1:] = (np.diff(part_of) != 0) | (np.diff(cells) != 0)
-    begins = np.flatnonzero(is_new)
-    counts = np.diff([*begins, len(cells)])
-    middles_mm = np.add.reduceat(depths_mm, begins) / counts if len(begins) else np.zeros(0)
-    apart_mm = middles_mm[:, None] - middles_mm[None, :]
+    return np.flatnonzero(is_new)
+
+
+def _sums(rows: _Array, begins: _Indices) -> _Array:
+    """The sums of groups of rows."""
+    return np.add.reduceat(rows, begins) if len(begins) else rows
+
+
+def _whitening(depths_mm: _Array, counts: _Indices, priors: Priors) -> _Array:
+    """What positions are multiplied by, so that their errors are independent and of size 1.
+
+    The error of a mean has independent noise and the tracker's distortion, which the means at near
+    depths share. The matrix is the inverse Cholesky factor of their covariance.
+    """
+    if priors.distortion_mm <= 0.0:
+        return np.eye(len(depths_mm)) / priors.noise_mm
+    apart_mm = depths_mm[:, None] - depths_mm[None, :]
     shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
     covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
-    return begins, np.linalg.inv(np.linalg.cholesky(covariance))
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
