@@ -136,9 +136,7 @@ class DivergenceMonitor:
     def __init__(self, settings: Settings) -> None:
         priors = settings.priors
         self._std_mm = math.hypot(priors.noise_mm / math.sqrt(RECENT), priors.distortion_mm)
-        self._most_mm = max(
-            _DIVERGED_STDS * self._std_mm, _DIVERGED_RATIO * _allowed_mm(settings)
-        )
+        self._most_mm = max(_DIVERGED_STDS * self._std_mm, _DIVERGED_RATIO * _allowed_mm(settings))
         self._count = 0
 
     def note(self, estimate: Estimate) -> None:

@@ -1,8 +1,8 @@
 """Where the tip was when a position was measured that is reported now.
 
-A tracker is late: its values hold for `Measurement.time_s`, and the needle may have moved since. The
-motions that were commanded tell how far it was then. Only times are used that the log has, so that
-a replay finds the same.
+A tracker is late: its values hold for `Measurement.time_s`, and the needle may have moved since.
+The motions that were commanded tell how far it was then. Only times are used that the log has, so
+that a replay finds the same.
 """
 
 from __future__ import annotations

@@ -99,9 +99,7 @@ class Steering:
         finally:
             from_mm = self._estimator.depth_mm
             self._estimator.push(made_mm)
-            self._lateness.note(
-                began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s
-            )
+            self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s)
             self.path = self.path.push(self._radius_mm, made_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
             self._has_grown = True

@@ -41,7 +41,7 @@ from ntagen.needle.channels import (
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
 from ntagen.needle.fluctuations import Process, fluctuating, turning
-from ntagen.needle.kinematics import Arc, bending_axis, orthonormal, push, pushed_to
+from ntagen.needle.kinematics import Arc, orthonormal, pushed_to
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
@@ -142,7 +142,7 @@ class Ahead:
 
     Attributes:
         covariance: Of the position, of the rotation vector of the tip without the turn of the bend
-            plane, and of the logarithm of the curvature and the turn of the bend plane in each step.
+            plane, and in each step of the logarithm of the curvature and of the bend plane's turn.
         differences: How much more than on the expected circle the logarithm of the curvature and
             the turn of the bend plane are expected to be, in each step.
     """
@@ -361,7 +361,7 @@ class Estimator:
             turn = padded(parts.stretches[parts.stretch_at(inserted_mm)].turn, width)
         if self._pending_rolls or channel == ENTRY:
             channel = len(self._channels)
-        depths_mm = depth_mm + _STEP_MM * (np.arange(_STEPS) + 0.5)
+        depths_mm: _Array = depth_mm + _STEP_MM * (np.arange(_STEPS, dtype=np.float64) + 0.5)
         rest = np.zeros((6 + 2 * _STEPS, 6 + 2 * _STEPS))
         growths, turns = np.zeros((_STEPS, width)), np.tile(turn, (_STEPS, 1))
         grown, turned = slice(6, 6 + _STEPS), slice(6 + _STEPS, None)

@@ -1,18 +1,18 @@
 """The product's estimator against recursive filters: errors, honesty and cost on phantoms.
 
     python -m tests.benchmarks.filters [--seeds 100] [--methods smoother kalman particles]
-        [--noise 0.1] [--latency 0.05] [--lost 0.01] [--grid] [--traces DIR]
+        [--noise 0.1] [--latency 0.05] [--lost 0.01] [--grid] [--brief] [--traces DIR]
 
 Each phantom is pushed 20 mm, rolled (with compensation), pushed 15 mm, pulled back 10 mm, rolled,
 and pushed 20 mm in a new channel, with a measurement every 0.25 mm. Its entry differs from the
-expected one as the priors say. Looked at are the tip after 5, 20 and 35 mm, and at the end; from the
-last two also the places 10, 20 and 30 mm further on.
+expected one as the priors say. Looked at are the tip after 5, 20 and 35 mm, and at the end; from
+the last two also the places 10, 20 and 30 mm further on.
 
 An error that is normalised with the covariance that the method states has a chi-square distribution
-(NEES: normalised estimation error squared), with three degrees of freedom for a place and five for a
-place with a direction. Printed are the mean over the degrees of freedom (1 if the method knows itself,
-greater if it is too sure), and the share of insertions inside the two-sided 95 % band. Last comes the
-radius: the error of the mean curvature over the next 30 mm, in stated standard deviations.
+(NEES: normalised estimation error squared), with three degrees of freedom for a place and five for
+a place with a direction. Printed are its mean over the degrees of freedom (1 if the method knows
+itself, greater if it is too sure), and the share of insertions inside the two-sided 95 % band. The
+same is printed for the mean curvature over the next 30 mm, and what the method states of it.
 
 `--grid` goes through noise, latency and drop-outs. `--traces` predicts the unseen rest of measured
 insertions: the files `FullStateGroundTruthPos.dat` below a folder, three floats a line, in mm.
@@ -36,13 +36,14 @@ from scipy.stats import chi2
 from ntagen.drive.configure import configure
 from ntagen.drive.fitting import settings_for_phantom
 from ntagen.drive.torsion import Compensated, Lag
-from ntagen.needle.estimate import Estimator
+from ntagen.needle.circle import CurvaturePrior
+from ntagen.needle.estimate import Estimator, pose_from_points
 from ntagen.needle.kinematics import bending_axis, orthonormal, push
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters, Sensing
 from ntagen.needle.priors import Priors
-from ntagen.needle.vectors import rotate
+from ntagen.needle.vectors import rotate, scale
 from ntagen.needle.virtual import SimulatedClock
 from ntagen.scene import Limits, Needle, Pose, Region, Scene
 from tests.benchmarks.recursive import KalmanFilter, ParticleFilter, Predicted
@@ -66,6 +67,7 @@ MOVES = (
 )
 AHEAD_MM = (10.0, 20.0, 30.0)
 BANDS = {freedom: chi2.ppf((0.025, 0.975), freedom) for freedom in (1, 3, 5)}
+TRACE_RADIUS_MM = 77.0
 BASE = Sensing()
 GRID = [
     *[replace(BASE, noise_mm=noise_mm) for noise_mm in (0.1, 0.3, 1.0)],
@@ -148,10 +150,11 @@ class Results:
     squares: dict[tuple[str, int], list[float]]
     update_s: list[float]
     estimate_s: list[float]
+    stated: dict[str, list[float]]
 
     @staticmethod
     def empty() -> Results:
-        return Results(defaultdict(list), defaultdict(list), [], [])
+        return Results(defaultdict(list), defaultdict(list), [], [], defaultdict(list))
 
     def note(self, name: str, truth: Pose, guess: Predicted, *, directed: bool) -> None:
         """Compares a predicted tip with the true one."""
@@ -231,6 +234,7 @@ def look(
                 results[name].note(f"look {number} +{length_mm:.0f}", truth, guess, directed=False)
         found, std = method.curvature
         results[name].errors[f"curvature {number}"].append(abs(found / ratio - 1.0))
+        results[name].stated[f"curvature {number}"].append(std)
         results[name].squares[f"curvature {number}", 1].append(((found - ratio) / std) ** 2)
 
 
@@ -239,6 +243,8 @@ def table(name: str, results: Results) -> None:
     for what, errors in results.errors.items():
         line = f"{name:10} {what:12} error median {np.median(errors):.3f}"
         line += f", 95 % {np.percentile(errors, 95):.3f}"
+        if what in results.stated:
+            line += f", stated {np.mean(results.stated[what]):.3f}"
         for freedom in (1, 3, 5):
             if (what, freedom) in results.squares:
                 squares = np.array(results.squares[what, freedom])
@@ -264,7 +270,78 @@ def compare(arguments: argparse.Namespace, sensing: Sensing) -> None:
     for seed in range(arguments.seeds):
         insertion(seed, arguments.radius, sensing, priors, results)
     for name in arguments.methods:
-        table(name, results[name])
+        (brief if arguments.brief else table)(name, results[name])
+
+
+def brief(name: str, results: Results) -> None:
+    """Prints what one method reached in three lines, all places taken together."""
+    tips = [what for what in results.errors if what.startswith("look") and "+" not in what]
+    groups = {"tip": (tips, (3, 5))}
+    for length_mm in AHEAD_MM:
+        ahead = [what for what in results.errors if what.endswith(f"+{length_mm:.0f}")]
+        groups[f"+{length_mm:.0f} mm"] = (ahead, (3,))
+    parts = []
+    for group, (names, freedoms) in groups.items():
+        errors = np.concatenate([results.errors[what] for what in names])
+        part = f"{group} {np.median(errors):.2f}/{np.percentile(errors, 95):.2f} mm"
+        for freedom in freedoms:
+            squares = np.concatenate([results.squares[what, freedom] for what in names])
+            low, high = BANDS[freedom]
+            inside = 100.0 * np.mean((squares >= low) & (squares <= high))
+            part += f" {np.mean(squares) / freedom:.2f} ({inside:.0f} %)"
+        parts.append(part)
+    cost = 1e3 * (np.mean(results.update_s) * 5.0 / SPACING_MM)
+    if results.estimate_s:
+        cost += 1e3 * np.median(results.estimate_s)
+    print(f"{name:10} " + " | ".join(parts) + f" | {cost:.0f} ms for 5 mm", flush=True)
+
+
+def trace(path: pathlib.Path) -> _Array:
+    """A measured insertion up to its first jump, thinned to chords of 1 mm."""
+    points = np.array([[float(word) for word in line.split()] for line in path.open()])
+    jumps = np.flatnonzero(np.linalg.norm(np.diff(points, axis=0), axis=1) > 5.0)
+    points = points[: jumps[0] + 1] if len(jumps) else points
+    kept = [points[0]]
+    for point in points:
+        if np.linalg.norm(point - kept[-1]) >= 1.0:
+            kept.append(point)
+    return np.array(kept)
+
+
+def predict_trace(points: _Array, results: dict[str, Results]) -> None:
+    """Watches the first 30 mm of a measured insertion, and predicts what comes.
+
+    Its entry pose is not known: heading and bevel are those of a circle through the first 15 mm,
+    with errors of 3 and 20 degrees.
+    """
+    expected = CurvaturePrior(1.0 / TRACE_RADIUS_MM, 0.1 / TRACE_RADIUS_MM)
+    entry, _ = pose_from_points(points[15::-1], 0.1, expected)
+    back = Pose(entry.position_mm, scale(-1.0, entry.heading), entry.bevel)
+    sensing = replace(BASE, noise_mm=0.03)
+    usual = priors_for(Needle(ENTRY, TRACE_RADIUS_MM, 1.0), sensing)
+    entry_rad, bevel_rad = math.radians(3.0), math.radians(20.0)
+    priors = replace(usual, heading_rad=entry_rad, bevel_rad=bevel_rad, curvature_ratio=0.05)
+    methods = {name: METHODS[name](orthonormal(back), TRACE_RADIUS_MM, priors) for name in results}
+    steps_mm = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    way_mm = np.concatenate([[0.0], np.cumsum(steps_mm)])
+    seen = int(np.searchsorted(way_mm, 30.0))
+    for name, method in methods.items():
+        for step_mm, point in zip(steps_mm[:seen], points[1 : seen + 1], strict=True):
+            start = time.perf_counter()
+            method.push(float(step_mm))
+            x, y, z = point.tolist()
+            method.measure(Measurement(0.0, (x, y, z), 0.0))
+            results[name].update_s.append(time.perf_counter() - start)
+        if isinstance(method, Smoother):
+            method.estimate()
+        for length_mm in AHEAD_MM:
+            if way_mm[-1] - way_mm[seen] >= length_mm:
+                place = int(np.searchsorted(way_mm, way_mm[seen] + length_mm))
+                guess = method.predict(round((way_mm[place] - way_mm[seen]) / 2.5) * 2.5)
+                beyond_mm = way_mm[place] - way_mm[seen] - round(length_mm / 2.5) * 2.5
+                guess.position_mm = guess.position_mm + beyond_mm * guess.heading
+                truth = Pose(tuple(points[place].tolist()), ENTRY.heading, ENTRY.bevel)
+                results[name].note(f"+{length_mm:.0f} mm", truth, guess, directed=False)
 
 
 def main() -> None:
@@ -277,13 +354,21 @@ def main() -> None:
     parser.add_argument("--latency", type=float, default=BASE.latency_s, help="in s")
     parser.add_argument("--lost", type=float, default=BASE.lost_ratio)
     parser.add_argument("--grid", action="store_true")
+    parser.add_argument("--brief", action="store_true", help="a line for each method")
     parser.add_argument("--traces", type=pathlib.Path)
     arguments = parser.parse_args()
+    if arguments.traces is not None:
+        results = {name: Results.empty() for name in arguments.methods}
+        paths = sorted(arguments.traces.rglob("FullStateGroundTruthPos.dat"))
+        traces = [points for points in map(trace, paths) if len(points) > 45]
+        for points in traces:
+            predict_trace(points, results)
+        print(f"{len(traces)} measured insertions, 30 mm seen")
+        for name in arguments.methods:
+            table(name, results[name])
+        return
     own = replace(
-        BASE,
-        noise_mm=arguments.noise,
-        latency_s=arguments.latency,
-        lost_ratio=arguments.lost,
+        BASE, noise_mm=arguments.noise, latency_s=arguments.latency, lost_ratio=arguments.lost
     )
     for sensing in GRID if arguments.grid else [own]:
         compare(arguments, sensing)

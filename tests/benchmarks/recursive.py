@@ -8,8 +8,8 @@ knows the present; for a pull both take up the state again that they had at this
 * `KalmanFilter`: an unscented Kalman filter on the group of poses. Its state is a pose and a vector
   of errors, with rotations as rotation vectors about the axes of the tip. A measurement is linear
   in the errors, so its update needs no sigma points. (S. J. Julier, J. K. Uhlmann, "Unscented
-  filtering and nonlinear estimation", Proc. IEEE 92, 2004; M. Brossard, S. Bonnabel, J.-P. Condomines,
-  "Unscented Kalman filtering on Lie groups", IROS 2017.)
+  filtering and nonlinear estimation", Proc. IEEE 92, 2004; M. Brossard, S. Bonnabel and J.-P.
+  Condomines, "Unscented Kalman filtering on Lie groups", IROS 2017.)
 * `ParticleFilter`: Rao-Blackwellised. Particles carry directions, curvature and lag; the place and
   the tracker's error are normally distributed in each of them, with the same covariance in all.
 """
@@ -71,9 +71,7 @@ class _Model:
         rotations = [p.bevel_rad, p.heading_rad, p.heading_rad]
         turned = p.turn_drift_rad
         curvature = [ratio, turned]
-        return np.array(
-            [*[p.position_mm] * 3, *rotations, *curvature, lag, *[p.distortion_mm] * 3]
-        )
+        return np.array([*[p.position_mm] * 3, *rotations, *curvature, lag, *[p.distortion_mm] * 3])
 
     def kept(self, length_mm: float) -> tuple[float, float]:
         """How much of curvature and tracker's error is left after a length."""

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from ntagen.drive.deviation import DeviationMonitor, require_explained, window
+from ntagen.drive.deviation import (
+    DeviationMonitor,
+    DivergenceMonitor,
+    require_explained,
+    window,
+)
+from ntagen.drive.records import Command, Estimated
 from ntagen.drive.settings import Settings
+from ntagen.drive.states import State
 from ntagen.errors import DeviceError
 from ntagen.needle.estimate import RECENT, Estimate, Estimator, Priors
 from ntagen.needle.kinematics import push
 from ntagen.needle.measurement import Measurement
-from tests.steering import ENTRY
+from tests.drive.runs import drive
+from tests.steering import ENTRY, PAPER
 
 LENGTH_MM = 60.0
 
@@ -91,3 +102,80 @@ def test_a_tolerance_that_is_set_counts_for_the_estimate_too() -> None:
 
 def test_the_radius_of_a_straight_needle_is_not_judged() -> None:
     require_explained(after(0.25, 0.25, 60), Settings(), math.inf)
+
+
+def test_a_misfit_that_stays_is_a_divergence() -> None:
+    monitor = DivergenceMonitor(Settings())
+    off = replace(after(0.25, 0.25, 60), misfit_mm=1.2)
+    # Once is the tissue, and what came before an estimate that fits does not count.
+    for estimate in (off, off, replace(off, misfit_mm=0.8), off, off):
+        require_explained(estimate, Settings(), 30.0)
+        monitor.note(estimate)
+    with pytest.raises(
+        DeviceError, match=r"in 3 of them in a row .* 1\.2 mm or 34 standard"
+    ) as found:
+        monitor.note(off)
+    assert "hint: does an axis jam or lose steps?" in str(found.value)
+
+
+def test_noise_is_no_divergence() -> None:
+    monitor = DivergenceMonitor(Settings(priors=Priors(noise_mm=1.0)))
+    for _ in range(10):
+        monitor.note(replace(after(0.25, 0.25, 60), misfit_mm=1.7))
+
+
+def negative(covariance: NDArray[np.float64]) -> None:
+    covariance[0, 0] = -1e-6
+
+
+def correlated(covariance: NDArray[np.float64]) -> None:
+    covariance[0, 1] = covariance[1, 0] = 2.0 * math.sqrt(covariance[0, 0] * covariance[1, 1])
+
+
+def endless(covariance: NDArray[np.float64]) -> None:
+    covariance[6, 6] = math.inf
+
+
+def unknown(covariance: NDArray[np.float64]) -> None:
+    covariance[2, 3] = math.nan
+
+
+@pytest.mark.parametrize("damage", [negative, correlated, endless, unknown])
+def test_a_covariance_that_is_none_is_refused(
+    damage: Callable[[NDArray[np.float64]], None],
+) -> None:
+    estimate = after(0.25, 0.25, 60)
+    covariance = np.array(estimate.covariance)
+    damage(covariance)
+    broken = replace(estimate, covariance=tuple(tuple(row) for row in covariance.tolist()))
+    with pytest.raises(DeviceError, match="does not say how much it errs"):
+        require_explained(broken, Settings(), 30.0)
+
+
+def test_nothing_moves_after_an_estimate_without_a_covariance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = Estimator.estimate
+
+    def broken(estimator: Estimator) -> Estimate:
+        estimate = made(estimator)
+        endless_rows = ((math.inf,) * 7,) * 7
+        return replace(estimate, covariance=endless_rows) if estimator.depth_mm > 9.0 else estimate
+
+    monkeypatch.setattr(Estimator, "estimate", broken)
+    result, diary = drive(PAPER)
+    assert result.ended.outcome == State.FAULTED.value
+    assert "does not say how much it errs" in result.ended.reason
+    kinds = [command.kind for command in diary.of(Command)]
+    last = max(i for i, one in enumerate(diary.records) if isinstance(one, Estimated))
+    after_it = [one.kind for one in diary.records[last:] if isinstance(one, Command)]
+    assert after_it == ["stop"] == kinds[-1:]
+
+
+def test_measurements_that_leave_no_estimate_are_told() -> None:
+    estimator = Estimator(ENTRY, 30.0, Priors(noise_mm=1e-12))
+    estimator.push(1.0)
+    for _ in range(3):
+        estimator.measure(Measurement(0.0, ENTRY.position_mm, 0.0))
+    with pytest.raises(DeviceError, match=r"no needle can be estimated(.|\n)*hint: are they in mm"):
+        estimator.estimate()

@@ -169,8 +169,8 @@ def test_the_derivatives_are_those_of_the_positions() -> None:
 
     _, placed = place(estimator._channels, entry, 1.0 / 30.0, unknowns)
     exact = np.array([part.positions(np.array([7.0]))[1][0] for p in placed for part in p])
-    # Stretches begin at 0, 5 and 10 mm, at the roll at 14 mm, at 15 and 20 mm, at the new channel at
-    # 12 mm, at the roll and the boundary at 15 mm, and at 20 mm; the new channel has a bite.
+    # Stretches begin at 0, 5 and 10 mm; at the roll at 14 mm, at 15 and 20 mm; at the new channel
+    # at 12 mm; at the roll at 15 mm, and at 20 mm. The new channel has a bite.
     assert len(unknowns) == 7 + 3 + 9 * 2 + 1
     for index in range(len(unknowns)):
         step = np.zeros(len(unknowns))
