@@ -176,8 +176,8 @@ def _require_covariance(estimate: Estimate) -> None:
         is_one = float(np.linalg.eigvalsh(covariance / np.outer(stds, stds))[0]) > -_ROUNDING
     if not is_one:
         raise DeviceError(
-            "the estimate of the needle does not say how much it errs: its covariance is not finite "
-            "or not positive definite\n"
+            "the estimate of the needle does not say how much it errs: its covariance is not "
+            "finite or not positive definite\n"
             "hint: are the priors and the noise of the tracker sensible "
             "(`ntagen drive TASK --settings`)?"
         )
