@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, Channel, Placed, place, positions
+from ntagen.needle.channels import ENTRY, Channel, Placed, padded, place, positions
 from ntagen.needle.fluctuations import oscillation
+from ntagen.needle.kinematics import roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.priors import Priors
 from ntagen.scene import Pose
@@ -114,19 +115,31 @@ class Problem:
         for reading in self._directed:
             measurement = reading.measurement
             pose, rotation = part(*reading.part).directions(reading.along_mm)
+            # A tracker sees how the tip was turned, and not how the tissue turns the bend plane.
+            turn = self._turn(reading, len(unknowns))
             seen_and_expected = (
-                (measurement.heading, pose.heading),
-                (measurement.bevel, pose.bevel),
+                (measurement.heading, pose.heading, rotation),
+                (
+                    measurement.bevel,
+                    roll(pose, -float(turn @ unknowns)).bevel,
+                    rotation - np.outer(pose.heading, turn),
+                ),
             )
-            for seen, direction in seen_and_expected:
+            for seen, direction, moved in seen_and_expected:
                 if seen is not None:
                     difference = np.array(seen) - np.array(direction)
                     residuals.append(difference / self._priors.direction_rad)
-                    turned = np.cross(rotation.T, direction).T
+                    turned = np.cross(moved.T, direction).T
                     slopes.append(turned / -self._priors.direction_rad)
         residuals.append(unknowns / self._stds)
         slopes.append(np.diag(1.0 / self._stds))
         return np.concatenate(residuals), np.vstack(slopes)
+
+    def _turn(self, reading: Reading, width: int) -> _Array:
+        """The coefficients of the turn of the bend plane at a reading."""
+        if reading.channel == ENTRY:
+            return np.zeros(width)
+        return padded(self._channels[reading.channel].stretches[reading.stretch].turn, width)
 
 
 def _begins(part_of: _Indices, depths_mm: _Array, priors: Priors) -> _Indices:

@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from ntagen.needle.channels import ENTRY as AT_ENTRY
 from ntagen.needle.channels import place
-from ntagen.needle.estimate import Estimate, Estimator, Priors, pose_from_points
-from ntagen.needle.kinematics import bending_axis, orthonormal, push
+from ntagen.needle.estimate import Estimate, Estimator, Priors, _ends, pose_from_points
+from ntagen.needle.kinematics import bending_axis, orthonormal, push, roll
 from ntagen.needle.measurement import Measurement
+from ntagen.needle.phantom import PhantomNeedle
+from ntagen.needle.phantom_parameters import Fluctuation, PhantomParameters, Sensing, Shape
 from ntagen.needle.vectors import add, distance, dot, rotate
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.scene import Needle, Pose
@@ -256,3 +258,77 @@ def test_an_error_shared_by_measurements_is_not_averaged_away() -> None:
         stds[distortion_mm] = estimator.estimate().position_std_mm(0.0)
     assert stds[0.0] == pytest.approx(0.01, rel=0.01)
     assert stds[0.1] == pytest.approx(math.hypot(0.01, 0.1), rel=0.01)
+
+
+def watched(parameters: PhantomParameters, priors: Priors, seed: int) -> tuple[Estimate, Pose]:
+    """What a tracker of directions tells of a phantom, and the truth."""
+    needle = Needle(ENTRY, 30.0, 1.0)
+    device = PhantomNeedle(needle, (), seed, SimulatedClock(), parameters, reports_pose=True)
+    estimator = Estimator(ENTRY, 30.0, priors)
+    for _ in range(120):
+        device.push(0.25)
+        estimator.push(0.25)
+        estimator.measure(device.measure())
+    return estimator.estimate(), device.true_tip
+
+
+def test_a_tracker_that_sees_the_bevel_does_not_see_the_bend_plane() -> None:
+    """The tissue turns the bend plane by half a radian on 30 mm, and the bevel by nothing."""
+    none = Fluctuation(0.0, 30.0, 0.2)
+    parameters = PhantomParameters(
+        shape=Shape(0.0, none, 0.0, 10.0, math.radians(1.0), none),
+        sensing=Sensing(0.02, none, 0.0, latency_s=0.0, lost_ratio=0.0),
+    )
+    for seed in range(3):
+        estimate, true = watched(parameters, Priors(noise_mm=0.02, turn_drift_rad=0.2), seed)
+        check_pose(estimate, true, 0.05, math.radians(10.0))
+        assert estimate.radius_mm == pytest.approx(30.0, rel=0.05)
+
+
+def test_what_a_channel_bends_less_at_its_beginning_is_expected() -> None:
+    """And shows in the new channel, not in its roll or in the curvature."""
+    estimator = Estimator(ENTRY, 30.0, Priors(noise_mm=0.02, bite_mm=0.8))
+    tip = ENTRY
+    for kind, value in (("push", 20.0), ("pull", 10.0), ("roll", math.pi), ("push", 15.0)):
+        if kind != "push":
+            getattr(estimator, kind)(value)
+            tip = push(tip, 30.0, -value) if kind == "pull" else roll(tip, value)
+            continue
+        for step in range(round(value / 0.25)):
+            bites = estimator.depth_mm < 12.0 and value < 20.0
+            tip = push(tip, 50.0 if bites else 30.0, 0.25)
+            estimator.push(0.25)
+            estimator.measure(Measurement(float(step), tip.position_mm, 0.0))
+    estimate = estimator.estimate()
+    check_pose(estimate, tip, 0.02, math.radians(0.3))
+    assert estimate.radius_mm == pytest.approx(30.0, rel=0.01)
+
+
+def test_a_measurement_counts_where_the_tip_was() -> None:
+    estimator = Estimator(ENTRY, 30.0, Priors(noise_mm=0.02))
+    estimator.push(10.0)
+    for depth_mm in (9.8, 10.0):
+        tip_mm = push(ENTRY, 30.0, depth_mm).position_mm
+        estimator.measure(Measurement(0.0, tip_mm, 0.0), depth_mm)
+    estimator.pull(4.0)
+    for depth_mm in (7.0, 6.0):
+        tip_mm = push(ENTRY, 30.0, depth_mm).position_mm
+        estimator.measure(Measurement(0.0, tip_mm, 0.0), depth_mm)
+    assert estimator.estimate().rms_mm < 1e-6
+
+
+def test_a_predicted_position_is_right_to_second_order() -> None:
+    """Against many needles whose errors are drawn from what the estimate says."""
+    priors = Priors(curvature_drift=0.15, turn_drift_rad=math.radians(10.0))
+    estimate, _ = driven(ROLLED, Errors(noise_mm=0.1), priors=priors)
+    ahead, steps = estimate.ahead, len(estimate.ahead.differences) // 2
+    drawn = np.random.default_rng(1).multivariate_normal(
+        np.concatenate([np.zeros(6), ahead.differences]), ahead.covariance, 4000, method="eigh"
+    )
+    # 30 mm are six steps.
+    used = np.r_[0:12, 6 + steps : 12 + steps]
+    ends = _ends(estimate.tip, estimate.radius_mm, 30.0, drawn[:, used])
+    off_mm = ends - np.array(push(estimate.tip, estimate.radius_mm, 30.0).position_mm)
+    stated = np.linalg.eigvalsh(estimate.position_covariance_mm2(30.0))
+    seen = np.linalg.eigvalsh(off_mm.T @ off_mm / len(off_mm))
+    assert np.sqrt(stated) == pytest.approx(np.sqrt(seen), rel=0.1)
