@@ -125,6 +125,7 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 bench-needle: $(INSTALLED) ## Measure the phantom needle against real ones, what the estimator predicts, and how drives of both needles end
 	$(BIN)/python tests/benchmarks/phantom.py
 	$(BIN)/python tests/benchmarks/predictions.py
+	$(BIN)/python -m tests.benchmarks.filters --grid --brief
 	$(BIN)/python -m tests.benchmarks.matching
 	$(BIN)/python tests/benchmarks/drives.py --noise 0.1 1 2 --least 0.93
 	$(BIN)/python tests/benchmarks/drives.py --needle phantom --seeds 100 --known all none
