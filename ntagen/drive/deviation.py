@@ -29,6 +29,9 @@ _CURVATURE_STDS: Final = 20.0
 """A curvature that is so many standard deviations of its prior off is that of no needle; ours. Half
 and twice the expected one are 14 of the usual 5 %: the driver copes with those."""
 
+_USUAL_RATIO: Final = 0.05
+"""A needle that was calibrated better than this may still be another one."""
+
 _CAUSES: Final = "hint: does an axis jam or lose steps? Is the tracker mirrored, frozen or late?"
 
 _LEAST_MISFIT_MM: Final = 1.0
@@ -116,7 +119,8 @@ def require_explained(estimate: Estimate, settings: Settings, radius_mm: float) 
         )
     priors = settings.priors
     log_ratio = math.log(estimate.radius_mm) - math.log(radius_mm)
-    if math.isfinite(radius_mm) and abs(log_ratio) > _CURVATURE_STDS * priors.curvature_ratio:
+    most = _CURVATURE_STDS * max(priors.curvature_ratio, _USUAL_RATIO)
+    if math.isfinite(radius_mm) and abs(log_ratio) > most:
         raise DeviceError(
             f"the tip moves as if the needle bent with a radius of {estimate.radius_mm:.1f} mm, "
             f"and {radius_mm:g} mm was expected\n{_CAUSES}"

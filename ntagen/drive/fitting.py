@@ -95,6 +95,7 @@ def settings_for_phantom(
     reinsertion = parameters.reinsertion
     priors = replace(
         settings.priors,
+        curvature_ratio=shape.curvature_ratio,
         noise_mm=math.hypot(sensing.noise_mm, sensing.step_mm),
         distortion_mm=sensing.distortion_mm.std,
         curvature_drift=DRIFT_RATIO * shape.curvature.std,
