@@ -30,7 +30,7 @@ from ntagen.scene import Pose
 _Array = NDArray[np.float64]
 
 MEMORY_MM = 8.0
-"""The length over which the curvature forgets; it predicts best on phantoms."""
+"""The length over which the curvature forgets; ours, not tuned."""
 
 DISTORTION_MEMORY_MM = 4.5
 """The same of the tracker's error."""
