@@ -90,6 +90,7 @@ class Parameter:
         help: What it is, as a sentence.
         least: The least value, in the unit of the field.
         is_above: Whether a value must be greater than `least`.
+        most: A value must be less than this; infinite for the greatest value of all.
         option: Its option of ``ntagen drive``; by default made of its words.
         choices: The words that it can have.
     """
@@ -102,6 +103,7 @@ class Parameter:
     is_above: bool = False
     option: str = ""
     choices: tuple[str, ...] = ()
+    most: float = math.inf
 
     @property
     def flag(self) -> str:
@@ -131,13 +133,16 @@ class Parameter:
         measure = MEASURES[self.kind]
         factor = measure.units.get(measure.unit, 1.0)
         is_low = value < self.least or (self.is_above and value == self.least)
-        if math.isfinite(value) and not is_low and value <= LARGEST * factor:
+        is_high = value > LARGEST * factor or value >= self.most
+        if math.isfinite(value) and not is_low and not is_high:
             return None
         bound = "greater than" if self.is_above else "at least"
+        most = f"at most {self.shown(LARGEST * factor)}"
+        if math.isfinite(self.most):
+            most = f"less than {self.shown(self.most)}"
         return Breach(
             "setting-out-of-range",
-            f"`{self.words}` must be {bound} {self.shown(self.least)} and at most "
-            f"{self.shown(LARGEST * factor)}",
+            f"`{self.words}` must be {bound} {self.shown(self.least)} and {most}",
             f"write for example `{self.example}`",
         )
 
@@ -448,6 +453,15 @@ PARAMETERS: Final = (
         "data",
         "A synthesis ends the run if the engine's states take more.",
         1.0,
+    ),
+    Parameter(
+        "accept",
+        "accept",
+        "ratio",
+        "The least confidence with which a push stays clear of critical regions until it is looked "
+        "at, and the tip is in the target.",
+        is_above=True,
+        most=1.0,
     ),
     Parameter(
         "timeout_s",

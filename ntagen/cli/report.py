@@ -96,6 +96,9 @@ def summary(
         "depth_mm": ended.depth_mm,
         "adjustments": ended.adjustments,
         "syntheses": ended.syntheses,
+        "cut_mm": ended.cut_mm,
+        "confidence": ended.confidence or None,
+        "error_mm": ended.error_mm or None,
         "each_synthesis": [dataclasses.asdict(one) for one in result.syntheses],
         "true_clearance_mm": None if truth is None or is_clear else truth.clearance_mm,
         "true_target_distance_mm": None if truth is None else truth.target_distance_mm,
@@ -117,8 +120,13 @@ def report(result: Driven, scene: Scene, log_path: Path | None, *, short: bool) 
         return
     if isinstance(result, Result):
         _tell_truth(result, scene.targets[-1].name)
+    if ended.confidence:
+        echo(
+            f"by the last estimate, the tip is in {scene.targets[-1].name} with a confidence of "
+            f"{ended.confidence:.3f}, and known to {ended.error_mm:.2f} mm"
+        )
     count = f"{ended.syntheses} syntheses, {ended.adjustments} adjustments"
-    echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep")
+    echo(f"{count}, {ended.time_s:.1f} s, {ended.depth_mm:.1f} mm deep, {ended.cut_mm:.1f} mm cut")
     if log_path is not None:
         echo(f"wrote {log_path}")
 

@@ -43,6 +43,7 @@ from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import Moves, pieces
 from ntagen.drive.planning import Lack, Planner
+from ntagen.drive.prospect import prefers
 from ntagen.drive.records import Ended, Journal, Predicted, Record, Relied
 from ntagen.drive.reliance import relies_on
 from ntagen.drive.reserve import is_enough, is_surely_in
@@ -50,6 +51,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.states import Event, State
 from ntagen.drive.steering import Steering
 from ntagen.drive.supervisor import Guard, Supervisor
+from ntagen.drive.tube import confidence_in
 from ntagen.drive.workflow import Workflow
 from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
@@ -149,6 +151,11 @@ class Controller:
     def ended(self, outcome: State) -> Ended:
         """The last record."""
         self._guide.leave("the run is over")
+        confidence = error_mm = 0.0
+        if outcome is State.TARGET_REACHED and self._needle.estimate is not None:
+            estimate = self._needle.glance()
+            error_mm = estimate.position_std_mm(0.0)
+            confidence = confidence_in(self._learner.a_priori.targets[-1], estimate)
         return Ended(
             time_s=self._now_s(),
             outcome=outcome.value,
@@ -156,6 +163,9 @@ class Controller:
             depth_mm=self._needle.depth_mm,
             adjustments=self._adjustments,
             syntheses=self._planner.count,
+            cut_mm=self._needle.cut_mm,
+            confidence=confidence,
+            error_mm=error_mm,
         )
 
     # The tasks, in the order of the workflow.
@@ -174,11 +184,18 @@ class Controller:
         require_explained(estimate, self._settings, self._learner.a_priori.needle.radius_mm)
         self._divergence.note(estimate)
         tip = estimate.tip
-        self._learner.visit(tip.position_mm, last_too=True)
+        self._learner.visit(tip.position_mm, last_too=self._is_sure_of_target(estimate))
         if self._learner.has_visited_all:
             self.reason = "the tip is in the last target"
             return Event.IN_TARGET
         return Event.ESTIMATED
+
+    def _is_sure_of_target(self, estimate: Estimate) -> bool:
+        """Whether the tip is in the last target with the confidence that is asked for."""
+        target = self._learner.a_priori.targets[-1]
+        if target.motion is not None or not prefers(self._settings):
+            return True
+        return confidence_in(target, estimate) >= self._settings.accept
 
     def _find_strategy(self) -> Event:
         if self._guide.is_on:
@@ -353,6 +370,8 @@ class Controller:
         certificate = certify(rest, scene)
         if not self._settings.margins.allow(certificate):
             return Event.PLAN_FAILS
+        if self._planner.tube(scene, estimate).confidence(rest) < self._settings.accept:
+            return Event.PLAN_FAILS
         if not is_enough(certificate, estimate):
             self._rest = rest
             return Event.PLAN_IS_THIN
@@ -394,6 +413,10 @@ class Controller:
         goal_mm = self._retreat_mm if self._retreat_mm is not None else self._needle.depth_mm
         self._retreat_mm = None
         length_mm = goal_mm - self._needle.depth_mm
+        tube = self._planner.tube(self._here(), self._needle.known)
+        if tube.confidence(Plan.of([Push(max(0.0, length_mm))])) < self._settings.accept:
+            # The next plan begins here, and needs no push before it.
+            return Event.PUSHED
         for piece_mm in pieces(length_mm, self._settings.spacing_mm):
             self._planner.require_time()
             start = self._needle.path

@@ -15,7 +15,9 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
 from ntagen.drive.timing import timed
+from ntagen.drive.tube import Tube
 from ntagen.errors import LimitError
+from ntagen.needle.estimate import Estimate
 from ntagen.plan.actions import Plan, Roll
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.synthesise import Synthesis, Synthesiser
@@ -30,11 +32,17 @@ class Lack:
 
     found: bool = False
     held: bool = False
+    confidence: float | None = None
 
     def event(self) -> tuple[Event, str]:
         """The event, and the reason in words."""
         if self.held:
             return Event.NO_TIME_LEFT, "no plan can end within the time limit"
+        if self.confidence is not None:
+            return Event.NONE_HOLDS, (
+                f"no plan is sure enough to stay clear of critical regions: the confidence of the "
+                f"best one is {self.confidence:.3f}; --accept says which one is enough"
+            )
         if self.found:
             return Event.NONE_HOLDS, "no plan of the model holds in exact kinematics"
         return Event.NO_STRATEGY, "no plan is left, even from the entry"
@@ -113,13 +121,14 @@ class Planner:
         back_mm = self._needle.depth_mm - depth_mm
         whole = self._found(scene, rest)
         self.lack.found |= whole.found > 0
+        whole = self._sure(whole)
         self.lack.held |= bool(whole.candidates)
         synthesis = self._in_time(whole, back_mm)
         if whole.candidates and not synthesis.candidates:
             # The engine gives the best plans. A shorter one may end in time.
             shorter = self._shorter(scene, back_mm)
             if shorter.needle.length_mm > step_length_mm(scene):
-                synthesis = self._in_time(self._found(shorter, rest), back_mm)
+                synthesis = self._in_time(self._sure(self._found(shorter, rest)), back_mm)
         number, best = self.count + 1, synthesis.best
         self._journal.synthesised(number, synthesis)
         clearance_mm = best.certificate.critical_clearance_mm if best else -1.0
@@ -151,6 +160,31 @@ class Planner:
             return found
         estimate, left_s = self._needle.known, self.left_s()
         return timed(found, lambda one: by_prospect(one, estimate, self._settings, left_s))
+
+    def _sure(self, synthesis: Synthesis) -> Synthesis:
+        """The synthesis without the plans that may soon touch a known critical region."""
+        if not synthesis.candidates:
+            return synthesis
+        tube = self.tube(synthesis.scene, self._needle.known)
+        sure, best = [], 0.0
+        for candidate in synthesis.candidates:
+            confidence = tube.confidence(candidate.plan)
+            best = max(best, confidence)
+            if confidence >= self._settings.accept:
+                sure.append(candidate)
+        if not sure:
+            self.lack.confidence = max(best, self.lack.confidence or 0.0)
+        return synthesis.with_candidates(sure)
+
+    def tube(self, scene: Scene, estimate: Estimate) -> Tube:
+        """What is around the ways from where the needle is in a scene.
+
+        Only regions that were told count. Where a learned one lies is a guess, and the force is
+        watched there. Regions that move are left to the certificates, which follow them in time.
+        """
+        is_judged = prefers(self._settings) and scene.breath is None
+        regions = self._learner.a_priori.criticals if is_judged else ()
+        return Tube(scene, estimate, self._settings, regions)
 
     def _shorter(self, scene: Scene, back_mm: float) -> Scene:
         """The scene with a needle so short that its plans, with all their rolls, end in time."""

@@ -174,6 +174,11 @@ class Ended(Record):
         depth_mm: The insertion depth at the end.
         adjustments: The number of times that the needle was pulled back.
         syntheses: The number of syntheses.
+        cut_mm: The length of all channels that were cut.
+        confidence: The probability that the tip is in the last target, by the last estimate; 0 if
+            the target was not reached.
+        error_mm: The standard deviation of the tip's position by that estimate, in the direction
+            that is known worst.
     """
 
     outcome: str
@@ -181,6 +186,9 @@ class Ended(Record):
     depth_mm: float
     adjustments: int
     syntheses: int
+    cut_mm: float = 0.0
+    confidence: float = 0.0
+    error_mm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

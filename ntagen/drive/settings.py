@@ -65,6 +65,9 @@ class Settings:
         pull_speed_ratio: Pulling in the open channel is faster than insertion by this factor, to
             know how long it takes; ours.
         roll_rad_per_s: The speed of rolls, to know how long a plan takes; ours.
+        accept: A needle that does not bend exactly as planned is pushed only if it touches no known
+            critical region with this confidence until the driver looks again (`ntagen.drive.tube`),
+            and it has reached the last target if it is there with this confidence.
         timeout_s: A run ends after this time (paper, section 4).
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
             ours.
@@ -95,6 +98,7 @@ class Settings:
     compensated_lag_rad: float = 0.0
     pull_speed_ratio: float = 5.0
     roll_rad_per_s: float = math.pi
+    accept: float = 0.95
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0
     learned_radius_mm: float = 2.0

@@ -56,7 +56,7 @@ class Steering:
         self._speed_mm_per_s = needle.speed_mm_per_s
         self._pull_speed_mm_per_s = settings.pull_speed_ratio * needle.speed_mm_per_s
         self._radius_mm = needle.radius_mm
-        self._cut_mm = 0.0
+        self._cut_mm = self._all_cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
         # Whether the channel is longer than it was at the last pull.
         self._has_grown = False
@@ -68,6 +68,11 @@ class Steering:
     def depth_mm(self) -> float:
         """The commanded insertion depth."""
         return self.path.depth_mm
+
+    @property
+    def cut_mm(self) -> float:
+        """The length of all channels that were cut, by the commands."""
+        return self._all_cut_mm
 
     @property
     def cuts(self) -> bool:
@@ -101,6 +106,7 @@ class Steering:
             self._estimator.push(made_mm)
             self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s)
             self.path = self.path.push(self._radius_mm, made_mm)
+            self._all_cut_mm += max(0.0, self.path.depth_mm - self._cut_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
             self._has_grown = True
         return True

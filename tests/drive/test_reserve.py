@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import random
+import re
 from dataclasses import replace
 
 import pytest
 
 from ntagen.drive.configure import configure
-from ntagen.drive.records import Synthesised, Transition
+from ntagen.drive.records import Command, Synthesised, Transition
 from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import Event, State
+from ntagen.parameters import BY_WORDS, Given
 from ntagen.scene import Scene
 from tests.drive.runs import Diary
 from tests.steering import ENTRY, PAPER, scene, sphere
@@ -18,9 +20,20 @@ from tests.steering import ENTRY, PAPER, scene, sphere
 NEAR = scene(targets=[sphere("T1", "target", (0.0, -20.0, 0.0), 8.0)], name="near")
 
 
-def phantom_drive(where: Scene, seed: int) -> tuple[Result, Diary]:
+# A gap through which a needle passes with 0.2 mm on both sides.
+GAP = scene(
+    sphere("C1", "critical", (5.2, -4.0, 0.0), 5.0),
+    sphere("C2", "critical", (-5.2, -4.0, 0.0), 5.0),
+    targets=[sphere("T1", "target", (0.0, -20.0, -4.0), 4.0)],
+    name="gap",
+)
+
+
+def phantom_drive(where: Scene, seed: int, accept: str = "0.95") -> tuple[Result, Diary]:
     """A run of a phantom needle with plans of the engine."""
-    configuration = configure([], where, needle="phantom")
+    parameter = BY_WORDS["accept"]
+    given = [Given(parameter, parameter.parse(accept), "a test")]
+    configuration = configure(given, where, needle="phantom")
     settings, diary = configuration.settings, Diary()
     make = configuration.needle.make
     return simulate(where, synthesiser_for(settings), settings, diary, make=make, seed=seed), diary
@@ -38,6 +51,25 @@ def test_a_run_ends_when_the_tip_is_in_the_target_for_sure() -> None:
     assert events_of(diary, State.MONITOR)[-1] == Event.IN_TARGET.value
     # Deep enough, and no deeper than it takes to be sure.
     assert 0.2 < -result.target_distance_mm < 1.5
+
+
+def test_the_end_says_how_sure_it_is_and_how_much_was_cut() -> None:
+    ended = phantom_drive(NEAR, seed=1)[0].ended
+    assert 0.95 <= ended.confidence <= 1.0
+    assert 0.0 < ended.error_mm < 0.3
+    assert ended.cut_mm == pytest.approx(ended.depth_mm)
+
+
+def test_nothing_moves_if_no_plan_is_sure_enough_until_less_is_accepted() -> None:
+    result, diary = phantom_drive(GAP, seed=1)
+    ended = result.ended
+    assert ended.outcome == State.NONE_HOLDS.value
+    said = re.search(r"the confidence of the best one is (0\.\d+)", ended.reason)
+    assert said is not None
+    assert [one.kind for one in diary.of(Command)] == ["stop"]
+    less = f"{float(said[1]) - 0.001:.3f}"
+    result, diary = phantom_drive(GAP, seed=1, accept=less)
+    assert any(one.kind == "push" for one in diary.of(Command))
 
 
 def test_a_plan_with_little_reserve_is_renewed_while_it_holds() -> None:

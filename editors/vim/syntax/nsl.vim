@@ -31,6 +31,7 @@ syntax match nslSetting /\<ranking\>/ contained
 syntax match nslSetting /\<push\>/ contained
 syntax match nslSetting /\<pull\>/ contained
 syntax match nslSetting /\<overrun\>/ contained
+syntax match nslSetting /\<accept\>/ contained
 syntax match nslSetting /\<noise\>/ contained
 syntax match nslSetting /\<force\>/ contained
 syntax match nslSetting /\<deviation\>/ contained
@@ -53,7 +54,9 @@ syntax match nslSetting /\<prior\s\+distortion\>/ contained
 syntax match nslSetting /\<prior\s\+direction\>/ contained
 syntax match nslSetting /\<prior\s\+curvature\>/ contained
 syntax match nslSetting /\<prior\s\+bevel\>/ contained
+syntax match nslSetting /\<prior\s\+bite\>/ contained
 syntax match nslSetting /\<max\s\+plans\>/ contained
+syntax match nslSetting /\<prior\s\+first\s\+curvature\>/ contained
 syntax match nslSetting /\<learned\s\+radius\>/ contained
 syntax match nslSetting /\<lag\s\+compensation\>/ contained
 syntax match nslSetting /\<initial\s\+push\>/ contained
