@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -12,10 +13,13 @@ from ntagen.drive.configure import configure
 from ntagen.drive.records import Command, Synthesised, Transition
 from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import Event, State
+from ntagen.nsl import load
 from ntagen.parameters import BY_WORDS, Given
 from ntagen.scene import Scene
 from tests.drive.runs import Diary
 from tests.steering import ENTRY, PAPER, scene, sphere
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 NEAR = scene(targets=[sphere("T1", "target", (0.0, -20.0, 0.0), 8.0)], name="near")
 
@@ -104,3 +108,11 @@ def test_random_tasks_are_reached_with_a_needle_that_is_not_exact() -> None:
     reached = [end for end in ends if end.ended.outcome == State.TARGET_REACHED.value]
     assert len(reached) >= 15, [end.ended for end in ends]
     assert all(end.target_distance_mm <= 0.1 for end in reached)
+
+
+@pytest.mark.parametrize("name", ["bevel_tip", "bent_tip"])
+def test_needles_that_bend_as_real_ones_reach_their_targets(name: str) -> None:
+    where = load(EXAMPLES / "needles" / f"{name}.nsl")
+    result, _ = phantom_drive(where, seed=2)
+    assert result.ended.outcome == State.TARGET_REACHED.value
+    assert result.target_distance_mm < 0.0 < result.clearance_mm
