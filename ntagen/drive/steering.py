@@ -27,6 +27,9 @@ from ntagen.scene import SHAFT_SPACING_MM, Needle, Vector
 
 _ROLL_NEGLIGIBLE_RAD: Final = 1e-9
 
+_ROLL_SMALL_RAD: Final = math.radians(10.0)
+"""A tip whose bend differs by less from that of its channel follows the channel; ours."""
+
 
 class Steering:
     """A needle that is steered, and what is known of where it is.
@@ -149,6 +152,9 @@ class Steering:
         angle_rad = math.remainder(self.path.pending_roll_rad, 2.0 * math.pi)
         if abs(angle_rad) > _ROLL_NEGLIGIBLE_RAD:
             self._turn(-angle_rad)
+        if abs(angle_rad) > _ROLL_SMALL_RAD:
+            # Without the roll, a push beyond this place leaves the channel.
+            self._cut_mm = min(self._cut_mm, self.path.depth_mm)
 
     def pull_back_to(self, depth_mm: float) -> None:
         """Pulls the needle back to this depth in its channel, and undoes rolls where they were."""
