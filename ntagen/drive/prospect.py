@@ -51,7 +51,9 @@ def by_prospect(
         return synthesis
     judge = _Judge(scene, estimate, settings, left_s)
     candidates = list(synthesis.candidates)
-    for first in _firsts(scene, judge.look_mm):
+    # Nothing is better than a plan after which the target is reached whatever the error is.
+    is_sure = any(judge.prospect(one.plan) > 1.0 - 0.5 * _STEP for one in candidates)
+    for first in () if is_sure else _firsts(scene, judge.look_mm):
         plan = judge.whole(first)
         if plan is None:
             continue
