@@ -13,7 +13,6 @@ from ntagen.drive.force import fitting_spacing_mm
 from ntagen.drive.settings import Settings
 from ntagen.drive.shells import sensing_margin_mm
 from ntagen.needle.errors import Errors
-from ntagen.needle.fluctuations import DRIFT_LENGTH_MM, DRIFT_RATIO
 from ntagen.needle.priors import Priors
 from ntagen.scene import Scene, Tissue
 
@@ -88,6 +87,9 @@ def settings_for_phantom(
     Raises:
         InputError: No push is short enough to feel a hidden region before it is pierced.
     """
+    # It takes NumPy, which a plan does without.
+    from ntagen.needle.fluctuations import DRIFT_LENGTH_MM, DRIFT_RATIO
+
     sensing, torsion, shape = parameters.sensing, parameters.torsion, parameters.shape
     wobble_rad = DRIFT_RATIO * shape.turn_rad.std
     steady_rad = DRIFT_LENGTH_MM * shape.turn_rad_per_mm
