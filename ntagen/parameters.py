@@ -90,7 +90,7 @@ class Parameter:
         help: What it is, as a sentence.
         least: The least value, in the unit of the field.
         is_above: Whether a value must be greater than `least`.
-        most: A value must be less than this; infinite for the greatest value of all.
+        most: A value must be less than this, if it is given.
         option: Its option of ``ntagen drive``; by default made of its words.
         choices: The words that it can have.
     """
@@ -103,7 +103,7 @@ class Parameter:
     is_above: bool = False
     option: str = ""
     choices: tuple[str, ...] = ()
-    most: float = math.inf
+    most: float | None = None
 
     @property
     def flag(self) -> str:
@@ -133,12 +133,12 @@ class Parameter:
         measure = MEASURES[self.kind]
         factor = measure.units.get(measure.unit, 1.0)
         is_low = value < self.least or (self.is_above and value == self.least)
-        is_high = value > LARGEST * factor or value >= self.most
+        is_high = value > LARGEST * factor or (self.most is not None and value >= self.most)
         if math.isfinite(value) and not is_low and not is_high:
             return None
         bound = "greater than" if self.is_above else "at least"
         most = f"at most {self.shown(LARGEST * factor)}"
-        if math.isfinite(self.most):
+        if self.most is not None:
             most = f"less than {self.shown(self.most)}"
         return Breach(
             "setting-out-of-range",
