@@ -144,6 +144,54 @@ def roll(angle_rad: float) -> Breach | None:
     return None
 
 
+def spin(fraction: float) -> Breach | None:
+    """A needle spins in more than none and less than all of the way."""
+    if WHOLE_TOLERANCE < fraction < 1.0 - WHOLE_TOLERANCE:
+        return None
+    return Breach(
+        "spin-out-of-range",
+        "a spun fraction must be more than 0 % and less than 100 %, but this is "
+        f"{100.0 * fraction:.6g} %",
+        f"write {fraction:g} %"
+        if 1.0 < fraction < 100.0
+        else "remove it: plans that do not spin the needle are always looked for"
+        if fraction == 0.0
+        else "write for example `spin 90 %`, after which the needle is nearly straight",
+    )
+
+
+def spin_repeated(fractions: Sequence[float], index: int) -> Breach | None:
+    """A spun fraction is none of those before it."""
+    fraction = fractions[index]
+    if all(abs(fraction - other) > WHOLE_TOLERANCE for other in fractions[:index]):
+        return None
+    return Breach(
+        "spin-repeated", f"{100.0 * fraction:.6g} % is written twice", "remove one of the two"
+    )
+
+
+def spin_possible(kind: str, *, is_moving: bool) -> Breach | None:
+    """Plans that spin the needle are made in static tissue in which no region moves.
+
+    Args:
+        kind: That of the tissue.
+        is_moving: Whether regions move.
+    """
+    if kind != "static":
+        return Breach(
+            "spin-misused",
+            f"a needle that spins, and a tissue that is {kind}, cannot be in one task",
+            "write `tissue static`, or leave `spin` out",
+        )
+    if is_moving:
+        return Breach(
+            "spin-misused",
+            "a needle that spins, and regions that move, cannot be in one task",
+            "make the regions as large as where they get, or leave `spin` out",
+        )
+    return None
+
+
 def roll_count(count: int) -> Breach | None:
     """A plan has from 0 to 100 rolls."""
     if isinstance(count, int) and 0 <= count <= MAX_ROLLS:

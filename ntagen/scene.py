@@ -190,6 +190,8 @@ class Limits:
         min_roll_distance_mm: The minimum insertion between two rolls (`MIN_PROG_BETWEEN_ROTS`).
         free_bevel: Whether the direction of the bevel before the entry may be chosen: one roll
             before the first push is not counted.
+        spins: The parts of the insertion in which the needle may spin about its shaft; the
+            curvature is less by such a part (duty-cycled spinning). It may always not spin.
     """
 
     step_s: float
@@ -197,6 +199,7 @@ class Limits:
     max_rolls: int
     min_roll_distance_mm: float
     free_bevel: bool = False
+    spins: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         step, distance = "the step", "the distance between rolls"
@@ -207,7 +210,18 @@ class Limits:
             rules.roll_count(self.max_rolls),
             rules.finite([self.min_roll_distance_mm], distance)
             or rules.not_negative(self.min_roll_distance_mm, distance),
+            *(
+                rules.finite([fraction], "a spun fraction")
+                or rules.spin(fraction)
+                or rules.spin_repeated(self.spins, index)
+                for index, fraction in enumerate(self.spins)
+            ),
         )
+
+    @property
+    def spun_fractions(self) -> tuple[float, ...]:
+        """All fractions that a push may have: none of the way first, then `spins`."""
+        return (0.0, *self.spins)
 
 
 @dataclass(frozen=True, slots=True)
@@ -340,6 +354,9 @@ class Scene:
             if region.motion is not None and region.motion.period_s != period_s:
                 raise InputError(f"`{region.name}` does not move with the period of the breath")
 
+        if self.limits.spins:
+            _require(rules.spin_possible(self.tissue.kind, is_moving=self.breath is not None))
+
     @property
     def regions(self) -> tuple[Region, ...]:
         """Targets, critical, detection, unexplored and safe regions, in this order."""
@@ -352,8 +369,12 @@ class Scene:
 
     @property
     def radii_mm(self) -> tuple[float, ...]:
-        """The radii of the motion circle that the tissue may pick."""
-        return tuple(self.needle.radius_mm / factor for factor in self.tissue.factors)
+        """The radii of the motion circle that the tissue may pick, or that spinning gives."""
+        return tuple(
+            self.needle.radius_mm / (factor * (1.0 - spin))
+            for spin in self.limits.spun_fractions
+            for factor in self.tissue.factors
+        )
 
     def with_tip_margin(self) -> Scene:
         """The same scene with its tip error as margins: regions to avoid larger, targets smaller.

@@ -31,8 +31,8 @@ class Poses:
         bevel = np.where(angle_rad[:, None] == 0.0, self.bevel, turned)
         return Poses(self.position, self.heading, bevel)
 
-    def pushed(self, radius_mm: float, length_mm: _Array) -> Poses:
-        """The poses after pushes; see `ntagen.needle.kinematics.push`."""
+    def pushed(self, radius_mm: float | _Array, length_mm: _Array) -> Poses:
+        """The poses after pushes, with one radius or one for each; see `kinematics.push`."""
         turn = length_mm / radius_mm
         cosine, sine = np.cos(turn)[:, None], np.sin(turn)[:, None]
         return Poses(
@@ -41,7 +41,7 @@ class Poses:
             cosine * self.bevel + sine * self.heading,
         )
 
-    def places(self, radius_mm: float, length_mm: _Array) -> _Array:
+    def places(self, radius_mm: float | _Array, length_mm: _Array) -> _Array:
         """The places after pushes."""
         half = 0.5 * (length_mm / radius_mm)
         chord = length_mm * np.sinc(half / math.pi)

@@ -94,9 +94,10 @@ class Timeline:
         """The arcs of all pushes and rests."""
         return tuple(stage.arc for stage in self._stages)
 
-    def push(self, start: Pose, length_mm: float) -> None:
-        """Adds a push from a pose."""
-        self._add(Arc(start, self._radius_mm, length_mm), length_mm / self._speed_mm_per_s)
+    def push(self, start: Pose, length_mm: float, radius_mm: float | None = None) -> None:
+        """Adds a push from a pose, perhaps on another circle."""
+        arc = Arc(start, radius_mm or self._radius_mm, length_mm)
+        self._add(arc, length_mm / self._speed_mm_per_s)
 
     def rest(self, seconds: float) -> None:
         """Adds a rest where the tip is."""

@@ -118,6 +118,7 @@ class _Builder:
         tissue = self._tissue()
         spheres = self._regions.spheres(needle)
         breath = None if limits is None else self._motions.breath(limits)
+        self._check_spins(tissue, breath)
         written = self._resolution()
         is_wrong = written is None and "resolution" in draft.seen
         made = None
@@ -303,7 +304,7 @@ class _Builder:
             distance = None
         if step is None or angles is None or count is None or distance is None:
             return None
-        return Limits(step, angles, count, distance, draft.is_bevel_free)
+        return Limits(step, angles, count, distance, draft.is_bevel_free, self._spins())
 
     def _roll_angles(self) -> tuple[float, ...] | None:
         """The rolls in rad, exactly those of whole degrees."""
@@ -328,6 +329,27 @@ class _Builder:
         if not self._reporter.obeys(rules.roll(placed.value), placed.span):
             return None
         return round(deg_from_rad(placed.value))
+
+    def _spins(self) -> tuple[float, ...]:
+        """The fractions of the insertion in which the needle may spin; those without a mistake."""
+        found: list[float] = []
+        for placed in self._draft.spins:
+            if placed.value is None or not self._reporter.obeys(
+                rules.spin(placed.value), placed.span
+            ):
+                continue
+            repeated = rules.spin_repeated([*found, placed.value], len(found))
+            if self._reporter.obeys(repeated, placed.span):
+                found.append(placed.value)
+        return tuple(found)
+
+    def _check_spins(self, tissue: Tissue, breath: Breath | None) -> None:
+        """The needle may spin only where plans do not depend on the tissue's answer or on time."""
+        if "spin" in self._draft.seen:
+            is_moving = breath is not None
+            self._reporter.obeys(
+                rules.spin_possible(tissue.kind, is_moving=is_moving), self._draft.seen["spin"]
+            )
 
     def _tissue(self) -> Tissue:
         """How the tissue behaves; static after a mistake."""
@@ -380,10 +402,11 @@ class _Builder:
         swept = self._draft.choices.get("safety") == "swept"
         circle = rules.visible(needle.radius_mm, resolution, "the radius of the motion circle")
         if self._reporter.obeys(circle, self._draft.numbers["radius"].span):
-            speed, radius = needle.speed_mm_per_s, needle.radius_mm
-            self._reporter.obeys(
-                rules.motion(limits.step_s, speed, radius, resolution, swept=swept), span
-            )
+            speed = needle.speed_mm_per_s
+            for index, (_, radius, place) in enumerate(self._circles(needle, limits)):
+                breach = rules.motion(limits.step_s, speed, radius, resolution, swept=swept)
+                if not self._reporter.obeys(breach, place if index else span):
+                    break
         seen = [sphere for sphere in spheres if self._regions.is_visible(sphere, resolution)]
         # The swept check sees critical regions between the ends of pushes, but no targets.
         jumped = ("target",) if swept else ("target", "critical", "detection", "unexplored")
@@ -398,6 +421,14 @@ class _Builder:
                 hint="make the step shorter",
                 notes=("regions are checked at the ends of pushes only",),
             )
+
+    def _circles(self, needle: Needle, limits: Limits) -> Iterator[tuple[str, float, Span]]:
+        """The motion circles of the needle: in words, their radii, and what they come from."""
+        yield "the motion circle", needle.radius_mm, self._draft.numbers["radius"].span
+        spans = {placed.value: placed.span for placed in self._draft.spins}
+        for spin in limits.spins:
+            what = f"the motion circle of a needle that spins for {100.0 * spin:g} % of the way"
+            yield what, needle.radius_mm / (1.0 - spin), spans[spin]
 
     def _check_rounding(self, scene: Scene) -> None:
         """Rounding moves the path on a circle by less than the least margin of the task."""
@@ -451,8 +482,8 @@ class _Builder:
             yield "the tip's position", math.hypot(*tip.position_mm), draft.vectors["tip"].span
         if needle is not None:
             # The centre of the motion circle lies one radius away from the tip.
-            reach = needle.radius_mm + math.hypot(*needle.tip.position_mm)
-            yield "the motion circle", reach, draft.numbers["radius"].span
+            away = math.hypot(*needle.tip.position_mm)
+            yield "the motion circle", needle.radius_mm + away, draft.numbers["radius"].span
             placed = draft.numbers.get("length", draft.resolution)
             yield (
                 "the needle's length",
@@ -460,6 +491,8 @@ class _Builder:
                 draft.span if placed is None else placed.span,
             )
         if needle is not None and limits is not None:
+            for what, radius, span in list(self._circles(needle, limits))[1:]:
+                yield what, radius + math.hypot(*needle.tip.position_mm), span
             span = draft.numbers["step" if "step" in draft.numbers else "speed"].span
             yield "a push", needle.speed_mm_per_s * limits.step_s, span
         if limits is not None and draft.roll_distance is not None:

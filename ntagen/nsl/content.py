@@ -83,6 +83,8 @@ class ContentResolver:
                 self._setting(statement, scope, draft)
             case tree.Roll():
                 self._roll(statement, scope, draft)
+            case tree.Spin():
+                self._spin(statement, scope, draft)
             case tree.Wait() | tree.Gate():
                 self._moves.rest(statement, scope, draft)
             case tree.Choice() | tree.Tissue():
@@ -250,6 +252,13 @@ class ContentResolver:
         for limit in statement.at_least[:1]:
             distance = self._evaluator.number(limit, scope, LENGTH, "the distance between rolls")
             draft.roll_distance = Placed(distance, limit.span)
+
+    def _spin(self, statement: tree.Spin, scope: Scope, draft: Draft) -> None:
+        """The fractions of the insertion in which the needle may spin."""
+        draft.spins = [
+            Placed(self._evaluator.number(one, scope, NUMBER, "a spun fraction"), one.span)
+            for one in statement.fractions
+        ]
 
     def _choice(self, statement: tree.Choice, draft: Draft) -> None:
         """A property that is one of a few words."""

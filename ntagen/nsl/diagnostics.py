@@ -201,6 +201,15 @@ KINDS: Final = _kinds(
     ("N124", "gate-never-open", "error", "The gate must be open long enough for a push."),
     ("N125", "nothing-moves", "error", "Waits and gates are about regions that move."),
     ("N126", "wait-wrong", "error", "A wait takes some time, and waits can be counted."),
+    # Spins.
+    ("N130", "spin-out-of-range", "error", "A needle spins in a part of the way, and not in all."),
+    ("N131", "spin-repeated", "error", "Each spun fraction is written once."),
+    (
+        "N132",
+        "spin-misused",
+        "error",
+        "Plans that spin the needle are made for static tissue in which nothing moves.",
+    ),
 )
 """All kinds of mistakes by name, in the order of their codes."""
 

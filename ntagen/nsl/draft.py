@@ -130,6 +130,7 @@ class Draft:
     angles: list[Placed[float]] = field(default_factory=list)
     max_rolls: Placed[int] | None = None
     roll_distance: Placed[float] | None = None
+    spins: list[Placed[float]] = field(default_factory=list)
     tissue: dict[str, Placed[float]] = field(default_factory=dict)
     choices: dict[str, str] = field(default_factory=dict)
     is_bevel_free: bool = False

@@ -38,6 +38,7 @@ _ONCE: Final = frozenset(
         "needle",
         "motion",
         "roll",
+        "spin",
         "wait",
         "push",
         "resolution",

@@ -123,6 +123,11 @@ class _StatementReader(ExpressionReader):
             self._need("TIMES" if is_most else "APART")
         return tree.Roll(self._span(0), angles, tuple(at_most), tuple(at_least))
 
+    def spin(self, _word: Token) -> tree.Spin:
+        """``"spin" values``."""
+        fractions = self._values()
+        return tree.Spin(self._span(0), fractions)
+
     def wait(self, _word: Token) -> tree.Wait:
         """``"wait" expression ["at" "most" expression "times"]``."""
         length = self._expression()
@@ -377,6 +382,7 @@ _STATEMENTS: Final[dict[str, Callable[[_StatementReader, Token], tree.Statement]
     "REGION_KIND": _StatementReader.region,
     **dict.fromkeys(_SETTINGS, _StatementReader.setting),
     "ROLL": _StatementReader.roll,
+    "SPIN": _StatementReader.spin,
     "WAIT": _StatementReader.wait,
     "PUSH": _StatementReader.gate,
     "TISSUE": _StatementReader.tissue,

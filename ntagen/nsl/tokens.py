@@ -19,7 +19,7 @@ BlockKind = Literal["file", "environment", "needle", "motion", "for", "drive", "
 
 REGIONS: Final = frozenset({"target", "critical", "detection", "unexplored", "safe"})
 _NEEDLE_ITEMS: Final = frozenset({"tip", "heading", "bevel", "radius", "speed", "length"})
-_LATER_MOTION: Final = frozenset({"wait", "push"})
+_LATER_MOTION: Final = frozenset({"wait", "push", "spin"})
 _MOTION_ITEMS: Final = frozenset({"step", "roll"}) | _LATER_MOTION
 _BODY_ITEMS: Final = REGIONS | {
     "tissue",
@@ -211,8 +211,8 @@ def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
     """The items, with the words of later statements as names wherever they are none of these.
 
     The words of later shapes are words only in a region, from the shape's word on, which is the
-    first thing behind the region's name; those of a motion from `moves` on; and those of waits and
-    gates only in the braces of `motion`. All of them not in parentheses, and not where a value must
+    first thing behind the region's name; those of a motion from `moves` on; and those of waits,
+    gates and spins only in the braces of `motion`. All of them not in parentheses, and not where a value must
     begin.
     """
     named: list[Token | Comment] = []
@@ -277,7 +277,7 @@ class _Words:
 _LATER_WORDS: Final = _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
 _BEFORE_VALUE: Final = frozenset(
     word.upper() for word in (_SOLID_WORDS | _MOVES_WORDS) - {"moves"}
-) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "BETWEEN", "AND"}
+) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "SPIN", "BETWEEN", "AND"}
 
 
 def _bounded(items: Sequence[Token | Comment]) -> list[Token | Comment]:

@@ -247,6 +247,15 @@ class Roll:
 
 
 @dataclass(frozen=True, slots=True)
+class Spin:
+    """``spin 20 %, 40 %``."""
+
+    span: Span
+    fractions: tuple[Expression, ...]
+    keyword: Literal["spin"] = "spin"
+
+
+@dataclass(frozen=True, slots=True)
 class Wait:
     """``wait 0.5 s at most 2 times``."""
 
@@ -419,6 +428,7 @@ Statement = (
     | Query
     | Setting
     | Roll
+    | Spin
     | Wait
     | Gate
     | Choice

@@ -63,6 +63,7 @@ FORMS: Final = {
     "push": "write for example `push only while phase between 200 deg and 340 deg`",
     "moves": "write for example `moves 12 mm along +z every 4 s phase 90 deg`",
     "roll": "write for example `roll by 90, 180 deg at most 2 times at least 2 mm apart`",
+    "spin": "write for example `spin 20 %, 40 %, 60 %`",
     "tissue": "write `tissue static`, `tissue adversarial curvature 10 % roll 5 deg` or "
     "`tissue stochastic`",
     "resolution": "write for example `resolution 1000 per mm`",

@@ -172,6 +172,8 @@ def _motion(scene: Scene, mistakes: list[str]) -> Iterator[_Line]:
         ),
         "limits",
     )
+    if limits.spins:
+        yield f"spin {', '.join(map(number, limits.spins))}", "limits.spins"
     if breath is not None:
         yield (
             (f"wait {number(breath.wait_s)} s at most {number(breath.max_pauses)} times"),

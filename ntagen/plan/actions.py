@@ -1,13 +1,14 @@
 """A plan: the sequence of pushes and rolls that steers the needle, and of waits between them.
 
-A plan is a value. Pushes that follow each other are one push, and no push is empty, so that two
-plans that move the needle in the same way are equal. So are waits.
+A plan is a value. Pushes that follow each other with the same spin are one push, and no push is
+empty, so that two plans that move the needle in the same way are equal. So are waits.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 
 from ntagen.needle.kinematics import Arc, push, roll
 from ntagen.scene import Limits, Needle, Pose
@@ -17,9 +18,20 @@ from ntagen.values import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """Insertion by a length along the motion circle."""
+    """Insertion by a length along the motion circle.
+
+    Attributes:
+        length_mm: The length.
+        spin: In this part of the length the needle spins about its shaft, in short cycles. The
+            curvature is less by this part.
+    """
 
     length_mm: float
+    spin: float = 0.0
+
+    def radius_mm(self, nominal_mm: float) -> float:
+        """The radius of the motion circle of a needle that has this one without a spin."""
+        return nominal_mm / (1.0 - self.spin)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +79,8 @@ class Plan:
         for action in actions:
             _require_possible(action)
             last = merged[-1] if merged else None
-            if isinstance(action, Push) and isinstance(last, Push):
-                merged[-1] = Push(last.length_mm + action.length_mm)
+            if isinstance(action, Push) and isinstance(last, Push) and action.spin == last.spin:
+                merged[-1] = Push(last.length_mm + action.length_mm, last.spin)
             elif isinstance(action, Wait) and isinstance(last, Wait):
                 merged[-1] = Wait(last.seconds + action.seconds)
             elif isinstance(action, Roll) or _amount(action) > 0.0:
@@ -86,14 +98,26 @@ class Plan:
         return sum(1 for action in self.actions if isinstance(action, Roll))
 
     @property
+    def spin_changes(self) -> int:
+        """How often the spin changes without a roll."""
+        return sum(
+            1
+            for before, after in pairwise(self.actions)
+            if isinstance(before, Push) and isinstance(after, Push)
+        )
+
+    @property
     def waits_s(self) -> float:
         """How long the needle rests, in all its waits."""
         return sum(action.seconds for action in self.actions if isinstance(action, Wait))
 
     def counted_rolls(self, limits: Limits) -> int:
-        """The number of rolls; one that chooses a free bevel before the entry does not count."""
+        """The number of rolls, and of changes of the spin without one.
+
+        One roll that chooses a free bevel before the entry does not count.
+        """
         is_free = limits.free_bevel and self.actions[:1] and isinstance(self.actions[0], Roll)
-        return self.roll_count - 1 if is_free else self.roll_count
+        return self.roll_count + self.spin_changes - (1 if is_free else 0)
 
     def arcs(self, needle: Needle) -> tuple[Arc, ...]:
         """The arcs that the tip of this needle draws when it follows the plan exactly."""
@@ -103,7 +127,7 @@ class Plan:
             if isinstance(action, Roll):
                 pose = roll(pose, action.angle_rad)
             elif isinstance(action, Push):
-                arcs.append(Arc(pose, needle.radius_mm, action.length_mm))
+                arcs.append(Arc(pose, action.radius_mm(needle.radius_mm), action.length_mm))
                 pose = arcs[-1].end
         return tuple(arcs)
 
@@ -114,7 +138,7 @@ class Plan:
             if isinstance(action, Roll):
                 pose = roll(pose, action.angle_rad)
             elif isinstance(action, Push):
-                pose = push(pose, needle.radius_mm, action.length_mm)
+                pose = push(pose, action.radius_mm(needle.radius_mm), action.length_mm)
         return pose
 
     def __str__(self) -> str:
@@ -136,12 +160,15 @@ def _require_possible(action: Action) -> None:
     number = _amount(action)
     if not math.isfinite(number) or (not isinstance(action, Roll) and number < 0.0):
         raise ValueError(f"a needle cannot do {action}")
+    if isinstance(action, Push) and not 0.0 <= action.spin < 1.0:
+        raise ValueError(f"a needle cannot spin for {action.spin:g} of the way")
 
 
 def _text(action: Action) -> str:
     match action:
         case Push():
-            return f"push {action.length_mm:g} mm"
+            spinning = f" spinning {100.0 * action.spin:.4g} %" if action.spin else ""
+            return f"push {action.length_mm:g} mm{spinning}"
         case Roll():
             return f"roll {deg_from_rad(action.angle_rad):.4g} deg"
         case Wait():

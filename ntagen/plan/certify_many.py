@@ -89,9 +89,13 @@ class _Batch:
         entered = np.full((1, len(self._scene.targets)), math.nan)
         return _Level(pose, np.zeros(1), near, np.zeros_like(near), entered)
 
-    def _arcs(self) -> Iterator[tuple[NDArray[np.intp], list[tuple[float, ...]], _Array]]:
-        """The arcs of each level: the row of the arc before, the rolls before it, its length."""
-        found: list[dict[tuple[int, tuple[float, ...], float], int]] = []
+    def _arcs(self) -> Iterator[tuple[NDArray[np.intp], list[tuple[float, ...]], _Array, _Array]]:
+        """The arcs of each level: the row of the arc before, the rolls before it, its push.
+
+        A push is the length and the radius.
+        """
+        nominal_mm = self._scene.needle.radius_mm
+        found: list[dict[tuple[int, tuple[float, ...], float, float], int]] = []
         for number, plan in enumerate(self._plans):
             row, depth = 0, 0
             rolls: tuple[float, ...] = ()
@@ -101,25 +105,29 @@ class _Batch:
                 elif isinstance(action, Push):
                     if depth == len(found):
                         found.append({})
-                    key = (row, rolls, action.length_mm)
+                    key = (row, rolls, action.length_mm, action.radius_mm(nominal_mm))
                     row = found[depth].setdefault(key, len(found[depth]))
                     depth, rolls = depth + 1, ()
             self._places[number] = depth, row
         for level in found:
-            rows, rolled, lengths = zip(*level, strict=True)
-            yield np.array(rows), list(rolled), np.array(lengths)
+            rows, rolled, lengths, radii = zip(*level, strict=True)
+            yield np.array(rows), list(rolled), np.array(lengths), np.array(radii)
 
     def _next(
-        self, rows: NDArray[np.intp], rolled: list[tuple[float, ...]], length_mm: _Array
+        self,
+        rows: NDArray[np.intp],
+        rolled: list[tuple[float, ...]],
+        length_mm: _Array,
+        radius_mm: _Array,
     ) -> _Level:
-        before, radius_mm = self._levels[-1], self._scene.needle.radius_mm
+        before = self._levels[-1]
         start = before.end.at(rows)
         for turn in range(max(map(len, rolled))):
             angles = [rolls[turn] if turn < len(rolls) else 0.0 for rolls in rolled]
             start = start.rolled(np.array(angles))
         end = start.pushed(radius_mm, length_mm)
         since_mm = before.length_mm[rows]
-        arc_mm, at_mm = self._nearest(start, end, length_mm, self._middles)
+        arc_mm, at_mm = self._nearest(start, end, length_mm, radius_mm, self._middles)
         near_mm, near_at_mm = before.near_mm[rows], before.near_at_mm[rows]
         is_nearer = arc_mm < near_mm
         return _Level(
@@ -127,22 +135,21 @@ class _Batch:
             since_mm + length_mm,
             np.where(is_nearer, arc_mm, near_mm),
             np.where(is_nearer, since_mm[:, None] + at_mm, near_at_mm),
-            self._entered(before.entered_mm[rows], start, since_mm, length_mm),
+            self._entered(before.entered_mm[rows], start, since_mm, length_mm, radius_mm),
         )
 
     def _nearest(
-        self, start: Poses, end: Poses, length_mm: _Array, middles: _Array
+        self, start: Poses, end: Poses, length_mm: _Array, radius_mm: _Array, middles: _Array
     ) -> tuple[_Array, _Array]:
         """The least distance of each arc to each point, and where; see `Arc.nearest_to`."""
-        radius_mm = self._scene.needle.radius_mm
-        from_center = middles - (start.position - radius_mm * start.bevel)[:, None]
+        from_center = middles - (start.position - radius_mm[:, None] * start.bevel)[:, None]
         sine = np.einsum("npi,ni->np", from_center, start.heading)
         cosine = np.einsum("npi,ni->np", from_center, start.bevel)
         turn = np.arctan2(sine, cosine) % (2.0 * math.pi)
-        foot_mm = turn * radius_mm
+        foot_mm = turn * radius_mm[:, None]
         aside = np.cos(turn)[..., None] * start.bevel[:, None]
         aside += np.sin(turn)[..., None] * start.heading[:, None]
-        foot_away = lengths(from_center - radius_mm * aside)
+        foot_away = lengths(from_center - radius_mm[:, None, None] * aside)
         first, last = start.away(middles), end.away(middles)
         best = np.where(last < first, last, first)
         best_at = np.where(last < first, length_mm[:, None], 0.0)
@@ -150,7 +157,12 @@ class _Batch:
         return np.where(is_foot, foot_away, best), np.where(is_foot, foot_mm, best_at)
 
     def _entered(
-        self, known_mm: _Array, start: Poses, start_mm: _Array, length_mm: _Array
+        self,
+        known_mm: _Array,
+        start: Poses,
+        start_mm: _Array,
+        length_mm: _Array,
+        radius_mm: _Array,
     ) -> _Array:
         """Where each target is entered, after the one before it; see `certify`."""
         entered = known_mm.copy()
@@ -160,24 +172,27 @@ class _Batch:
             is_open = np.isnan(entered[:, number]) & (skipped <= length_mm)
             rows = np.flatnonzero(is_open)
             if len(rows):
-                rest = start.at(rows).pushed(self._scene.needle.radius_mm, skipped[rows])
-                at_mm = self._enters(rest, length_mm[rows] - skipped[rows], number)
+                rest = start.at(rows).pushed(radius_mm[rows], skipped[rows])
+                left_mm = length_mm[rows] - skipped[rows]
+                at_mm = self._enters(rest, left_mm, radius_mm[rows], number)
                 entered[rows, number] = start_mm[rows] + skipped[rows] + at_mm
             since_mm = entered[:, number]
         return entered
 
-    def _enters(self, start: Poses, length_mm: _Array, number: int) -> _Array:
+    def _enters(
+        self, start: Poses, length_mm: _Array, radius_mm: _Array, number: int
+    ) -> _Array:
         """Where arcs first touch a target; not a number if they never do; see `Arc.enters_at`."""
         first = len(self._avoided) + number
         middle, target_mm = self._middles[first : first + 1], self._radii[first]
-        radius_mm = self._scene.needle.radius_mm
         end = start.pushed(radius_mm, length_mm)
-        away_mm, at_mm = (one[:, 0] for one in self._nearest(start, end, length_mm, middle))
+        near = self._nearest(start, end, length_mm, radius_mm, middle)
+        away_mm, at_mm = (one[:, 0] for one in near)
         found = np.where(start.away(middle)[:, 0] <= target_mm, 0.0, math.nan)
         rows = np.flatnonzero(np.isnan(found) & (away_mm <= target_mm))
         if not len(rows):
             return found
-        start, high = start.at(rows), at_mm[rows]
+        start, high, radius_mm = start.at(rows), at_mm[rows], radius_mm[rows]
         low = np.maximum(0.0, high - math.pi * radius_mm)
         for _ in range(_BISECTIONS):
             half = 0.5 * (low + high)

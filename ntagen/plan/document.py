@@ -101,7 +101,10 @@ def _action_text(action: Action) -> str:
 
 
 def plan_to_json(plan: Plan) -> list[dict[str, float]]:
-    """The actions as objects ``{"push_mm": …}``, ``{"roll_deg": …}`` and ``{"wait_s": …}``."""
+    """The actions as objects ``{"push_mm": …}``, ``{"roll_deg": …}`` and ``{"wait_s": …}``.
+
+    A push in which the needle spins has the part as ``spin``, too.
+    """
     return [_action_to_json(action) for action in plan.actions]
 
 
@@ -121,7 +124,8 @@ def plan_from_json(actions: object) -> Plan:
 
 def _action_to_json(action: Action) -> dict[str, float]:
     if isinstance(action, Push):
-        return {"push_mm": action.length_mm}
+        spin = {"spin": action.spin} if action.spin else {}
+        return {"push_mm": action.length_mm, **spin}
     if isinstance(action, Wait):
         return {"wait_s": action.seconds}
     return {"roll_deg": round(deg_from_rad(action.angle_rad), 9)}
@@ -129,7 +133,9 @@ def _action_to_json(action: Action) -> dict[str, float]:
 
 def _action_from_json(action: object) -> Action:
     match action:
-        case {"push_mm": float() | int() as length_mm}:
+        case {"push_mm": float() | int() as length_mm, "spin": float() | int() as spin}:
+            return Push(float(length_mm), float(spin))
+        case {"push_mm": float() | int() as length_mm} if "spin" not in action:
             return Push(float(length_mm))
         case {"roll_deg": float() | int() as angle_deg}:
             return Roll(rad_from_deg(float(angle_deg)))

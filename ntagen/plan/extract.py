@@ -2,9 +2,10 @@
 
 It also asks the model whether it can make a plan that was not found by the engine.
 
-In the model, the User's edge with ``do_push!`` is a push of one model step. Its edge with
-``do_rotate!`` is a roll by the angle whose index the edge selects, and that with ``do_wait!`` is a
-wait, which only models with moving regions have. All other edges (checks, the
+In the model, the User's edge with ``do_push!`` is a push of one model step. Where the needle may
+spin, the edge selects the index of the spin. Its edge with ``do_rotate!`` is a roll by the angle
+whose index the edge selects, or a change of the spin alone with the index behind them. That with
+``do_wait!`` is a wait, which only models with moving regions have. All other edges (checks, the
 tissue's answers) are not actions of the needle.
 """
 
@@ -22,6 +23,7 @@ _PUSH: Final = "do_push!"
 _ROLL: Final = "do_rotate!"
 _WAIT: Final = "do_wait!"
 _ANGLE_INDEX: Final = "angle_index"
+_SPIN_INDEX: Final = "spin_index"
 _CHECKER: Final = "Checker"
 _REACHED: Final = "Final_TR_Reached"
 
@@ -82,8 +84,8 @@ def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
     """The different plans of the runs, in the order of the runs.
 
     Raises:
-        NtagenError: A run selects an angle that the scene does not have, so the model is not that
-            of the scene.
+        NtagenError: A run selects an angle or a spin that the scene does not have, so the model is
+            not that of the scene.
     """
     return tuple(dict.fromkeys(_plan(run, scene) for run in runs))
 
@@ -169,23 +171,29 @@ def leads_to_target(walk: Walk, plan: Plan, scene: Scene) -> bool:
 
 
 def _moves_of(plan: Plan, scene: Scene) -> list[tuple[str, int]]:
-    """The User's edges, last first: what they send, and the index of the angle or -1."""
+    """The User's edges, last first: what they send, and the index of the angle or spin, or -1."""
+    limits = scene.limits
     moves: list[tuple[str, int]] = []
     for action in plan.actions:
         if isinstance(action, Push):
-            moves += [(_PUSH, -1)] * round(action.length_mm / step_length_mm(scene))
+            if moves and moves[-1][0] == _PUSH:
+                moves.append((_ROLL, len(limits.roll_angles_rad)))
+            spin = limits.spun_fractions.index(action.spin) if limits.spins else -1
+            moves += [(_PUSH, spin)] * round(action.length_mm / step_length_mm(scene))
         elif isinstance(action, Wait):
             moves += [(_WAIT, -1)] * round(action.seconds / _wait_s(scene))
         else:
-            moves.append((_ROLL, scene.limits.roll_angles_rad.index(action.angle_rad)))
+            moves.append((_ROLL, limits.roll_angles_rad.index(action.angle_rad)))
     return moves[::-1]
 
 
 def _decision(step: Step) -> tuple[str, int] | None:
-    """What the User's edge of a move sends, with the index of the angle or -1."""
+    """What the User's edge of a move sends, with the index of the angle or spin, or -1."""
     for edge in step.edges:
-        if edge.sync in (_PUSH, _WAIT):
-            return edge.sync, -1
+        if edge.sync == _PUSH:
+            return _PUSH, edge.select.get(_SPIN_INDEX, -1)
+        if edge.sync == _WAIT:
+            return _WAIT, -1
         if edge.sync == _ROLL:
             return _ROLL, edge.select.get(_ANGLE_INDEX, -1)
     return None
@@ -209,13 +217,19 @@ def _plan(run: Run, scene: Scene) -> Plan:
 
 
 def _action(edge: Edge, scene: Scene) -> Action | None:
+    limits = scene.limits
     if edge.sync == _PUSH:
-        return Push(step_length_mm(scene))
+        spin = edge.select.get(_SPIN_INDEX, 0)
+        if not 0 <= spin < len(limits.spun_fractions):
+            raise NtagenError(f"the model has the spin with index {spin}, which the scene lacks")
+        return Push(step_length_mm(scene), limits.spun_fractions[spin])
     if edge.sync == _WAIT:
         return Wait(_wait_s(scene))
     if edge.sync != _ROLL:
         return None
     index = edge.select.get(_ANGLE_INDEX, -1)
-    if not 0 <= index < len(scene.limits.roll_angles_rad):
+    if limits.spins and index == len(limits.roll_angles_rad):
+        return None  # The pushes have the spins.
+    if not 0 <= index < len(limits.roll_angles_rad):
         raise NtagenError(f"the model rolls by the angle with index {index}, which the scene lacks")
-    return Roll(scene.limits.roll_angles_rad[index])
+    return Roll(limits.roll_angles_rad[index])

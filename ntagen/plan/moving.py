@@ -38,7 +38,7 @@ def timeline(
         if isinstance(action, Push):
             seconds = action.length_mm / speed_mm_per_s
             keeps_gate = keeps_gate and breath.is_open(line.end_s, seconds)
-            line.push(pose, action.length_mm)
+            line.push(pose, action.length_mm, action.radius_mm(needle.radius_mm))
             pose = line.end
         elif isinstance(action, Wait):
             line.rest(action.seconds)

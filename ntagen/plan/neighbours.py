@@ -13,7 +13,7 @@ Cost: about 0.3 ms for a neighbour in a scene with ten regions; about 10 ms at m
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
@@ -33,30 +33,39 @@ class _Steps:
 
     Attributes:
         pushes: The steps before the first roll, between two rolls, and after the last roll.
-        angles: The angle of each roll, as an index.
+        angles: The angle of each roll, as an index; -1 where the spin alone changes.
+        spins: The spin of the steps in each place, as an index.
     """
 
     pushes: tuple[int, ...]
     angles: tuple[int, ...]
+    spins: tuple[int, ...]
 
     @staticmethod
     def of(plan: Plan, scene: Scene) -> _Steps:
-        pushes, angles = [0], []
+        pushes, angles, spins = [0], [], [0]
         for action in plan.actions:
             if isinstance(action, Push):
-                pushes[-1] += round(action.length_mm / step_length_mm(scene))
+                if pushes[-1] > 0:
+                    pushes.append(0)
+                    spins.append(0)
+                    angles.append(-1)
+                pushes[-1] = round(action.length_mm / step_length_mm(scene))
+                spins[-1] = scene.limits.spun_fractions.index(action.spin)
             elif isinstance(action, Roll):
                 pushes.append(0)
+                spins.append(0)
                 angles.append(scene.limits.roll_angles_rad.index(action.angle_rad))
-        return _Steps(tuple(pushes), tuple(angles))
+        return _Steps(tuple(pushes), tuple(angles), tuple(spins))
 
     def plan(self, scene: Scene) -> Plan:
-        step_mm = step_length_mm(scene)
-        actions: list[Action] = [Push(step_mm) for _ in range(self.pushes[0])]
-        for angle, pushes in zip(self.angles, self.pushes[1:], strict=True):
-            actions.append(Roll(scene.limits.roll_angles_rad[angle]))
+        limits, step_mm = scene.limits, step_length_mm(scene)
+        actions: list[Action] = []
+        for place, (pushes, spin) in enumerate(zip(self.pushes, self.spins, strict=True)):
+            if place > 0 and self.angles[place - 1] >= 0:
+                actions.append(Roll(limits.roll_angles_rad[self.angles[place - 1]]))
             # One by one, as the engine's plans are made: equal plans have equal sums.
-            actions += [Push(step_mm) for _ in range(pushes)]
+            actions += [Push(step_mm, limits.spun_fractions[spin]) for _ in range(pushes)]
         return Plan.of(actions)
 
     def moved(self, *changes: tuple[int, int]) -> _Steps:
@@ -64,12 +73,15 @@ class _Steps:
         pushes = list(self.pushes)
         for place, more in changes:
             pushes[place] += more
-        return _Steps(tuple(pushes), self.angles)
+        return replace(self, pushes=tuple(pushes))
 
     def turned(self, roll: int, angle: int) -> _Steps:
         """With another angle of a roll."""
-        angles = (*self.angles[:roll], angle, *self.angles[roll + 1 :])
-        return _Steps(self.pushes, angles)
+        return replace(self, angles=(*self.angles[:roll], angle, *self.angles[roll + 1 :]))
+
+    def spun(self, place: int, spin: int) -> _Steps:
+        """With another spin in one place."""
+        return replace(self, spins=(*self.spins[:place], spin, *self.spins[place + 1 :]))
 
     def is_possible(self, scene: Scene) -> bool:
         """Whether the rolls are few and far enough apart, and the last move is a push."""
@@ -84,8 +96,8 @@ class _Steps:
 def neighbours(plan: Plan, scene: Scene) -> Iterator[Plan]:
     """The plans with one small change.
 
-    A roll comes one step earlier or later, or by the next smaller or larger angle; or the plan is
-    one step shorter or longer. Where regions move there are none: they would meet other places.
+    A roll comes one step earlier or later, or by the next smaller or larger angle; or the needle
+    spins more or less between two rolls; or the plan is one step shorter or longer. Where regions move there are none: they would meet other places.
     """
     if scene.breath is not None:
         return
@@ -94,8 +106,15 @@ def neighbours(plan: Plan, scene: Scene) -> Iterator[Plan]:
     changed: list[_Steps] = []
     for roll, (before, after) in enumerate(pairwise(range(len(steps.pushes)))):
         changed += [steps.moved((before, more), (after, -more)) for more in (-1, 1)]
-        others = {(steps.angles[roll] + by) % count for by in (-1, 1)} - {steps.angles[roll]}
-        changed += [steps.turned(roll, angle) for angle in sorted(others)]
+        if steps.angles[roll] >= 0:
+            others = {(steps.angles[roll] + by) % count for by in (-1, 1)} - {steps.angles[roll]}
+            changed += [steps.turned(roll, angle) for angle in sorted(others)]
+    fractions = scene.limits.spun_fractions
+    by_size = sorted(range(len(fractions)), key=fractions.__getitem__)
+    for less, more in pairwise(by_size):
+        for place, spin in enumerate(steps.spins):
+            if spin in (less, more) and steps.pushes[place] > 0:
+                changed.append(steps.spun(place, less + more - spin))
     changed += [steps.moved((-1, more)) for more in (-1, 1)]
     yield from (one.plan(scene) for one in changed if one.is_possible(scene))
 

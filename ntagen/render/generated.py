@@ -89,7 +89,10 @@ def declaration(model: Any, source: Any) -> str:
         'const int ANGLE_COUNT = ')
     put(shown(len(model.angles)))
     put(';\n'
-        'const int allowed_rot_angles[ANGLE_COUNT] = {         // The rolls to choose from, in degrees.\n'
+        'const int allowed_rot_angles[ANGLE_COUNT] = {         // The rolls to choose from, in degrees.')
+    if model.spins:
+        put(' A roll by 0 changes the spin alone.')
+    put('\n'
         '    ')
     put(shown(', '.join(map(shown, model.angles))))
     put('\n'
@@ -198,6 +201,10 @@ def declaration(model: Any, source: Any) -> str:
             'fixed_t motion_circle_r = ')
         put(shown(model.circle_radius))
         put(';   // The tissue decides it for each segment; see below.')
+    elif model.spins:
+        put('\n')
+        put(shown(('%-53s' % (''.join(map(shown, ('fixed_t motion_circle_r = ', model.circle_radius, ';',))),))))
+        put(' // It depends on the spin; see below.')
     else:
         put('\n'
             'const fixed_t motion_circle_r = ')
@@ -521,6 +528,51 @@ def declaration(model: Any, source: Any) -> str:
             '    update_base_rotation_matrix();\n'
             '}\n'
             '\n')
+    if model.spins:
+        put('/***************************************************** Spinning *****************************************************/\n'
+            '// A needle that spins about its shaft while it is inserted goes straight. If it does so in a part of each cycle of about a\n'
+            '// millimetre, its curvature is less by that part. A segment is what the tip travels from the start or a roll to the next\n'
+            '// roll. The first push of a segment chooses the spin, and the others keep it. The first choice is that of no spin.\n'
+            'const int SPIN_COUNT = ')
+        put(shown(len(model.spins)))
+        put(';\n'
+            'const fixed_t spin_radii[SPIN_COUNT] = {')
+        put(shown(', '.join(map(shown, model.spins))))
+        put('};\n'
+            'int sel_spin = 0;                                     // The spin chosen last.\n'
+            'bool is_spin_open = true;                             // Whether the next push chooses it.\n'
+            '\n'
+            '// Whether the last roll, by 0, said that the spin changes.\n'
+            'bool check_spin_changes() {\n'
+            '    return is_spin_open && prev_ROT_index >= 0 && sel_rot_angle == 0;\n'
+            '}\n'
+            '\n'
+            '// Whether the next push may have a spin.\n'
+            'bool check_spin_allowed(int spin_index) {\n'
+            '    return is_spin_open ? (spin_index != sel_spin || !check_spin_changes()) : spin_index == sel_spin;\n'
+            '}\n'
+            '\n'
+            '// A roll begins a segment.\n'
+            'void begin_segment() {\n'
+            '    is_spin_open = true;\n'
+            '}\n'
+            '\n'
+            '// The spin of the next push. Another one has another circle, which touches the tip in the same direction.\n'
+            'void choose_spin(int spin_index) {\n'
+            '    int i;\n'
+            '    double _S_ = _SI_*1.0;\n'
+            '\n'
+            '    is_spin_open = false;\n'
+            '    if (spin_index == sel_spin) {\n'
+            '        return;\n'
+            '    }\n'
+            '    sel_spin = spin_index;\n'
+            '    motion_circle_r = spin_radii[spin_index];\n'
+            '    for (i=0; i<3; i++) {\n'
+            '        motion_circle_center[i] = fint((tip_pos[i]/_S_ - ((motion_circle_r/_S_) * (vectors[TIP_Z_VEC][i]/_S_))) * _S_);\n'
+            '    }\n'
+            '}\n'
+            '\n')
     put("// The tip's axes and the first circle follow from the pose at the start.\n"
         'void initialize() {\n'
         '    update_circle_center();\n'
@@ -586,6 +638,13 @@ def declaration(model: Any, source: Any) -> str:
         put('is_picked && ')
     put('needle_progress - actions[prev_ROT_index][ACT_PROG] >= MIN_PROG_BETWEEN_ROTS;\n'
         '}')
+    if model.spins:
+        put('\n'
+            '\n'
+            '// Whether it may be rolled by an angle: by 0 only where a push has chosen a spin, which changes then, and by no other before.\n'
+            'bool check_angle_allowed(int angle) {\n'
+            '    return angle == 0 ? !is_spin_open : !check_spin_changes();\n'
+            '}')
     if model.swept:
         put('\n')
         put('/** The arc of the last push **/\n'
@@ -1371,9 +1430,16 @@ def declaration(model: Any, source: Any) -> str:
         '}\n'
         '\n'
         '/** What guides the search: it is no part of the question, and a wrong answer only costs time **/\n'
-        '// How near the tip comes to the target if it goes on along its circle, or after one more roll if there may be one.\n'
+        '// How near the tip comes to the target if it goes on along its circle, or after one more roll if there may be one.')
+    if model.spins:
+        put('\n'
+            '// It may have any spin after the roll.')
+    put('\n'
         'fixed_t get_miss() {\n'
-        '    int i, angle_count;\n'
+        '    int i, angle_count')
+    if model.spins:
+        put(', spin')
+    put(';\n'
         '    double place[3];\n'
         '    double _S_ = _SI_*1.0;\n'
         '    double r = motion_circle_r/_S_;\n'
@@ -1385,12 +1451,27 @@ def declaration(model: Any, source: Any) -> str:
         '        angle = i < 0 ? 0.0 : allowed_rot_angles[i]/180.0 * PI;\n'
         '        // The target in the plane of the circle, and its distance from that plane.\n'
         '        in_plane = place[2] * cos(angle) - place[1] * sin(angle);\n'
-        '        off_plane = place[2] * sin(angle) + place[1] * cos(angle);\n'
-        '        off_circle = sqrt(place[0]*place[0] + (r + in_plane)*(r + in_plane)) - r;\n'
-        '        miss = sqrt(off_circle*off_circle + off_plane*off_plane);\n'
-        '        if (i < 0 || miss < least) {\n'
-        '            least = miss;\n'
-        '        }\n'
+        '        off_plane = place[2] * sin(angle) + place[1] * cos(angle);')
+    if model.spins:
+        put('\n'
+            '        for (spin=0; spin<SPIN_COUNT; spin++) {\n'
+            '            if (i >= 0 || is_spin_open || spin == sel_spin) {\n'
+            '                r = spin_radii[spin]/_S_;\n'
+            '                off_circle = sqrt(place[0]*place[0] + (r + in_plane)*(r + in_plane)) - r;\n'
+            '                miss = sqrt(off_circle*off_circle + off_plane*off_plane);\n'
+            '                if ((i < 0 && (spin == 0 || !is_spin_open)) || miss < least) {\n'
+            '                    least = miss;\n'
+            '                }\n'
+            '            }\n'
+            '        }')
+    else:
+        put('\n'
+            '        off_circle = sqrt(place[0]*place[0] + (r + in_plane)*(r + in_plane)) - r;\n'
+            '        miss = sqrt(off_circle*off_circle + off_plane*off_plane);\n'
+            '        if (i < 0 || miss < least) {\n'
+            '            least = miss;\n'
+            '        }')
+    put('\n'
         '    }\n'
         '    return fint(least*_S_);\n'
         '}\n'
@@ -1582,6 +1663,26 @@ def declaration(model: Any, source: Any) -> str:
         put(' > 0;\n'
             '}\n'
             '\n')
+        if model.spins:
+            put('// Whether the circle passes by a target region whatever spin the next push has. Its roundings are less than three times those on\n'
+                '// a circle.\n'
+                'bool all_spins_miss(int TR_index) {\n'
+                '    int spin;\n'
+                '    double place[3];\n'
+                '    double r, off_circle;\n'
+                '    double _S_ = _SI_*1.0;\n'
+                '\n'
+                '    look_at(TR_index, place);\n'
+                '    for (spin=0; spin<SPIN_COUNT; spin++) {\n'
+                '        r = spin_radii[spin]/_S_;\n'
+                '        off_circle = sqrt(place[0]*place[0] + (r + place[2])*(r + place[2])) - r;\n'
+                '        if (sqrt(off_circle*off_circle + place[1]*place[1])*_S_ <= TR_radius[TR_index] + 4*CIRCLE_MARGIN) {\n'
+                '            return false;\n'
+                '        }\n'
+                '    }\n'
+                '    return true;\n'
+                '}\n'
+                '\n')
         if model.adversary:
             put('// Whether the tissue may pick a circle that passes by a target region which lies there, in a segment that begins with a roll\n'
                 '// by this angle in rad. The roundings of the roll and of the pick are less than three times those on a circle.\n'
@@ -1675,7 +1776,12 @@ def declaration(model: Any, source: Any) -> str:
     put(');')
     if model.only_plans:
         put('\n'
-            '    if (!check_rotation_left() && TR_reachable && circle_misses(TR_index)) {\n'
+            '    if (!check_rotation_left() && TR_reachable && ')
+        if model.spins:
+            put('(is_spin_open ? all_spins_miss(TR_index) : circle_misses(TR_index))')
+        else:
+            put('circle_misses(TR_index)')
+        put(') {\n'
             '        TR_reachable = false;\n'
             '    }')
         if model.adversary:
@@ -2009,8 +2115,8 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
     put(escaped(transition('user_init', 'user_wait_for_check', [('synchronisation', 76, (-38), 'do_check!', ), ('assignment', 76, (-21), 'initialize()', ), ])))
     put(escaped(transition('user_wait_for_check', 'user_end', [('synchronisation', 284, 60, 'terminate?', ), ])))
     put(escaped(transition('user_wait_for_check', 'user_idle', [('synchronisation', 344, (-21), 'finished_check?', ), ])))
-    put(escaped(transition('user_idle', 'user_perform_action', (([('guard', 400, 77, 'check_push_allowed()', ), ] if model.moving else []) + [('synchronisation', 400, 94, 'do_push!', ), ]), nails=[(476, 68, ), (476, 136, ), ])))
-    put(escaped(transition('user_idle', 'user_perform_action', [('select', 624, 68, 'angle_index : int[0, ANGLE_COUNT - 1]', ), ('guard', 624, 85, 'check_rotation_allowed()', ), ('synchronisation', 624, 102, 'do_rotate!', ), ('assignment', 624, 119, 'sel_rot_angle = allowed_rot_angles[angle_index]', ), ], nails=[(612, 68, ), (612, 136, ), ])))
+    put(escaped(transition('user_idle', 'user_perform_action', (((([('select', 260, 60, 'spin_index : int[0, SPIN_COUNT - 1]', ), ('guard', 260, 77, 'check_spin_allowed(spin_index)', ), ] if model.spins else []) + ([('guard', 400, 77, 'check_push_allowed()', ), ] if model.moving else [])) + [('synchronisation', 400, 94, 'do_push!', ), ]) + ([('assignment', 260, 111, 'choose_spin(spin_index)', ), ] if model.spins else [])), nails=[(476, 68, ), (476, 136, ), ])))
+    put(escaped(transition('user_idle', 'user_perform_action', [('select', 624, 68, 'angle_index : int[0, ANGLE_COUNT - 1]', ), ('guard', 624, 85, ''.join(map(shown, ('check_rotation_allowed()', (' && check_angle_allowed(allowed_rot_angles[angle_index])' if model.spins else ''),))), ), ('synchronisation', 624, 102, 'do_rotate!', ), ('assignment', 624, 119, 'sel_rot_angle = allowed_rot_angles[angle_index]', ), ], nails=[(612, 68, ), (612, 136, ), ])))
     if model.moving:
         put(escaped(transition('user_idle', 'user_perform_action', [('guard', 552, 150, 'check_wait_allowed()', ), ('synchronisation', 552, 167, 'do_wait!', ), ('assignment', 552, 184, 'begin_wait()', ), ])))
     put(escaped(transition('user_perform_action', 'user_request_check', [('synchronisation', 556, 265, 'finished_tissue_action?', ), ])))
@@ -2040,7 +2146,7 @@ def document(model: Any, declaration: Any, queries: Any) -> str:
         put(escaped(transition('needle_idle', 'needle_wait', [('guard', (-160), 150, 'WAIT_TIME >= 0', ), ('synchronisation', (-160), 167, 'do_wait?', ), ('assignment', (-160), 184, 'ti = 0', ), ], nails=[((-34), 85, ), ((-34), 255, ), ])))
         put(escaped(transition('needle_wait', 'needle_idle', [('guard', 46, 150, 'ti >= WAIT_TIME', ), ('synchronisation', 46, 167, 'do_tissue_action!', ), ('assignment', 46, 184, 'end_wait()', ), ], nails=[(34, 255, ), (34, 85, ), ])))
     put(escaped(transition('needle_idle', 'needle_rotate', [('synchronisation', 95, (-125), 'do_rotate?', ), ('assignment', 95, (-108), 'log_push_action(),\nlog_rotation_action()', ), ], nails=[(85, (-68), ), (255, (-68), ), ])))
-    put(escaped(transition('needle_rotate', 'needle_idle', [('synchronisation', 95, 75, 'do_tissue_action!', ), ('assignment', 95, 92, ''.join(map(shown, (('begin_segment(),\n' if model.adversary else ''), 'rotate_deg(sel_rot_angle)', (',\nend_roll()' if model.moving else ''),))), ), ], nails=[(255, 68, ), (85, 68, ), ])))
+    put(escaped(transition('needle_rotate', 'needle_idle', [('synchronisation', 95, 75, 'do_tissue_action!', ), ('assignment', 95, 92, ''.join(map(shown, (('begin_segment(),\n' if (model.adversary or model.spins) else ''), 'rotate_deg(sel_rot_angle)', (',\nend_roll()' if model.moving else ''),))), ), ], nails=[(255, 68, ), (85, 68, ), ])))
     put('\n'
         '</template>\n')
     put('\n')

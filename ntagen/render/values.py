@@ -72,7 +72,10 @@ class Adversary:
 
 @dataclass(frozen=True, slots=True)
 class ModelValues:
-    """All values for the templates; lengths are texts in units of ``1 / scale`` mm."""
+    """All values for the templates; lengths are texts in units of ``1 / scale`` mm.
+
+    `spins` are the radii of the motion circle without a spin, and with each one.
+    """
 
     name: str
     frame_note: str
@@ -100,6 +103,7 @@ class ModelValues:
     solids: Solids
     moving: Moving | None
     adversary: Adversary | None
+    spins: tuple[str, ...] = ()
     chance: Chance | None = None
 
 
@@ -184,7 +188,10 @@ def model_values(
         max_rolls=limits.max_rolls,
         max_actions=max(MIN_ACTIONS, 2 * (limits.max_rolls + limits.free_bevel) + 2),
         free_bevel=limits.free_bevel,
-        angles=tuple(_whole_degrees(angle) for angle in limits.roll_angles_rad),
+        # A roll by 0 changes the spin alone.
+        angles=tuple(
+            _whole_degrees(angle) for angle in limits.roll_angles_rad + (0.0,) * bool(limits.spins)
+        ),
         tip_position=writer.vector(tip.position_mm, "the tip's position"),
         base_matrix=writer.matrix(
             (tip.heading, cross(tip.bevel, tip.heading), tip.bevel), "the tip's direction"
@@ -201,6 +208,10 @@ def model_values(
         solids=tables,
         moving=breathing,
         adversary=_adversary(scene, writer),
+        spins=tuple(
+            writer.number(radius_mm, "the radius of the motion circle of a needle that spins")
+            for radius_mm in (scene.radii_mm if limits.spins else ())
+        ),
         chance=chance(scene, tables, frame, plan),
     )
 

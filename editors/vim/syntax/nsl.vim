@@ -6,7 +6,7 @@ endif
 
 " The words that begin statements, and the other words of the grammar.
 syntax keyword nslStatement bevel critical detection device environment for heading include length let
-syntax keyword nslStatement motion needle push radius resolution roll safe safety speed step target tip tissue
+syntax keyword nslStatement motion needle push radius resolution roll safe safety speed spin step target tip tissue
 syntax keyword nslStatement tracker transform unexplored wait
 syntax keyword nslWord about after along and apart around as at between box by capsule cylinder ellipsoid
 syntax keyword nslWord every grid halfspace in label least margin markups mesh most moves only per phase point
