@@ -420,7 +420,7 @@ class Controller:
         for piece_mm in pieces(length_mm, self._settings.spacing_mm):
             self._planner.require_time()
             start = self._needle.path
-            self._push(piece_mm, start.push(self._needle.known.radius_mm, piece_mm).tip)
+            self._push(Push(piece_mm), start.push(self._needle.known.radius_mm, piece_mm).tip)
             if self._learner.feels(self._needle.measure()):
                 return Event.FORCE
             if self._is_short:
@@ -475,18 +475,21 @@ class Controller:
             self._is_short = False
             self._needle.wait(max(0.0, action.seconds - self._pace.late_s))
         else:
-            self._push(action.length_mm, self._predicted)
+            self._push(action, self._predicted)
 
-    def _push(self, length_mm: float, predicted: Pose) -> None:
+    def _push(self, action: Push, predicted: Pose) -> None:
         """Pushes under guard; counts how often in a row a push was ended early."""
         settings, depth_mm = self._settings, self._needle.depth_mm
         end_mm = predicted.position_mm
-        expected_n = self._learner.expected_force_n(depth_mm + length_mm, end_mm)
+        expected_n = self._learner.expected_force_n(depth_mm + action.length_mm, end_mm)
         clock_s = self._learner.clock_s(self._needle.seen_s)
         regions = tuple(one.at(clock_s) for one in self._learner.a_priori.criticals)
         way = (self._needle.path.tip.position_mm, end_mm)
         with self._supervisor.guarding(Guard.of(settings, way, regions, expected_n)):
-            self._is_short = not self._needle.push(length_mm)
+            self._is_short = not self._needle.push(action)
+        if self._is_short and action.spin:
+            # Out of the guard, which would end this motion, too.
+            self._needle.settle()
         self._short_in_row = self._short_in_row + 1 if self._is_short else 0
 
     def _now_s(self) -> float:

@@ -109,6 +109,80 @@ class Waiting(Protocol):
         """
 
 
+@runtime_checkable
+class Screwing(Protocol):
+    """What can insert a needle and turn it at once; it may have `can_screw` to say it cannot."""
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Inserts the needle by a length, and turns it by an angle meanwhile, at a constant ratio.
+
+        Raises:
+            DeviceError: The motion is impossible or failed.
+            Halted: Who watched it ended it early; its part is that of the angle.
+        """
+
+
+@runtime_checkable
+class Spinning(Protocol):
+    """What inserts a needle that spins in a part of the way; see `ntagen.drive.spinning`."""
+
+    def spin(self, length_mm: float, fraction: float) -> None:
+        """Inserts the needle by a length, and spins it in a fraction of that.
+
+        Raises:
+            DeviceError: The motion is impossible or failed.
+            Halted: Who watched it ended it early.
+        """
+
+    def settle(self) -> None:
+        """Ends the turn in which it was ended early, if it was: the needle has its angle again.
+
+        Raises:
+            DeviceError: The motion failed.
+        """
+
+
+def can_screw(actuator: Actuator) -> bool:
+    """Whether an actuator can insert a needle and turn it at once."""
+    return isinstance(actuator, Screwing) and getattr(actuator, "can_screw", True)
+
+
+def screw_on(actuator: Actuator, length_mm: float, angle_rad: float) -> None:
+    """Inserts a needle and turns it at once.
+
+    Raises:
+        DeviceError: The actuator cannot do that, or the motion failed.
+        Halted: Who watched it ended it early; its part is that of the angle.
+    """
+    if not isinstance(actuator, Screwing):
+        raise DeviceError(CANNOT_SPIN)
+    actuator.screw(length_mm, angle_rad)
+
+
+def spin_on(device: Actuator, length_mm: float, fraction: float) -> None:
+    """Inserts a needle that spins in a fraction of the way.
+
+    Raises:
+        DeviceError: The device cannot do that, or the motion failed.
+        Halted: Who watched it ended it early.
+    """
+    if not isinstance(device, Spinning):
+        raise DeviceError(CANNOT_SPIN)
+    device.spin(length_mm, fraction)
+
+
+def settle(device: Actuator) -> None:
+    """Ends the turn in which a device was ended early, if it was."""
+    if isinstance(device, Spinning):
+        device.settle()
+
+
+CANNOT_SPIN: Final = (
+    "this device cannot insert and turn the needle at once\n"
+    "hint: leave `spin` out of the task, or choose a device that can"
+)
+
+
 def rest(actuator: Actuator, seconds: float) -> None:
     """Lets an actuator rest for a time on its clock.
 
@@ -151,6 +225,14 @@ class Assembly:
     def roll(self, angle_rad: float) -> None:
         """See `Actuator.roll`."""
         self.actuator.roll(angle_rad)
+
+    def spin(self, length_mm: float, fraction: float) -> None:
+        """See `Spinning.spin`."""
+        spin_on(self.actuator, length_mm, fraction)
+
+    def settle(self) -> None:
+        """See `Spinning.settle`."""
+        settle(self.actuator)
 
     def pull(self, length_mm: float) -> None:
         """See `Actuator.pull`."""

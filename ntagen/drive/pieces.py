@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Final
 
+from ntagen.drive.spinning import CYCLE_MM
 from ntagen.needle.kinematics import push, roll
 from ntagen.plan.actions import Action, Push, Roll
 from ntagen.scene import Pose, Scene
@@ -22,7 +23,7 @@ class Moves:
     Args:
         scene: The scene whose needle makes the plan.
         actions: The plan.
-        spacing_mm: No push is longer.
+        spacing_mm: No push is longer, but for a cycle of spinning.
     """
 
     def __init__(
@@ -62,25 +63,29 @@ class Moves:
 
 def _poses(scene: Scene, moves: tuple[Action, ...]) -> Iterator[Pose]:
     """The pose after each move."""
-    # The circle of the pushes since the last roll, and how far on it the tip is.
+    # The circle of the pushes since the last roll or change of the spin, and how far on it the tip
+    # is.
     start, radius_mm, done_mm, rolled_rad = scene.needle.tip, scene.needle.radius_mm, 0.0, 0.0
-    end = tip = start
+    end, tip, spin = start, start, 0.0
     for move in moves:
         if isinstance(move, Roll):
             rolled_rad += move.angle_rad
             tip = roll(end, rolled_rad)
         elif isinstance(move, Push):
-            if rolled_rad != 0.0:
-                start, done_mm, rolled_rad = tip, 0.0, 0.0
+            if rolled_rad != 0.0 or move.spin != spin:
+                start, done_mm, rolled_rad, spin = tip, 0.0, 0.0, move.spin
             done_mm += move.length_mm
-            end = tip = push(start, radius_mm, done_mm)
+            end = tip = push(start, move.radius_mm(radius_mm), done_mm)
         yield tip
 
 
 def _in_pieces(actions: Iterable[Action], spacing_mm: float) -> Iterator[Action]:
     for action in actions:
         if isinstance(action, Push):
-            yield from map(Push, pieces(action.length_mm, spacing_mm))
+            # A cycle of spinning is not divided: each one is a whole turn of the needle.
+            longest_mm = max(spacing_mm, CYCLE_MM) if action.spin else spacing_mm
+            for piece_mm in pieces(action.length_mm, longest_mm):
+                yield Push(piece_mm, action.spin)
         else:
             yield action
 

@@ -12,13 +12,14 @@ from ntagen.drive.learning import Learner
 from ntagen.drive.prospect import by_prospect, prefers
 from ntagen.drive.records import Journal, Synthesised, Timed
 from ntagen.drive.settings import Settings
+from ntagen.drive.spinning import push_seconds
 from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
 from ntagen.drive.timing import timed
 from ntagen.drive.tube import Tube
 from ntagen.errors import LimitError
 from ntagen.needle.estimate import Estimate
-from ntagen.plan.actions import Plan, Roll
+from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
@@ -228,5 +229,11 @@ class Planner:
         if scene.breath is not None:
             periods_s = scene.breath.period_s * plan.roll_count
             return plan.length_mm / speed_mm_per_s + periods_s + plan.waits_s
+        roll_rad_per_s = self._settings.roll_rad_per_s
         rolls_rad = sum(abs(one.turn_rad) for one in plan.actions if isinstance(one, Roll))
-        return plan.length_mm / speed_mm_per_s + rolls_rad / self._settings.roll_rad_per_s
+        pushes_s = sum(
+            push_seconds(one.length_mm, one.spin, speed_mm_per_s, roll_rad_per_s)
+            for one in plan.actions
+            if isinstance(one, Push)
+        )
+        return pushes_s + rolls_rad / roll_rad_per_s

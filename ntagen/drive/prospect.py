@@ -68,10 +68,13 @@ def by_prospect(
 
 def _firsts(scene: Scene, length_mm: float) -> Iterator[Plan]:
     """What a plan may do until the driver looks at it again."""
-    yield Plan.of([Push(length_mm)])
+    for spin in scene.limits.spun_fractions:
+        yield Plan.of([Push(length_mm, spin)])
     for before_mm in (0.0, 0.5 * length_mm):
         for angle_rad in scene.limits.roll_angles_rad:
-            yield Plan.of([Push(before_mm), Roll(angle_rad), Push(length_mm - before_mm)])
+            for spin in scene.limits.spun_fractions:
+                then = (Roll(angle_rad), Push(length_mm - before_mm, spin))
+                yield Plan.of([Push(before_mm), *then])
 
 
 class _Judge:
@@ -115,6 +118,6 @@ class _Judge:
                 self._left_mm,
                 self._covariance_mm2,
                 since_roll_mm=since_mm,
-                way_rolls=self._scene.limits.max_rolls - first.roll_count,
+                way_rolls=self._scene.limits.max_rolls - first.roll_count - first.spin_changes,
             )
         return self._known[first]

@@ -16,6 +16,7 @@ from ntagen.drive.knowledge import told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Journal, Journals
 from ntagen.drive.settings import Settings
+from ntagen.drive.spinning import spun
 from ntagen.drive.supervisor import Supervisor
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
@@ -75,7 +76,7 @@ def drive(
     counter = SynthesisCounter()
     controller = Controller(
         told(scene, known),
-        Assembly(mover, sensor),
+        Assembly(spun(mover, scene), sensor),
         synthesise,
         settings,
         Journals(journal, counter),

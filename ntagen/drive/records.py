@@ -47,10 +47,17 @@ class Transition(Record):
 
 @dataclass(frozen=True, slots=True)
 class Command(Record):
-    """A command: ``push`` or ``pull`` with mm, ``roll`` with rad, ``wait`` with s, or ``stop``."""
+    """A command: ``push`` or ``pull`` with mm, ``roll`` with rad, ``wait`` with s, or ``stop``.
+
+    Attributes:
+        kind: The command.
+        value: How much of it.
+        spin: In this part of a push the needle spins.
+    """
 
     kind: str
     value: float
+    spin: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,6 +125,14 @@ class _Stage:
             halted.part = min(1.0, logged.made_mm / length_mm)
             raise halted
 
+    def spin(self, length_mm: float, fraction: float) -> None:
+        """Repeats how the push ended; the spin was compared as a part of the record."""
+        self.push(length_mm)
+
+    def settle(self) -> None:
+        """Does nothing: the device does not move."""
+        self._repeat_failure()
+
     def roll(self, angle_rad: float) -> None:
         """Does nothing: the device does not move."""
         self._repeat_failure()

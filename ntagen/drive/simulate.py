@@ -18,6 +18,7 @@ from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
+from ntagen.drive.spinning import spun
 from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
@@ -181,7 +182,7 @@ def simulate(
     actuator: Actuator = needle
     if settings.compensated_lag_rad > 0.0:
         actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
-    device = Assembly(actuator, sensor)
+    device = Assembly(spun(actuator, scene), sensor)
     witness = Witness(needle, journal)
     counter = SynthesisCounter()
     controller = Controller(

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from ntagen.drive.device import Device, Halted, require_finite, rest
+from ntagen.drive.device import Device, Halted, require_finite, rest, settle, spin_on
 from ntagen.drive.lateness import Lateness
 from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
@@ -23,6 +23,7 @@ from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path, sample_poses
+from ntagen.plan.actions import Push
 from ntagen.scene import SHAFT_SPACING_MM, Needle, Vector
 
 _ROLL_NEGLIGIBLE_RAD: Final = 1e-9
@@ -93,26 +94,37 @@ class Steering:
         """The time on the device's clock."""
         return self._device.now_s()
 
-    def push(self, length_mm: float) -> bool:
+    def push(self, action: Push) -> bool:
         """Inserts the needle; returns whether it went all the way (`Halted`)."""
-        began_s = self._command("push", length_mm)
+        length_mm, spin = action.length_mm, action.spin
+        began_s = self._command("push", length_mm, spin)
         self._reach.moved(length_mm)
         made_mm = length_mm
+        if spin:
+            # A tip that turns does not follow an old channel.
+            self._cut_mm = min(self._cut_mm, self.path.depth_mm)
         try:
-            self._device.push(length_mm)
+            if spin:
+                spin_on(self._device, length_mm, spin)
+            else:
+                self._device.push(length_mm)
         except Halted as halted:
             made_mm *= halted.part
             self._journal.record(CutShort(self.now_s(), made_mm, str(halted)))
             return False
         finally:
             from_mm = self._estimator.depth_mm
-            self._estimator.push(made_mm)
+            self._estimator.push(made_mm, spin)
             self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s)
-            self.path = self.path.push(self._radius_mm, made_mm)
+            self.path = self.path.push(action.radius_mm(self._radius_mm), made_mm)
             self._all_cut_mm += max(0.0, self.path.depth_mm - self._cut_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
             self._has_grown = True
         return True
+
+    def settle(self) -> None:
+        """Ends a turn in which a push with a spin was ended early."""
+        settle(self._device)
 
     def roll(self, angle_rad: float) -> None:
         """Turns the needle: the next push leaves the old channel, if it lies in one."""
@@ -231,9 +243,9 @@ class Steering:
         """Stops the needle without a record: for ends in which the journal may fail."""
         self._device.stop()
 
-    def _command(self, kind: str, value: float) -> float:
+    def _command(self, kind: str, value: float, spin: float = 0.0) -> float:
         """Records a motion that begins now, unless somebody wants the run to end; when it began."""
         self._listen()
         began_s = self.now_s()
-        self._journal.record(Command(began_s, kind, value))
+        self._journal.record(Command(began_s, kind, value, spin))
         return began_s

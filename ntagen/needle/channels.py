@@ -2,7 +2,9 @@
 
 A push cuts a channel. After a pull and a roll, the next push leaves it: a new channel begins there.
 Each channel is divided where the depth is a multiple of `STRETCH_MM`; at these places curvature and
-bend plane may change (`ntagen.needle.fluctuations`). Without changes, a channel is one stretch.
+bend plane may change (`ntagen.needle.fluctuations`). It is also divided where the spin changes: a
+needle that spins in a part of the way bends less by this part. Without all that, a channel is one
+stretch.
 
 The derivatives are exact. If an unknown changes by ``dx``, all that lies beyond it moves as a rigid
 body: a point ``x`` by ``w x x + v``, with a rotation vector ``w`` and a translation ``v`` that are
@@ -14,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,15 +52,17 @@ class Stretch:
 
     Attributes:
         offset_mm: Where it begins in its channel.
-        growth: The logarithm of its curvature, relative to that at the entry.
+        growth: The logarithm of its curvature without a spin, relative to that at the entry.
         turn: The angle by which the tissue has turned the bend plane.
         expected: What is added to `growth` whatever the unknowns are.
+        spin: In this part of it the needle spins.
     """
 
     offset_mm: float
     growth: _Array = field(default_factory=_none)
     turn: _Array = field(default_factory=_none)
     expected: float = 0.0
+    spin: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +112,23 @@ class Channel:
         inner_mm = [offset_mm for offset_mm in offsets_mm if offset_mm > _NOTHING_MM]
         return inner_mm if self.stretches else [0.0, *inner_mm]
 
+    def spin_from_here(self, spin: float) -> None:
+        """Notes the spin of the part that is cut next: the tissue there is as in the last part."""
+        if not self.stretches or self.stretches[-1].spin == spin:
+            return
+        last = self.stretches[-1]
+        if self.extent_mm <= last.offset_mm + _NOTHING_MM:
+            last.spin = spin
+        else:
+            self.stretches.append(replace(last, offset_mm=self.extent_mm, spin=spin))
+
+    def begin_stretch(self, stretch: Stretch) -> None:
+        """Adds a stretch, in the place of one that begins there because the spin has changed."""
+        last_mm = self.stretches[-1].offset_mm if self.stretches else 0.0
+        if last_mm > 0.0 and stretch.offset_mm - last_mm <= _NOTHING_MM:
+            self.stretches.pop()
+        self.stretches.append(stretch)
+
     def stretch_at(self, offset_mm: float) -> int:
         """The index of the stretch in which a place lies; its end belongs to it."""
         number = len(self.stretches) - 1
@@ -122,10 +143,11 @@ class Placed:
 
     Attributes:
         start: The pose at its beginning, after rolls and turns.
-        curvature_per_mm: Its curvature.
+        curvature_per_mm: The curvature that it would have without a spin.
         rotation: The rotation vector of the beginning, 3 rows, one column for each unknown.
         shift: The translation, in the same form.
         growth: The derivative of the curvature's logarithm by each unknown.
+        spin: In this part of it the needle spins.
     """
 
     start: Pose
@@ -133,11 +155,17 @@ class Placed:
     rotation: _Array
     shift: _Array
     growth: _Array
+    spin: float = 0.0
+
+    @property
+    def bent_per_mm(self) -> float:
+        """The curvature that it has."""
+        return self.curvature_per_mm * (1.0 - self.spin)
 
     @property
     def radius_mm(self) -> float:
-        """One over the curvature."""
-        return 1.0 / self.curvature_per_mm
+        """One over the curvature that it has."""
+        return 1.0 / self.bent_per_mm
 
     def positions(self, along_mm: _Array) -> tuple[_Array, _Array]:
         """Positions at these lengths from the beginning, and their derivatives: see `positions`."""
@@ -145,7 +173,7 @@ class Placed:
 
     def directions(self, along_mm: float) -> tuple[Pose, _Array]:
         """The pose at a length from the beginning, and the derivative of its rotation vector."""
-        turn_rad = self.curvature_per_mm * along_mm
+        turn_rad = self.bent_per_mm * along_mm
         axis = np.array(bending_axis(self.start))
         return (
             push(self.start, self.radius_mm, along_mm),
@@ -154,8 +182,8 @@ class Placed:
 
     def beyond(self, along_mm: float) -> Placed:
         """What begins after this length: the same curvature, further on."""
-        start, curvature = self.start, self.curvature_per_mm
-        turn_rad = curvature * along_mm
+        start = self.start
+        turn_rad = self.bent_per_mm * along_mm
         end = push(start, self.radius_mm, along_mm)
         # A change of the curvature moves the end by `own`, and turns it about the bending axis.
         half = 0.5 * turn_rad
@@ -170,10 +198,11 @@ class Placed:
         shift = subtract(own, cross(turn, end.position_mm))
         return Placed(
             end,
-            curvature,
+            self.curvature_per_mm,
             self.rotation + np.array(turn)[:, None] * self.growth,
             self.shift + np.array(shift)[:, None] * self.growth,
             self.growth,
+            self.spin,
         )
 
     def rolled(self, angle_rad: float, unknowns: tuple[int, ...]) -> Placed:
@@ -184,7 +213,7 @@ class Placed:
             rotation, shift = rotation.copy(), shift.copy()
             for unknown in unknowns:
                 _turn_about(rotation, shift, unknown, start.heading, start.position_mm)
-        return Placed(start, self.curvature_per_mm, rotation, shift, self.growth)
+        return Placed(start, self.curvature_per_mm, rotation, shift, self.growth, self.spin)
 
     def among(self, stretch: Stretch, entry: Placed, unknowns: _Array, before: _Array) -> Placed:
         """The same with the curvature and the bend plane of a stretch.
@@ -207,15 +236,16 @@ class Placed:
             placed.rotation,
             placed.shift,
             entry.growth + growth,
+            stretch.spin,
         )
 
     def bitten(self, bite: Bite, unknowns: _Array) -> Placed:
         """The same without the bend of so much of its length."""
         length_mm = bite.expected_mm + bite.std_mm * float(unknowns[bite.unknown])
-        angle_rad = -self.curvature_per_mm * length_mm
+        angle_rad = -self.bent_per_mm * length_mm
         axis = bending_axis(self.start)
         slopes = angle_rad * self.growth
-        slopes[bite.unknown] -= self.curvature_per_mm * bite.std_mm
+        slopes[bite.unknown] -= self.bent_per_mm * bite.std_mm
         moved = np.array(cross(axis, self.start.position_mm))
         return Placed(
             Pose(
@@ -227,6 +257,7 @@ class Placed:
             self.rotation + np.array(axis)[:, None] * slopes,
             self.shift - moved[:, None] * slopes,
             self.growth,
+            self.spin,
         )
 
     def turned(self, turn: _Array, unknowns: _Array) -> Placed:
@@ -240,6 +271,7 @@ class Placed:
             self.rotation + heading[:, None] * turn,
             self.shift - moved[:, None] * turn,
             self.growth,
+            self.spin,
         )
 
 
@@ -324,7 +356,7 @@ def positions(
     begins = np.array([start.position_mm for start in starts])[part_of]
     headings = np.array([start.heading for start in starts])[part_of]
     bevels = np.array([start.bevel for start in starts])[part_of]
-    turned = np.array([part.curvature_per_mm for part in parts])[part_of] * along_mm
+    turned = np.array([part.bent_per_mm for part in parts])[part_of] * along_mm
     half = 0.5 * turned
     chord = along_mm * np.sinc(half / math.pi)
     ahead, aside = chord * np.cos(half), chord * np.sin(half)

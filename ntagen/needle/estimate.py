@@ -6,7 +6,8 @@ But the commands are known. The estimator replays them (pushes, rolls and pulls)
 channels that were cut (`ntagen.needle.channels`), with a few unknowns:
 
 * the entry pose (three for the position, three small rotations),
-* the curvature at the entry, as a factor of the expected one,
+* the curvature at the entry, as a factor of the expected one; in a push with a spin the expected
+  one is less by the spun part, and the factor is the same,
 * the error of each roll, since a shaft does not turn its tip exactly as it is turned at its base,
 * what curvature and bend plane do in each stretch of 5 mm, if their priors are not 0
   (`ntagen.needle.fluctuations`). So old measurements say less about the present than new ones.
@@ -83,8 +84,8 @@ class Estimate:
 
     Attributes:
         path: The estimated channel in which the needle lies now; its end is the tip.
-        radius_mm: The radius of the motion circle that is expected over the next 30 mm: the
-            present curvature does not stay. Without drift it is that of the whole path.
+        radius_mm: The radius of the motion circle that is expected over the next 30 mm without a
+            spin: the present curvature does not stay. Without drift it is that of the whole path.
         radius_std_mm: The standard deviation of the mean radius over these 30 mm.
         rms_mm: Root mean square of the distances between measured and estimated positions.
         misfit_mm: The length of the mean difference between the last measured positions and the
@@ -238,14 +239,16 @@ class Estimator:
         """The insertion depth that was commanded."""
         return sum(length_mm for _, length_mm in self._inserted)
 
-    def push(self, length_mm: float) -> None:
-        """Notes a push."""
+    def push(self, length_mm: float, spin: float = 0.0) -> None:
+        """Notes a push, in a part of which the needle may spin."""
         if length_mm <= 0.0:
             return
         channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
-        if channel != ENTRY and not self._pending_rolls:
+        # A tip that turns does not follow an old channel.
+        leaves = channel != ENTRY and spin > 0.0 and inserted_mm < self._channels[channel].extent_mm
+        if channel != ENTRY and not self._pending_rolls and not leaves:
             self._inserted[-1] = (channel, inserted_mm + length_mm)
-            self._extend(channel, inserted_mm + length_mm)
+            self._extend(channel, inserted_mm + length_mm, spin)
             return
         depth_mm = self.depth_mm
         new = Channel(channel, inserted_mm, depth_mm, self._pending_rad, self._pending_rolls)
@@ -255,7 +258,7 @@ class Estimator:
         self._channels.append(new)
         self._inserted.append((len(self._channels) - 1, length_mm))
         self._pending_rad, self._pending_rolls = 0.0, ()
-        self._extend(len(self._channels) - 1, length_mm)
+        self._extend(len(self._channels) - 1, length_mm, spin)
 
     def roll(self, angle_rad: float) -> None:
         """Notes a roll."""
@@ -395,21 +398,22 @@ class Estimator:
         self._stds.append(std)
         return len(self._stds) - 1
 
-    def _extend(self, index: int, extent_mm: float) -> None:
-        """Notes how far a channel was cut; new stretches get their unknowns."""
+    def _extend(self, index: int, extent_mm: float, spin: float) -> None:
+        """Notes how far a channel was cut, and the spin; new stretches get their unknowns."""
         channel = self._channels[index]
         if extent_mm <= channel.extent_mm:
             return
+        channel.spin_from_here(spin)
         if self._is_even:
-            channel.stretches = channel.stretches or [Stretch(0.0)]
+            channel.stretches = channel.stretches or [Stretch(0.0, spin=spin)]
         else:
             for offset_mm in channel.new_boundaries(extent_mm):
-                channel.stretches.append(self._stretch(index, channel.depth_mm, offset_mm))
+                channel.begin_stretch(self._stretch(index, channel.depth_mm, offset_mm, spin))
         channel.extent_mm = extent_mm
 
-    def _stretch(self, channel: int, depth_mm: float, offset_mm: float) -> Stretch:
+    def _stretch(self, channel: int, depth_mm: float, offset_mm: float, spin: float) -> Stretch:
         """A new stretch with its unknowns."""
-        stretch = Stretch(offset_mm)
+        stretch = Stretch(offset_mm, spin=spin)
         begin_mm = depth_mm + offset_mm
         end_mm = STRETCH_MM * (math.floor(begin_mm / STRETCH_MM + 1e-9) + 1.0)
         middle_mm = 0.5 * (begin_mm + end_mm)

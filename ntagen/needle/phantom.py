@@ -5,6 +5,7 @@ It has the methods of the virtual needle (`ntagen.needle.virtual`), but:
 * its curvature drifts and its bend plane turns, both as the tissue at that depth makes them;
 * friction along the shaft holds back its tip when the base is rolled;
 * a push in an old channel follows it, within its width;
+* a needle that spins goes nearly straight: a small share of its bend stays, or too much goes;
 * its force is the total axial force at the base: friction, cutting, layers, near regions, noise;
 * a measurement is late, noisy and rounded, has a correlated error, and can be lost.
 
@@ -27,6 +28,7 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom_parameters import PhantomParameters
 from ntagen.needle.phantom_sensor import Frame, PhantomSensor, Seen
 from ntagen.needle.phantom_tissue import CELL_MM, Tissue
+from ntagen.needle.screws import STRAIGHT_MM, is_whole, steps_of
 from ntagen.needle.sweep import Sweep
 from ntagen.needle.vectors import add, combine, cross, distance, scale
 from ntagen.needle.virtual import (
@@ -112,9 +114,11 @@ class PhantomNeedle:
         self._needle = needle
         self._obstacles = obstacles
         self._clock = clock
-        tissue, channels, sensor = np.random.SeedSequence(seed).spawn(3)
+        tissue, channels, sensor, spins = np.random.SeedSequence(seed).spawn(4)
         self._tissue = Tissue(self._parameters, needle.length_mm + _MARGIN_MM, tissue)
         self._channel_errors = np.random.default_rng(channels)
+        spin_std = self._parameters.shape.spin_ratio
+        self._spin_error = float(np.random.default_rng(spins).normal(0.0, spin_std))
         self._base_rad = 0.0
         self._tip_rad = 0.0
         self._depth_mm = 0.0
@@ -155,6 +159,45 @@ class PhantomNeedle:
             left_mm -= step_mm
             self._pass(step_mm / self._needle.speed_mm_per_s)
             self._show()
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Moves the tip on while the base turns; the tip turns as far as friction lets it.
+
+        Raises:
+            DeviceError: The length is negative, or a value is not finite.
+        """
+        require_possible(length_mm >= 0.0, "screw", length_mm)
+        require_possible(math.isfinite(angle_rad), "screw", angle_rad)
+        self._direction = 1.0
+        seconds = max(
+            length_mm / self._needle.speed_mm_per_s, abs(angle_rad) / ROLL_RAD_PER_S
+        )
+        bent_mm = abs(self._spin_error) * length_mm
+        self._advance(bent_mm, turned_rad=math.pi if self._spin_error > 0.0 else 0.0)
+        before_rad = self._tip_rad
+        self._base_rad += angle_rad
+        self._slip()
+        if is_whole(self._tip_rad - before_rad):
+            if self._ahead:
+                self._leave()
+            self._advance(length_mm - bent_mm, is_straight=True)
+        else:
+            self._base_rad, self._tip_rad = self._base_rad - angle_rad, before_rad
+            steps = steps_of(angle_rad)
+            for _ in range(steps):
+                self._base_rad += angle_rad / steps
+                self._slip()
+                self._advance((length_mm - bent_mm) / steps)
+        self._pass(seconds)
+        self._show()
+
+    def _advance(
+        self, length_mm: float, turned_rad: float = 0.0, *, is_straight: bool = False
+    ) -> None:
+        """Moves the tip on, at no time."""
+        left_mm = length_mm
+        while left_mm > _NOTHING_MM:
+            left_mm -= self._step(left_mm, turned_rad, is_straight=is_straight)
 
     def wait(self, seconds: float) -> None:
         """Rests for a time.
@@ -277,20 +320,30 @@ class PhantomNeedle:
 
     # Motion.
 
-    def _step(self, left_mm: float) -> float:
-        """Moves the tip within one cell or piece; returns by how much."""
+    def _step(
+        self, left_mm: float, turned_rad: float = 0.0, *, is_straight: bool = False
+    ) -> float:
+        """Moves the tip within one cell or piece; returns by how much.
+
+        Args:
+            left_mm: At most so far.
+            turned_rad: It bends into a direction that is turned by this.
+            is_straight: Whether it does not bend.
+        """
         if self._ahead and not self._fits():
             self._leave()
         if self._ahead:
             return self._follow(left_mm)
         cell = self._tissue.cell(self._depth_mm)
-        bend_rad = self._bend_rad()
+        bend_rad = self._bend_rad() + turned_rad
         radius_mm = self._needle.radius_mm / self._tissue.curvature_ratio(cell)
+        if is_straight:
+            radius_mm = STRAIGHT_MM
         step_mm = min(left_mm, self._to_boundary_mm(cell))
         if self._bite_mm > _NOTHING_MM:
             step_mm = min(step_mm, self._bite_mm)
             self._bite_mm -= step_mm
-            radius_mm /= self._parameters.reinsertion.bite_ratio
+            radius_mm /= 1.0 if is_straight else self._parameters.reinsertion.bite_ratio
         last = self._pieces[-1] if self._pieces else None
         new = _Piece(self._frame(), bend_rad, radius_mm, 0.0, cell)
         if last and (last.cell, last.bend_rad, last.radius_mm) == (cell, bend_rad, radius_mm):

@@ -60,6 +60,8 @@ class Shape:
         turn_rad_per_mm: Standard deviation of the rate at which the bend plane turns, constant in
             one insertion. [ultrasteer], calibrated: median 10 degrees between halves of 40 mm.
         turn_rad: The fluctuation of the bend plane. [ultrasteer], calibrated.
+        spin_ratio: Spinning in a part of the way takes away this much more or less of the curvature
+            than that part: the standard deviation, constant in one insertion, as a ratio. Ours.
     """
 
     curvature_ratio: float = 0.02
@@ -68,6 +70,7 @@ class Shape:
     first_mm: float = 10.0
     turn_rad_per_mm: float = math.radians(13.0) / 38.0
     turn_rad: Fluctuation = Fluctuation(math.radians(6.0), 30.0, 0.2)
+    spin_ratio: float = 0.03
 
 
 @dataclass(frozen=True, slots=True)

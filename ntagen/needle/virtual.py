@@ -25,6 +25,7 @@ from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.obstacle import Obstacle as Obstacle
 from ntagen.needle.path import Path
+from ntagen.needle.screws import STRAIGHT_MM, TURN_RAD, is_whole, steps_of
 from ntagen.scene import Needle, Pose
 
 ROLL_RAD_PER_S: Final = math.pi
@@ -109,6 +110,26 @@ class VirtualNeedle:
         self._let_pick()
         self._path = self._path.push(self._needle.radius_mm / self._factor, length_mm)
         self._pass(length_mm / self._needle.speed_mm_per_s)
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Moves the tip on while it turns; in whole turns that is straight.
+
+        Raises:
+            DeviceError: The length is negative, or a value is not finite.
+        """
+        require_possible(length_mm >= 0.0, "screw", length_mm)
+        require_possible(math.isfinite(angle_rad), "screw", angle_rad)
+        turn_s = abs(angle_rad) / ROLL_RAD_PER_S
+        if is_whole(angle_rad):
+            self._path = self._path.push(STRAIGHT_MM, length_mm)
+            left_rad = math.remainder(angle_rad, TURN_RAD)
+            self._path = self._path.roll(left_rad) if left_rad else self._path
+        else:
+            steps = steps_of(angle_rad)
+            for _ in range(steps):
+                path = self._path.roll(angle_rad / steps)
+                self._path = path.push(self._needle.radius_mm, length_mm / steps)
+        self._pass(max(length_mm / self._needle.speed_mm_per_s, turn_s))
 
     def _let_pick(self) -> None:
         """At the first push of a segment, the tissue picks what holds until the next roll."""

@@ -12,9 +12,9 @@ bends a little less. The prospect is no probability: errors show little by littl
 about the first ones is not undone for the last. It says which of two places is better.
 
 Rolls are looked at in a few places (`ROLL_PLACES`), and ways are sampled for what they touch; so a
-way of a prospect still needs its certificate.
+way of a prospect still needs its certificate. Of the spins, none and the greatest are looked at.
 
-Cost: 2 to 4 ms for a place with two rolls left, of five angles.
+Cost: 2 to 4 ms for a place with two rolls left, of five angles; where the needle may spin, 10 ms.
 """
 
 from __future__ import annotations
@@ -40,6 +40,9 @@ ERRORS: Final = 48
 
 ROLL_PLACES: Final = (14, 8)
 """Along an arc, the first roll is looked at in so many places, and each later one."""
+
+SPUN_PLACES: Final = (8, 4)
+"""The same where the needle may spin: then there are several arcs after each roll."""
 
 _LEAST_APART_MM: Final = 4.0
 """Two rolls that are nearer to each other are much like one."""
@@ -102,16 +105,21 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class _Arcs:
-    """Arcs as rows: their starts, how long they may be, and where they branch off from which."""
+    """Arcs as rows: their starts, how long they may be, and where they branch off from which.
+
+    `choice` is the number of the roll and the spin in `Prospects.choices`.
+    """
 
     start: Poses
     length_mm: _Array
+    radius_mm: _Array
     parent: _Rows
     branch_mm: _Array
+    choice: _Rows
 
-    def nearest(self, rows: _Rows, radius_mm: float, places: _Array) -> tuple[_Array, _Array]:
+    def nearest(self, rows: _Rows, places: _Array) -> tuple[_Array, _Array]:
         """The least distance of arcs to places, and where; see `Arc.nearest_to`."""
-        start = self.start.at(rows)
+        start, radius_mm = self.start.at(rows), self.radius_mm[rows, None]
         heading, bevel = start.heading, start.bevel
         center = start.position - radius_mm * bevel
         # As products of matrices: there may be a hundred thousand pairs.
@@ -127,7 +135,7 @@ class _Arcs:
         beyond = np.flatnonzero((at_mm >= length_mm[:, None]).any(axis=1))
         if len(beyond):
             missing = start.at(beyond)
-            end = missing.places(radius_mm, length_mm[beyond])
+            end = missing.places(radius_mm[beyond, 0], length_mm[beyond])
             first = np.sqrt(np.maximum(0.0, _squares(missing.position, places)))
             last = np.sqrt(np.maximum(0.0, _squares(end, places)))
             is_beyond = at_mm[beyond] >= length_mm[beyond, None]
@@ -155,6 +163,11 @@ class Prospects:
     def __init__(self, scene: Scene, depth_mm: float) -> None:
         self._scene = scene
         self._radius_mm = scene.needle.radius_mm
+        limits = scene.limits
+        self._spins = (0.0, max(limits.spins)) if limits.spins else (0.0,)
+        # After a roll by 0 another spin comes, and only then.
+        angles = (*limits.roll_angles_rad, 0.0) if limits.spins else limits.roll_angles_rad
+        self._choices = [(angle, spin) for angle in angles for spin in range(len(self._spins))]
         target = scene.targets[-1]
         self._middle = np.array(target.center_mm)
         self._reach_mm = target.shape.reach_mm()
@@ -194,16 +207,16 @@ class Prospects:
         useful_mm += _FARTHEST_SIGMAS * math.sqrt(max(0.0, float(variances[-1])))
         best_mm, middle_mm, way = np.full(len(places), math.inf), self._inside_mm, None
         levels = self._levels(place, left_mm, since_roll_mm, useful_mm)
-        clear: _Flags = np.ones(1, dtype=bool)
+        clear: _Flags = np.ones(len(levels[0].length_mm), dtype=bool)
         for index, arcs in enumerate(levels):
             rows = np.flatnonzero(clear)
-            near = arcs.nearest(rows, self._radius_mm, self._middle[None])
+            near = arcs.nearest(rows, self._middle[None])
             useful = near[0][:, 0] <= useful_mm
             rows, away_mm, foot_mm = rows[useful], near[0][useful, 0], near[1][useful, 0]
             free = foot_mm < self._touched_at(arcs, rows, foot_mm)
             rows, away_mm, foot_mm = rows[free], away_mm[free], foot_mm[free]
             if len(rows):
-                found_mm = arcs.nearest(rows, self._radius_mm, places)[0]
+                found_mm = arcs.nearest(rows, places)[0]
                 best_mm = np.minimum(best_mm, found_mm.min(axis=0))
                 one = int(np.argmin(away_mm))
                 if away_mm[one] < middle_mm and (way_rolls is None or index <= way_rolls):
@@ -227,30 +240,43 @@ class Prospects:
         """
         limits = self._scene.limits
         vectors = (place.position_mm, place.heading, place.bevel)
-        start = Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
-        none = np.zeros(1, dtype=np.intp)
-        levels = [_Arcs(start, np.array([left_mm]), none, np.zeros(1))]
-        angles_rad = np.array(limits.roll_angles_rad)
+        count = len(self._spins)
+        start = Poses(*(np.array([vector] * count, dtype=np.float64) for vector in vectors))
+        each = np.arange(count)
+        radii_mm = self._radius_mm / (1.0 - np.array(self._spins))
+        lengths_mm = np.full(count, left_mm)
+        levels = [_Arcs(start, lengths_mm, radii_mm, each, np.zeros(count), each)]
+        angles_rad = np.array([angle for angle, _ in self._choices])
+        spins = np.array([spin for _, spin in self._choices], dtype=np.intp)
         apart_mm = limits.min_roll_distance_mm
+        roll_places = ROLL_PLACES if count == 1 else SPUN_PLACES
         first_mm = max(0.0, apart_mm - since_roll_mm)
         for number in range(limits.max_rolls):
             before = levels[-1]
-            count = ROLL_PLACES[min(number, len(ROLL_PLACES) - 1)]
+            count = roll_places[min(number, len(roll_places) - 1)]
             spacing_mm = left_mm / count
             along_mm: _Array = first_mm + spacing_mm * np.arange(count, dtype=np.float64)
             rows, places = np.nonzero(along_mm < before.length_mm[:, None] - _TINY_MM)
             if not len(rows):
                 break
             at_mm: _Array = along_mm[places]
-            start = before.start.at(rows).pushed(self._radius_mm, at_mm)
+            start = before.start.at(rows).pushed(before.radius_mm[rows], at_mm)
             rest_mm = before.length_mm[rows] - at_mm
             kept = np.flatnonzero(self._can_reach(start, rest_mm, useful_mm))
             if not len(kept):
                 break
-            # All branches of the first angle come first, then those of the next one.
+            # All branches of the first choice come first, then those of the next one.
             each = np.tile(kept, len(angles_rad))
-            rolled = start.at(each).rolled(np.repeat(angles_rad, len(kept)))
-            levels.append(_Arcs(rolled, rest_mm[each], rows[each], at_mm[each]))
+            choice = np.repeat(np.arange(len(angles_rad)), len(kept))
+            if len(self._spins) > 1:
+                spin_before = spins[before.choice[rows[each]]]
+                turns = (angles_rad[choice] != 0.0) | (spins[choice] != spin_before)
+                each, choice = each[turns], choice[turns]
+            rolled = start.at(each).rolled(angles_rad[choice])
+            radius_mm = radii_mm[spins[choice]]
+            levels.append(
+                _Arcs(rolled, rest_mm[each], radius_mm, rows[each], at_mm[each], choice)
+            )
             first_mm = max(apart_mm, _LEAST_APART_MM)
         return levels
 
@@ -277,7 +303,8 @@ class Prospects:
         starts = np.cumsum(counts) - counts
         number = np.arange(1, counts.sum() + 1) - np.repeat(starts, counts)
         at_mm = np.minimum(_SAMPLE_MM * number, np.repeat(length_mm, counts))
-        points = arcs.start.at(np.repeat(rows, counts)).places(self._radius_mm, at_mm)
+        owners = np.repeat(rows, counts)
+        points = arcs.start.at(owners).places(arcs.radius_mm[owners], at_mm)
         touches = np.zeros(len(points), dtype=bool)
         for region in regions:
             touches |= region.shape.distance_mm(points) <= 0.0
@@ -285,14 +312,17 @@ class Prospects:
 
     def _plan(self, levels: list[_Arcs], index: int, row: int, foot_mm: float) -> Plan:
         """The way that ends on this arc of a level."""
-        angles = self._scene.limits.roll_angles_rad
-        actions: list[Action] = [Push(foot_mm)]
-        while index > 0:
+        actions: list[Action] = []
+        length_mm = foot_mm
+        while True:
             arcs = levels[index]
-            number = row // (len(arcs.length_mm) // len(angles))
-            actions = [Push(float(arcs.branch_mm[row])), Roll(angles[number]), *actions]
-            index, row = index - 1, int(arcs.parent[row])
-        return Plan.of(actions)
+            angle_rad, spin = self._choices[int(arcs.choice[row])]
+            actions.insert(0, Push(length_mm, self._spins[spin]))
+            if index == 0:
+                return Plan.of(actions)
+            if angle_rad:
+                actions.insert(0, Roll(angle_rad))
+            length_mm, index, row = float(arcs.branch_mm[row]), index - 1, int(arcs.parent[row])
 
 
 def first_part(plan: Plan, length_mm: float) -> Plan:
@@ -303,7 +333,7 @@ def first_part(plan: Plan, length_mm: float) -> Plan:
         if left_mm <= _TINY_MM:
             break
         if isinstance(action, Push):
-            actions.append(Push(min(left_mm, action.length_mm)))
+            actions.append(Push(min(left_mm, action.length_mm), action.spin))
             left_mm -= action.length_mm
         else:
             actions.append(action)
