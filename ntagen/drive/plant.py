@@ -37,6 +37,9 @@ class Movable(Protocol):
     def roll_on(self, angle_rad: float) -> None:
         """Goes on with the last roll: no error is added."""
 
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Inserts it and turns its base at once."""
+
     def pull(self, length_mm: float) -> None:
         """Pulls it back."""
 
@@ -46,7 +49,8 @@ class NeedlePlant:
 
     Pieces of a motion are added up until somebody wants to see the needle (`settle`). A roll is one
     roll of the needle, however often it is seen on the way: errors of rolls come once for each. It
-    ends when another axis moves, when the direction changes, or with `finish`.
+    ends when another axis moves, when the direction changes, or with `finish`. Where both axes move
+    at once, they make a screw motion.
 
     Args:
         needle: The needle.
@@ -56,41 +60,39 @@ class NeedlePlant:
     def __init__(self, needle: Movable, axes: Axes) -> None:
         self._needle = needle
         self._axes = axes
-        self._letter = ""
-        self._is_forward = True
+        # The directions of the axes that move, and how far they went.
+        self._directions = (0, 0)
         self._has_begun = False
-        self._way = 0.0
+        self._ways = (0.0, 0.0)
 
     def move(self, steps: Mapping[str, float], seconds: float) -> None:
         """Adds motion of the axes, in mm and degrees."""
-        for letter, step in steps.items():
-            if step == 0.0:
-                continue
-            if letter != self._letter or (step > 0.0) != self._is_forward:
-                self.settle()
-                self._letter, self._is_forward = letter, step > 0.0
-                self._has_begun = False
-            self._way += step
+        axes = (self._axes.insert, self._axes.roll)
+        mm, deg = (axis.sign * steps.get(axis.letter, 0.0) for axis in axes)
+        directions = ((mm > 0.0) - (mm < 0.0), (deg > 0.0) - (deg < 0.0))
+        if directions == (0, 0):
+            return
+        if directions != self._directions:
+            self.settle()
+            self._directions = directions
+            self._has_begun = False
+        self._ways = (self._ways[0] + mm, self._ways[1] + deg)
 
     def settle(self) -> None:
         """Moves the needle by what has been added up."""
-        way, self._way = self._way, 0.0
-        if way == 0.0:
-            return
-        axis = next(
-            (a for a in (self._axes.insert, self._axes.roll) if a.letter == self._letter), None
-        )
-        if axis is None:
-            return
-        way *= axis.sign
-        if axis is self._axes.roll:
-            turn = self._needle.roll_on if self._has_begun else self._needle.roll
-            turn(rad_from_deg(way))
-        elif way > 0.0:
-            self._needle.push(way)
+        (mm, deg), self._ways = self._ways, (0.0, 0.0)
+        angle_rad = rad_from_deg(deg)
+        if mm > 0.0 and deg:
+            self._needle.screw(mm, angle_rad)
         else:
-            self._needle.pull(-way)
-        self._has_begun = True
+            if mm > 0.0:
+                self._needle.push(mm)
+            elif mm < 0.0:
+                self._needle.pull(-mm)
+            if deg:
+                turn = self._needle.roll_on if self._has_begun else self._needle.roll
+                turn(angle_rad)
+        self._has_begun |= mm != 0.0 or deg != 0.0
 
     def finish(self) -> None:
         """Ends the motion: one in the same direction after it is another one."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NoReturn
 
-from ntagen.drive.device import Halted, Watch
+from ntagen.drive.device import Halted, Watch, can_screw, screw_on
 from ntagen.errors import DeviceError
 from ntagen.extensions import DEVICES, guarded, load, opened
 
@@ -133,6 +133,19 @@ class PluginActuator:
     def push(self, length_mm: float) -> None:
         """See `ntagen.drive.device.WatchedActuator.push`."""
         self._move("push", self._inner.push, length_mm, least=0.0)
+
+    @property
+    def can_screw(self) -> bool:
+        """Whether it can insert the needle and turn it at once."""
+        return can_screw(self._inner)
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """See `ntagen.drive.device.Screwing.screw`."""
+        if not math.isfinite(angle_rad):
+            raise DeviceError(f"the device refuses to screw by {angle_rad}")
+        self._move(
+            "screw", lambda mm: screw_on(self._inner, mm, angle_rad), length_mm, least=0.0
+        )
 
     def roll(self, angle_rad: float) -> None:
         """See `ntagen.drive.device.WatchedActuator.roll`."""

@@ -107,17 +107,19 @@ class _Judge:
 
     def _judged(self, first: Plan) -> Judged:
         if first not in self._known:
-            since_mm = math.inf
+            since_mm, spin = math.inf, None
             for action in first.actions:
                 if isinstance(action, Push):
                     since_mm += action.length_mm
+                    spin = action.spin
                 elif isinstance(action, Roll):
-                    since_mm = 0.0
+                    since_mm, spin = 0.0, None
             self._known[first] = self._prospects.judge(
                 first.end(self._scene.needle),
                 self._left_mm,
                 self._covariance_mm2,
                 since_roll_mm=since_mm,
                 way_rolls=self._scene.limits.max_rolls - first.roll_count - first.spin_changes,
+                spin=spin,
             )
         return self._known[first]

@@ -56,6 +56,10 @@ def scene_to_json(scene: Scene, known: Mapping[str, str] | None = None) -> str:
     if scene.tissue.kind == "static":
         # As logs have it that were written before there was another.
         entries["tissue"] = {"kind": scene.tissue.kind}
+    limits = _entries(scene.limits)
+    if not scene.limits.spins:
+        del limits["spins"]
+    entries["limits"] = limits
     document: dict[str, object] = {"version": VERSION, "scene": entries}
     missing = {digest: text for digest, text in samples.items() if digest not in (known or {})}
     if missing:
@@ -96,6 +100,7 @@ def scene_from_json(text: str | bytes, known: Mapping[str, str] | None = None) -
             )
         entries = {kind: [] for kind in _LATER_KINDS} | {"breath": None} | document["scene"]
         entries["tissue"] = dataclasses.asdict(Tissue()) | entries["tissue"]
+        entries["limits"] = {"spins": []} | entries["limits"]
         samples = {**(known or {}), **document.get("samples", {})}
         regions = {
             kind: tuple(_to_region(entry, samples) for entry in entries[kind]) for kind in _KINDS

@@ -50,6 +50,9 @@ class Knowing(Protocol):
 class Simulated(Device, Knowing, Protocol):
     """A simulated needle: a device that knows the truth."""
 
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Inserts it and turns its base at once."""
+
     def roll_on(self, angle_rad: float) -> None:
         """Goes on with the last roll: no error is added."""
 

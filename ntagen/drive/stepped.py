@@ -54,6 +54,11 @@ class Stepped:
         """See `GrblActuator.push`."""
         self.actuator.push(length_mm)
 
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """See `GrblActuator.screw`."""
+        self.actuator.screw(length_mm, angle_rad)
+        self._plant.finish()
+
     def roll(self, angle_rad: float) -> None:
         """See `GrblActuator.roll`."""
         self.actuator.roll(angle_rad)

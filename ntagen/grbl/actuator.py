@@ -2,12 +2,14 @@
 
 Each motion is a jog, which the controller forgets when it is stopped. While it runs, its status is
 asked for and compared with what was commanded: the direction, the way, the time, and that no other
-axis moves. What steppers lose on the way no controller knows: that shows in the measured position.
+axis moves. In a screw motion the needle is inserted and turned at once. What steppers lose on the
+way no controller knows: that shows in the measured position.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -46,17 +48,54 @@ class StoppedError(DeviceError):
 
 
 @dataclass(frozen=True, slots=True)
-class _Goal:
-    """A motion: the axis, its speed, and the positions of all axes at its start and its end."""
+class _Way:
+    """How far an axis goes in the needle's direction, how fast, and the longest piece of it."""
 
     motor: Motor
+    length: float
     speed: float
+    longest: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Goal:
+    """A motion.
+
+    Attributes:
+        motors: The axes that move, at once; the first one is looked at.
+        at_speed_s: How long it takes at full speed.
+        start: The positions of all axes at its start.
+        end: The positions at its end.
+    """
+
+    motors: tuple[Motor, ...]
+    at_speed_s: float
     start: tuple[float, ...]
     end: tuple[float, ...]
 
     @property
+    def motor(self) -> Motor:
+        return self.motors[0]
+
+    def way_of(self, motor: Motor) -> float:
+        return self.end[motor.index] - self.start[motor.index]
+
+    @property
     def way(self) -> float:
-        return self.end[self.motor.index] - self.start[self.motor.index]
+        return self.way_of(self.motor)
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes, with ramps."""
+        ways = [(motor, self.way_of(motor)) for motor in self.motors]
+        return max(motor.seconds(way, abs(way) / self.at_speed_s) for motor, way in ways if way)
+
+    @property
+    def words(self) -> str:
+        """The axes and the speed along their common way, whose units are mm and degrees."""
+        axes = " ".join(f"{one.axis.letter}{self.way_of(one):.4f}" for one in self.motors)
+        speed = math.hypot(*map(self.way_of, self.motors)) / self.at_speed_s
+        return f"{axes} F{speed * 60.0:.3f}"
 
 
 class GrblActuator:
@@ -113,7 +152,7 @@ class GrblActuator:
             Halted: Who watched it ended it early.
         """
         self._require(length_mm >= 0.0, "push", length_mm)
-        self._move(self._insert, length_mm, self._axes.push_mm_per_s, self._axes.max_mm)
+        self._move(_Way(self._insert, length_mm, self._axes.push_mm_per_s, self._axes.max_mm))
 
     def pull(self, length_mm: float) -> None:
         """Pulls the needle back by a length.
@@ -122,7 +161,7 @@ class GrblActuator:
             DeviceError: The motion is impossible, was stopped, or failed.
         """
         self._require(length_mm >= 0.0, "pull", length_mm)
-        self._move(self._insert, -length_mm, self._axes.pull_mm_per_s, self._axes.max_mm)
+        self._move(_Way(self._insert, -length_mm, self._axes.pull_mm_per_s, self._axes.max_mm))
 
     def roll(self, angle_rad: float) -> None:
         """Turns the shaft, right-handed about the heading.
@@ -131,8 +170,24 @@ class GrblActuator:
             DeviceError: The motion is impossible, was stopped, or failed.
         """
         self._require(True, "roll", angle_rad)
+        self._move(self._turn(angle_rad))
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """Inserts the needle and turns it at once, as fast as the slower of both axes.
+
+        Raises:
+            DeviceError: The motion is impossible, was stopped, or failed.
+            Halted: Who watched it ended it early; its part is that of the angle.
+        """
+        self._require(length_mm >= 0.0, "screw", length_mm)
+        self._require(True, "screw", angle_rad)
+        axes = self._axes
+        insertion = _Way(self._insert, length_mm, axes.push_mm_per_s, axes.max_mm)
+        self._move(self._turn(angle_rad), insertion)
+
+    def _turn(self, angle_rad: float) -> _Way:
         angle_deg = deg_from_rad(angle_rad)
-        self._move(self._roll, angle_deg, self._axes.roll_deg_per_s, self._axes.max_deg)
+        return _Way(self._roll, angle_deg, self._axes.roll_deg_per_s, self._axes.max_deg)
 
     def stop(self) -> None:
         """Stops the needle where it is, and waits until it stands.
@@ -206,29 +261,30 @@ class GrblActuator:
         if not possible or not math.isfinite(value):
             raise DeviceError(f"the device refuses to {command} by {value}")
 
-    def _move(self, motor: Motor, length: float, speed: float, longest: float) -> None:
-        """Moves an axis in pieces, each no longer than the longest one."""
+    def _move(self, *ways: _Way) -> None:
+        """Moves axes at once, in pieces of which none is longer than the longest one."""
         stops = self._stops
-        count = max(1, math.ceil(abs(length) / longest - 1e-9))
-        way = motor.axis.sign * length
+        count = max(1, *(math.ceil(abs(way.length) / way.longest - 1e-9) for way in ways))
+        first = ways[0].motor
+        way = first.axis.sign * ways[0].length
         with self._link.turn:
-            start = self._expected[motor.index]
+            start = self._expected[first.index]
             try:
                 for _ in range(count):
-                    self._piece(motor, way / count, speed, stops)
+                    self._piece(ways, count, stops)
             except Halted as halted:
-                made = (self._expected[motor.index] - start) / way
+                made = (self._expected[first.index] - start) / way
                 halted.part = max(0.0, min(1.0, made))
                 raise
 
-    def _piece(self, motor: Motor, way: float, speed: float, stops: int) -> None:
+    def _piece(self, ways: Sequence[_Way], count: int, stops: int) -> None:
         def watch() -> None:
             if self._stops != stops:
                 raise StoppedError(f"{self._link.name}: the motion was stopped")
             self.watch()
 
-        goal = self._plan(motor, way, speed, watch)
-        if abs(goal.way) < motor.tolerance / 2.0:
+        goal = self._plan(ways, count, watch)
+        if abs(goal.way) < goal.motor.tolerance / 2.0:
             return
         try:
             self._begin(goal, watch)
@@ -250,11 +306,11 @@ class GrblActuator:
         watch()
         return status
 
-    def _plan(self, motor: Motor, way: float, speed: float, watch: Watch) -> _Goal:
-        """The motion from where the axes stand, if they stand where they were left.
+    def _plan(self, ways: Sequence[_Way], count: int, watch: Watch) -> _Goal:
+        """One of several equal pieces of a motion, from where the axes were left.
 
         Raises:
-            DeviceError: They do not, or the end is outside of the limits.
+            DeviceError: They do not stand there, or the end is outside of the limits.
         """
         self._link.require_whole()
         start = position_of(require_ready(self._link, self._status(watch)))
@@ -266,17 +322,21 @@ class GrblActuator:
                     "hint: something else has moved it; measure where the needle is"
                 )
         end = list(self._expected)
-        end[motor.index] += way
-        if not motor.axis.low <= end[motor.index] <= motor.axis.high:
-            raise DeviceError(
-                f"{self._link.name}: {end[motor.index]:.3f} {motor.unit} is outside of the travel "
-                f"of the axis {motor.axis.letter}, {motor.axis.low:g} to {motor.axis.high:g}"
-            )
-        return _Goal(motor, speed, start, tuple(end))
+        for way in ways:
+            motor = way.motor
+            end[motor.index] += motor.axis.sign * way.length / count
+            if not motor.axis.low <= end[motor.index] <= motor.axis.high:
+                raise DeviceError(
+                    f"{self._link.name}: {end[motor.index]:.3f} {motor.unit} is outside of the "
+                    f"travel of the axis {motor.axis.letter}, {motor.axis.low:g} to "
+                    f"{motor.axis.high:g}"
+                )
+        at_speed_s = max(abs(way.length) / count / way.speed for way in ways)
+        return _Goal(tuple(way.motor for way in ways), at_speed_s, start, tuple(end))
 
     def _begin(self, goal: _Goal, watch: Watch) -> None:
         """Sends the motion, once."""
-        word = f"{goal.motor.axis.letter}{goal.way:.4f} F{goal.speed * 60.0:.3f}"
+        word = goal.words
         if self._jogs:
             try:
                 watch()
@@ -296,7 +356,7 @@ class GrblActuator:
         the axis: a computer may be busy in between.
         """
         began_s = changed_s = self.now_s()
-        seconds = goal.motor.seconds(goal.way, goal.speed)
+        seconds = goal.seconds
         latest_s = began_s + _LATE_RATIO * seconds + _LATE_S
         last = goal.start[goal.motor.index]
         while True:
@@ -307,7 +367,10 @@ class GrblActuator:
             if here != last:
                 last, changed_s = here, now_s
             if status.activity is Activity.IDLE:
-                if abs(here - goal.end[goal.motor.index]) <= goal.motor.tolerance:
+                if all(
+                    abs(position_of(status)[one.index] - goal.end[one.index]) <= one.tolerance
+                    for one in goal.motors
+                ):
                     self._expected = goal.end
                     return
                 if here != goal.start[goal.motor.index] or asked_s > began_s + _BEGIN_S:
@@ -329,16 +392,17 @@ class GrblActuator:
             raise self._wrong(goal, status, "was interrupted")
         position = position_of(status)
         for other in (self._insert, self._roll):
-            if other is goal.motor:
+            if other in goal.motors:
                 continue
             if abs(position[other.index] - goal.end[other.index]) > other.tolerance:
                 raise self._wrong(goal, status, f"also moves the axis {other.axis.letter}")
-        done = position[goal.motor.index] - goal.start[goal.motor.index]
-        along = math.copysign(done, done * goal.way) if done else 0.0
-        if along < -goal.motor.tolerance:
-            raise self._wrong(goal, status, "goes into the wrong direction")
-        if along > abs(goal.way) + goal.motor.tolerance:
-            raise self._wrong(goal, status, "went too far")
+        for motor in goal.motors:
+            way, done = goal.way_of(motor), position[motor.index] - goal.start[motor.index]
+            along = math.copysign(done, done * way) if done else 0.0
+            if along < -motor.tolerance:
+                raise self._wrong(goal, status, "goes into the wrong direction")
+            if along > abs(way) + motor.tolerance:
+                raise self._wrong(goal, status, "went too far")
 
     def _wrong(self, goal: _Goal, status: Status, what: str) -> DeviceError:
         """The error about a motion; nothing is moved after it."""

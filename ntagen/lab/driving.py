@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
-from ntagen.drive.device import LiveSensor, Watch, WatchedActuator
+from ntagen.drive.device import LiveSensor, Watch, WatchedActuator, can_screw, screw_on
 from ntagen.drive.outcome import Driven
 from ntagen.drive.real import drive
 from ntagen.drive.records import Journal, Journals
@@ -170,6 +170,14 @@ class _Hurried:
     def push(self, length_mm: float) -> None:
         with self._clock.at_rate(self._clock.speed):
             self._inner.push(length_mm)
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        with self._clock.at_rate(self._clock.speed):
+            screw_on(self._inner, length_mm, angle_rad)
+
+    @property
+    def can_screw(self) -> bool:
+        return can_screw(self._inner)
 
     def roll(self, angle_rad: float) -> None:
         with self._clock.at_rate(self._clock.speed):

@@ -107,7 +107,7 @@ class Judged:
 class _Arcs:
     """Arcs as rows: their starts, how long they may be, and where they branch off from which.
 
-    `choice` is the number of the roll and the spin in `Prospects.choices`.
+    Each has the roll before it, which is 0 where the spin alone changes, and its own spin.
     """
 
     start: Poses
@@ -115,7 +115,8 @@ class _Arcs:
     radius_mm: _Array
     parent: _Rows
     branch_mm: _Array
-    choice: _Rows
+    roll_rad: _Array
+    spin: _Array
 
     def nearest(self, rows: _Rows, places: _Array) -> tuple[_Array, _Array]:
         """The least distance of arcs to places, and where; see `Arc.nearest_to`."""
@@ -167,7 +168,8 @@ class Prospects:
         self._spins = (0.0, max(limits.spins)) if limits.spins else (0.0,)
         # After a roll by 0 another spin comes, and only then.
         angles = (*limits.roll_angles_rad, 0.0) if limits.spins else limits.roll_angles_rad
-        self._choices = [(angle, spin) for angle in angles for spin in range(len(self._spins))]
+        choices = [(angle, spin) for angle in angles for spin in self._spins]
+        self._rolls_rad, self._spins_after = np.array(choices).T
         target = scene.targets[-1]
         self._middle = np.array(target.center_mm)
         self._reach_mm = target.shape.reach_mm()
@@ -186,6 +188,7 @@ class Prospects:
         *,
         since_roll_mm: float = math.inf,
         way_rolls: int | None = None,
+        spin: float | None = None,
     ) -> Judged:
         """What is ahead of a place.
 
@@ -195,6 +198,8 @@ class Prospects:
             covariance_mm2: That of the error of the end, along x, y and z.
             since_roll_mm: How far the last roll is behind.
             way_rolls: The way has at most so many rolls; by default as many as the scene allows.
+            spin: The spin of the push that led there, which counts until the next roll; by default
+                any may come.
         """
         straight_mm = float(np.linalg.norm(self._middle - np.array(place.position_mm)))
         left_mm = min(left_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
@@ -206,7 +211,8 @@ class Prospects:
         useful_mm = self._inside_mm + SOFT_MM
         useful_mm += _FARTHEST_SIGMAS * math.sqrt(max(0.0, float(variances[-1])))
         best_mm, middle_mm, way = np.full(len(places), math.inf), self._inside_mm, None
-        levels = self._levels(place, left_mm, since_roll_mm, useful_mm)
+        spins = self._spins if spin is None else (spin,)
+        levels = self._levels(place, spins, left_mm, since_roll_mm, useful_mm)
         clear: _Flags = np.ones(len(levels[0].length_mm), dtype=bool)
         for index, arcs in enumerate(levels):
             rows = np.flatnonzero(clear)
@@ -232,7 +238,12 @@ class Prospects:
         return Judged(float(counted.mean()), None if way is None else self._plan(levels, *way))
 
     def _levels(
-        self, place: Pose, left_mm: float, since_roll_mm: float, useful_mm: float
+        self,
+        place: Pose,
+        spins: tuple[float, ...],
+        left_mm: float,
+        since_roll_mm: float,
+        useful_mm: float,
     ) -> list[_Arcs]:
         """All arcs: straight from the place, then those after one roll, two rolls and so on.
 
@@ -240,16 +251,14 @@ class Prospects:
         """
         limits = self._scene.limits
         vectors = (place.position_mm, place.heading, place.bevel)
-        count = len(self._spins)
+        count = len(spins)
         start = Poses(*(np.array([vector] * count, dtype=np.float64) for vector in vectors))
-        each = np.arange(count)
-        radii_mm = self._radius_mm / (1.0 - np.array(self._spins))
-        lengths_mm = np.full(count, left_mm)
-        levels = [_Arcs(start, lengths_mm, radii_mm, each, np.zeros(count), each)]
-        angles_rad = np.array([angle for angle, _ in self._choices])
-        spins = np.array([spin for _, spin in self._choices], dtype=np.intp)
+        none, spun = np.zeros(count), np.array(spins)
+        radii_mm = self._radius_mm / (1.0 - spun)
+        lengths_mm, rows = np.full(count, left_mm), np.arange(count)
+        levels = [_Arcs(start, lengths_mm, radii_mm, rows, none, none, spun)]
         apart_mm = limits.min_roll_distance_mm
-        roll_places = ROLL_PLACES if count == 1 else SPUN_PLACES
+        roll_places = ROLL_PLACES if len(self._spins) == 1 else SPUN_PLACES
         first_mm = max(0.0, apart_mm - since_roll_mm)
         for number in range(limits.max_rolls):
             before = levels[-1]
@@ -266,16 +275,15 @@ class Prospects:
             if not len(kept):
                 break
             # All branches of the first choice come first, then those of the next one.
-            each = np.tile(kept, len(angles_rad))
-            choice = np.repeat(np.arange(len(angles_rad)), len(kept))
+            each = np.tile(kept, len(self._rolls_rad))
+            roll_rad = np.repeat(self._rolls_rad, len(kept))
+            spun = np.repeat(self._spins_after, len(kept))
             if len(self._spins) > 1:
-                spin_before = spins[before.choice[rows[each]]]
-                turns = (angles_rad[choice] != 0.0) | (spins[choice] != spin_before)
-                each, choice = each[turns], choice[turns]
-            rolled = start.at(each).rolled(angles_rad[choice])
-            radius_mm = radii_mm[spins[choice]]
+                changes = (roll_rad != 0.0) | (spun != before.spin[rows[each]])
+                each, roll_rad, spun = each[changes], roll_rad[changes], spun[changes]
+            rolled, radii_mm = start.at(each).rolled(roll_rad), self._radius_mm / (1.0 - spun)
             levels.append(
-                _Arcs(rolled, rest_mm[each], radius_mm, rows[each], at_mm[each], choice)
+                _Arcs(rolled, rest_mm[each], radii_mm, rows[each], at_mm[each], roll_rad, spun)
             )
             first_mm = max(apart_mm, _LEAST_APART_MM)
         return levels
@@ -316,12 +324,11 @@ class Prospects:
         length_mm = foot_mm
         while True:
             arcs = levels[index]
-            angle_rad, spin = self._choices[int(arcs.choice[row])]
-            actions.insert(0, Push(length_mm, self._spins[spin]))
+            actions.insert(0, Push(length_mm, float(arcs.spin[row])))
             if index == 0:
                 return Plan.of(actions)
-            if angle_rad:
-                actions.insert(0, Roll(angle_rad))
+            if arcs.roll_rad[row]:
+                actions.insert(0, Roll(float(arcs.roll_rad[row])))
             length_mm, index, row = float(arcs.branch_mm[row]), index - 1, int(arcs.parent[row])
 
 
