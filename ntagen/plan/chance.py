@@ -123,12 +123,17 @@ def actions_of(plan: Plan, scene: Scene) -> tuple[int, ...]:
     """A plan as its model has it: 0 is a push of one step, else a roll by that number of degrees.
 
     Raises:
-        InputError: It has a wait, a part of a step, or a part of a degree.
+        InputError: It has a wait, a spin, a part of a step, or a part of a degree.
     """
     step_mm = step_length_mm(scene)
     actions: list[int] = []
     for action in plan.actions:
         if isinstance(action, Push):
+            if action.spin:
+                raise InputError(
+                    f"the plan pushes {action.length_mm:g} mm with a spin, and a tissue with chance"
+                    " has none\nhint: leave `spin` out of the task"
+                )
             count = action.length_mm / step_mm
             if abs(count - round(count)) > _WHOLE:
                 raise InputError(f"a push of {action.length_mm:g} mm is no number of whole steps")

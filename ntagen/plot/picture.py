@@ -73,6 +73,8 @@ class Picture:
     Attributes:
         scene: The regions and the needle's pose.
         best: The path of the best plan.
+        bent: The parts of it in which the needle does not spin; none if it never does.
+        spun: The parts of it in which the needle spins, which are dashed.
         others: The paths of other plans.
         true_path: The true path of the tip (simulation only).
         measured: Measured positions of the tip.
@@ -102,6 +104,8 @@ class Picture:
     moments: Sequence[Moment] = ()
     appears_s: Mapping[str, float] = field(default_factory=dict)
     clock_s: float = 0.0
+    bent: Sequence[Curve] = ()
+    spun: Sequence[Curve] = ()
 
 
 def draw(picture: Picture) -> Figure:
@@ -356,7 +360,7 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     # Curves that are joined do not darken each other.
     alpha = 0.6 if count > _MANY_CURVES else max(0.25, min(0.6, 15.0 / max(1, count)))
     measured = [picture.measured] if picture.measured else []
-    best = [picture.best] if picture.best else []
+    best = [picture.best] if picture.best and not picture.spun else picture.bent
     dots = {"marker": ".", "markersize": 2.5, "linestyle": "none"}
     other = {"color": OTHER, "linewidth": 0.7, "alpha": alpha, "label": picture.other_label}
     plan = {"color": NEEDLE, "linewidth": 2.2, "label": picture.best_label}
@@ -364,9 +368,11 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
     if picture.true_path:
         # The plan is a light band under the true path, so that both are visible.
         plan |= {"linewidth": 4.0, "alpha": 0.45}
+    spun = plan | {"linestyle": (0, (1.6, 0.8)), "label": f"{picture.best_label}, spinning"}
     return [
         (other | {"zorder": 4}, picture.others),
         (plan | {"zorder": 5}, best),
+        (spun | {"zorder": 5}, picture.spun),
         ({"color": MEASURED, **dots, "label": "measured", "zorder": 6}, measured),
         (true | {"zorder": 7}, picture.true_path),
     ]

@@ -24,7 +24,7 @@ from ntagen.drive.story import guaranteed, tell
 from ntagen.errors import InputError
 from ntagen.files import json_of
 from ntagen.needle.path import sample_poses
-from ntagen.plan.actions import Plan
+from ntagen.plan.actions import Plan, Push
 from ntagen.plan.branches import path_of
 from ntagen.plan.document import plan_from_json
 from ntagen.plan.synthesise import Synthesis
@@ -54,9 +54,12 @@ def picture_of_plans(scene: Scene, synthesis: Synthesis | None, shown: int) -> P
         clearance = clearance_of(candidates[0].certificate)
         caption += f"; best: {_shortened(str(candidates[0].plan))}{clearance and f', {clearance}'}"
         caption += f"\n{ranked_by(synthesis.ranking)}" if synthesis is not None else ""
+    bent, spun = parts_of(plans[0], scene.needle) if plans else ((), ())
     return Picture(
         scene=scene,
         best=curve(plans[0], scene.needle) if plans else (),
+        bent=bent,
+        spun=spun,
         others=[curve(plan, scene.needle) for plan in plans[1:]],
         caption=caption,
         clock_s=0.0 if scene.breath is None else scene.breath.clock_s,
@@ -74,14 +77,18 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
     learned = tuple(region for region in _last_scene(log).regions if region.name not in names)
     plans, needle = _last_plans(log, shown)
     best = curve(plans[0], needle) if plans else ()
+    bent, spun = parts_of(plans[0], needle) if plans else ((), ())
     others, labels = [curve(plan, needle) for plan in plans[1:]], ("last plan", "other plans")
     followed = _followed(log, shown)
     if followed is not None:
         (best, others), labels = followed, (FOLLOWED_LABEL, OTHER_LABEL)
+        bent, spun = (), ()
     ends = [record for record in log.records if isinstance(record, Ended)]
     return Picture(
         scene=actual.with_regions(*learned),
         best=best,
+        bent=bent,
+        spun=spun,
         others=others,
         best_label=labels[0],
         other_label=labels[1],
@@ -133,6 +140,18 @@ def curve(plan: Plan, needle: Needle) -> Curve:
     """The points of the path of a needle that follows a plan."""
     poses = sample_poses(plan.arcs(needle), _SPACING_MM)
     return [pose.position_mm for pose in poses]
+
+
+def parts_of(plan: Plan, needle: Needle) -> tuple[Sequence[Curve], Sequence[Curve]]:
+    """The parts of a plan's path without a spin, and those with one; none if none has."""
+    pushes = [action for action in plan.actions if isinstance(action, Push)]
+    if not any(push.spin for push in pushes):
+        return (), ()
+    parts: dict[bool, list[Curve]] = {False: [], True: []}
+    for push, arc in zip(pushes, plan.arcs(needle), strict=True):
+        poses = sample_poses((arc,), _SPACING_MM)
+        parts[push.spin > 0.0].append([pose.position_mm for pose in poses])
+    return parts[False], parts[True]
 
 
 def _shortened(plan: str) -> str:

@@ -160,7 +160,10 @@ def _paths(picture: Picture) -> Iterable[dict[str, Any]]:
     if picture.others:
         yield _path(picture.other_label, picture.others, OTHER, 1.0, 0.5)
     if picture.best:
-        yield _path(picture.best_label, [picture.best], NEEDLE, 3.0, 0.9)
+        best = picture.bent if picture.spun else [picture.best]
+        yield _path(picture.best_label, best, NEEDLE, 3.0, 0.9)
+    if picture.spun:
+        yield _path(f"{picture.best_label}, spinning", picture.spun, NEEDLE, 1.5, 0.9)
     if not picture.moments and picture.true_path:
         yield _path("true path", picture.true_path, TRUE, 1.5, 1.0)
 
