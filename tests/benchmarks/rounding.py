@@ -75,7 +75,8 @@ def text_of(task: Steering) -> str:
         "environment drawn {",
         f"  needle {{ radius {task.radius} mm  speed 1 mm/s  length {task.length} mm }}",
         f"  motion {{ step {task.push} s  roll by {', '.join(map(str, task.angles))} deg  "
-        f"at most {task.most_rolls} times  at least {task.between * task.push} mm apart }}",
+        f"at most {task.most_rolls} times  at least {task.between * task.push} mm apart  "
+        + (f"spin {', '.join(map(str, task.spins))} }}" if task.spins else "}"),
         f"  target T sphere {task.target.center} mm  radius {task.target.radius} mm",
     ]
     for number, solid in enumerate(task.avoided):

@@ -77,6 +77,8 @@ class Steering:
         between: The pushes between two of them, at least.
         target: What is to be reached at the end of a push.
         avoided: What must not be touched.
+        spins: The parts of the way in which the needle may spin; the curvature is less by them. The
+            part may change at a roll, and where there may be a roll, in its place.
     """
 
     radius: float
@@ -87,6 +89,7 @@ class Steering:
     between: int
     target: Ball
     avoided: tuple[Solid, ...]
+    spins: tuple[float, ...] = ()
 
 
 def has_plan(task: Steering, slack_mm: float) -> bool:
@@ -106,16 +109,23 @@ class _Search:
         position, heading = np.zeros((1, 3)), np.array([[0.0, -1.0, 0.0]])
         inward = np.array([[0.0, 0.0, -1.0]])
         most = int(self.task.length / self.task.push + 1e-9)
-        starts = [(position, heading, inward, np.array([most]))]
+        spins = (0.0, *self.task.spins)
+        starts = {spin: [(position, heading, inward, np.array([most]))] for spin in spins}
         if not self.is_free(position[:, None, :]).all():
             return False
         for rolls in range(self.task.most_rolls + 1):
-            ends: list[Any] = []
-            for start in starts:
-                # Before the first push a roll may come at once.
-                if self.follow(*start, ends, is_entry=rolls == 0):
-                    return True
-            starts = [self.rolled(ends, angle) for angle in self.task.angles] if ends else []
+            ends: dict[float, list[Any]] = {spin: [] for spin in spins}
+            for spin, some in starts.items():
+                for start in some:
+                    # Before the first push a roll may come at once.
+                    if self.follow(*start, ends[spin], spin, is_entry=rolls == 0):
+                        return True
+            everywhere = [end for some in ends.values() for end in some]
+            rolled = [self.rolled(everywhere, one) for one in self.task.angles if everywhere]
+            starts = {
+                spin: [*rolled, *(self.rolled(some, 0) for s, some in ends.items() if s != spin and some)]
+                for spin in spins
+            }
         return False
 
     def follow(
@@ -125,6 +135,7 @@ class _Search:
         inward: Array,
         left: NDArray[np.int64],
         ends: list[Any],
+        spin: float,
         *,
         is_entry: bool,
     ) -> bool:
@@ -134,16 +145,17 @@ class _Search:
             Whether one of them arrives.
         """
         task = self.task
+        radius = task.radius / (1.0 - spin)
         if is_entry:
             ends.append((position, heading, inward, left))
-        center = position + task.radius * inward
+        center = position + radius * inward
         fine = max(1, math.ceil(task.push / SPACING_MM))
         low = task.target.center[1] - task.target.radius + self.slack_mm
         alive = np.arange(len(position))
         for number in range(1, int(left.max(initial=0)) + 1):
             alive = alive[left[alive] >= number]
-            turns = (number - 1 + np.arange(1, fine + 1) / fine) * task.push / task.radius
-            points = center[alive, None, :] + task.radius * (
+            turns = (number - 1 + np.arange(1, fine + 1) / fine) * task.push / radius
+            points = center[alive, None, :] + radius * (
                 np.sin(turns)[None, :, None] * heading[alive, None, :]
                 - np.cos(turns)[None, :, None] * inward[alive, None, :]
             )

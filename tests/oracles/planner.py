@@ -18,17 +18,19 @@ from ntagen.shapes import Capsule
 
 Array = NDArray[np.float64]
 Steps = tuple[tuple[str, float], ...]
-"""A plan as ``("push", mm)`` and ``("roll", rad)``."""
+"""A plan as ``("push", mm)`` and ``("roll", rad)``; before a push there may be ``("spin", part)``."""
 
 
 @dataclass(frozen=True)
 class _Family:
-    """Many poses at once, each with the way that led to it."""
+    """Many poses at once, each with the way that led to it and the spin of what comes."""
 
     position: Array
     heading: Array
     bevel: Array
     ways: list[Steps]
+    spin: float = 0.0
+    must_push: bool = False
 
 
 def plans(scene: Scene, *, samples: int = 1) -> list[Steps]:
