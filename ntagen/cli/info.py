@@ -98,6 +98,7 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
 
             more = {
                 **precision_facts(loaded.task.scene),
+                "spins": list(loaded.task.scene.limits.spins),
                 "settings": _settings(configuration),
                 "regions": region_facts(loaded.task.scene),
             }
@@ -128,7 +129,7 @@ def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
 
 def _show_task(task: Task, configuration: Configuration) -> None:
     """Prints regions, devices and settings of an environment."""
-    from ntagen.cli.precision import precision_line
+    from ntagen.cli.precision import precision_line, spins_line
     from ntagen.cli.region_rows import region_rows
     from ntagen.cli.steering import show_settings
 
@@ -138,6 +139,8 @@ def _show_task(task: Task, configuration: Configuration) -> None:
     for row in region_rows(task.scene, ROWS_SHOWN):
         echo(f"  {row}")
     echo(precision_line(task.scene))
+    if (spins := spins_line(task.scene)) is not None:
+        echo(spins)
     for device in (task.device, task.tracker):
         if device is not None:
             echo(str(device))

@@ -32,5 +32,16 @@ def precision_line(scene: Scene) -> str:
     return f"resolution: {found.per_mm} per mm, {origin}: {found.bound}, {depth}"
 
 
+def spins_line(scene: Scene) -> str | None:
+    """The spins with their radii, for people; None without one."""
+    if not scene.limits.spins:
+        return None
+    circles = (
+        f"{100.0 * spin:g} % (radius {scene.needle.radius_mm / (1.0 - spin):.4g} mm)"
+        for spin in scene.limits.spins
+    )
+    return f"the needle may spin for {', '.join(circles)} of a push"
+
+
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None

@@ -147,7 +147,8 @@ def match_trace(scene: Scene, trace: Trace, options: Options | None = None) -> M
     Where the scene's targets and regions lie does not matter: the start is free.
 
     Raises:
-        InputError: The trace is longer than the needle, or so many rolls are not possible.
+        InputError: The trace is longer than the needle, so many rolls are not possible, or the
+            needle may spin.
     """
     return _Matcher(scene, trace, options or Options()).best()
 
@@ -158,6 +159,11 @@ class _Matcher:
     def __init__(self, scene: Scene, trace: Trace, options: Options) -> None:
         self._needle, self._trace, self._options = scene.needle, trace, options
         limits = scene.limits
+        if limits.spins:
+            raise InputError(
+                "a trace is explained by pushes and rolls, and the needle of the scene may spin\n"
+                "hint: leave `spin` out of the task"
+            )
         self._step_mm = step_length_mm(scene)
         self._angles_rad = limits.roll_angles_rad
         self._apart = max(1, math.ceil(limits.min_roll_distance_mm / self._step_mm - 1e-9))

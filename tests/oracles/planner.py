@@ -18,19 +18,17 @@ from ntagen.shapes import Capsule
 
 Array = NDArray[np.float64]
 Steps = tuple[tuple[str, float], ...]
-"""A plan as ``("push", mm)`` and ``("roll", rad)``; before a push there may be ``("spin", part)``."""
+"""A plan as ``("push", mm)`` and ``("roll", rad)``."""
 
 
 @dataclass(frozen=True)
 class _Family:
-    """Many poses at once, each with the way that led to it and the spin of what comes."""
+    """Many poses at once, each with the way that led to it."""
 
     position: Array
     heading: Array
     bevel: Array
     ways: list[Steps]
-    spin: float = 0.0
-    must_push: bool = False
 
 
 def plans(scene: Scene, *, samples: int = 1) -> list[Steps]:

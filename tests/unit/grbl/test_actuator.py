@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from ntagen.errors import DeviceError
+from ntagen.errors import DeviceError, Halted
 from ntagen.grbl.actuator import STOP_BYTES, GrblActuator, StoppedError
 from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
@@ -414,3 +414,54 @@ def test_lines_may_end_by_a_carriage_return_alone() -> None:
     bench = Bench(GRBL_11H)
     GrblActuator(Returning(bench.emulator), bench.axes).push(2.0)
     assert bench.plant.sums["X"] == pytest.approx(2.0, abs=0.005)
+
+
+@BOTH
+def test_a_screw_motion_moves_both_axes_at_once(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    letter = AXES[dialect.name].roll.letter
+    ratios: list[tuple[float, float]] = []
+    actuator.watch = lambda: ratios.append(
+        (bench.plant.sums.get("X", 0.0), -bench.plant.sums.get(letter, 0.0))
+    )
+    start_s = actuator.now_s()
+    actuator.screw(0.4, 2.0 * math.pi)
+    assert bench.plant.sums["X"] == pytest.approx(0.4, abs=0.01)
+    assert bench.plant.sums[letter] == pytest.approx(-360.0, abs=0.01)
+    # Four quarters of a second each, with ramps.
+    assert 4.0 < actuator.now_s() - start_s < 8.0
+    assert all(mm == pytest.approx(0.4 * deg / 360.0, abs=0.01) for mm, deg in ratios)
+    assert len(ratios) > 10
+    actuator.screw(3.0, -math.pi)
+    assert actuator.position[0] == pytest.approx(3.4)
+    assert bench.plant.sums[letter] == pytest.approx(-180.0, abs=0.01)
+
+
+@BOTH
+def test_a_screw_motion_that_is_ended_early_tells_its_part_by_the_angle(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+
+    def end() -> None:
+        raise Halted("enough")
+
+    actuator.watch = At(bench, 2.0, end)
+    with pytest.raises(Halted) as caught:
+        actuator.screw(0.4, 2.0 * math.pi)
+    letter = AXES[dialect.name].roll.letter
+    assert 0.1 < caught.value.part < 0.9
+    assert -bench.plant.sums[letter] == pytest.approx(360.0 * caught.value.part, abs=0.05)
+    assert bench.plant.sums["X"] == pytest.approx(0.4 * caught.value.part, abs=0.01)
+    actuator.roll(2.0 * math.pi * (1.0 - caught.value.part))
+    assert bench.plant.sums[letter] == pytest.approx(-360.0, abs=0.05)
+
+
+@BOTH
+def test_impossible_screw_motions_are_refused(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    for length_mm, angle_rad in ((-1.0, 1.0), (math.nan, 1.0), (1.0, math.inf)):
+        with pytest.raises(DeviceError, match="refuses to screw"):
+            actuator.screw(length_mm, angle_rad)
+    assert not bench.plant.sums
