@@ -127,9 +127,9 @@ def command(
 
     The picture shows two projections and a view in space. Targets are green, critical regions red,
     detection regions dashed orange, unexplored ones grey, safe ones dotted. The best plan is blue,
-    the others are faint; where the needle spins, it is dashed. In a tissue that answers (tissue adversarial), all branches of a strategy
-    against it are drawn instead, the expected one thick. For a run, the picture also shows the true
-    path, the measurements and what the driver learned.
+    the others are faint; where the needle spins, it is dashed. In a tissue that answers (tissue
+    adversarial), all branches of a strategy against it are drawn instead, the expected one thick.
+    For a run, the picture also shows the true path, the measurements and what the driver learned.
 
     A file that ends in .html is a page for a browser: you turn the scene with the mouse, switch
     regions and paths on and off, and step through the time of a run. It needs no network.

@@ -143,9 +143,7 @@ class PluginActuator:
         """See `ntagen.drive.device.Screwing.screw`."""
         if not math.isfinite(angle_rad):
             raise DeviceError(f"the device refuses to screw by {angle_rad}")
-        self._move(
-            "screw", lambda mm: screw_on(self._inner, mm, angle_rad), length_mm, least=0.0
-        )
+        self._move("screw", lambda mm: screw_on(self._inner, mm, angle_rad), length_mm, least=0.0)
 
     def roll(self, angle_rad: float) -> None:
         """See `ntagen.drive.device.WatchedActuator.roll`."""

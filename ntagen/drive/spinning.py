@@ -8,9 +8,9 @@ A cycle is at most `CYCLE_MM` long. Half of what bends comes before the turn, an
 that the end of the cycle lies where the arc of the mean curvature ends. The turns are whole ones,
 alternately forward and back, so that the shaft and its cables do not wind up.
 
-A motion that is ended early in a turn leaves the needle at some angle. `Spun.settle` makes the rest
-of that turn, or takes it back, whichever is nearer, without insertion. Nothing else moves the needle
-before.
+A motion that is ended early in a turn leaves the needle at some angle. `Spun.settle` makes the
+rest of that turn, or takes it back, whichever is nearer, without insertion. Nothing else moves the
+needle before.
 """
 
 from __future__ import annotations

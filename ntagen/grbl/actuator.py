@@ -396,12 +396,12 @@ class GrblActuator:
                 continue
             if abs(position[other.index] - goal.end[other.index]) > other.tolerance:
                 raise self._wrong(goal, status, f"also moves the axis {other.axis.letter}")
-        for motor in goal.motors:
-            way, done = goal.way_of(motor), position[motor.index] - goal.start[motor.index]
+        for one in goal.motors:
+            way, done = goal.way_of(one), position[one.index] - goal.start[one.index]
             along = math.copysign(done, done * way) if done else 0.0
-            if along < -motor.tolerance:
+            if along < -one.tolerance:
                 raise self._wrong(goal, status, "goes into the wrong direction")
-            if along > abs(way) + motor.tolerance:
+            if along > abs(way) + one.tolerance:
                 raise self._wrong(goal, status, "went too far")
 
     def _wrong(self, goal: _Goal, status: Status, what: str) -> DeviceError:

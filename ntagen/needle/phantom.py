@@ -169,9 +169,7 @@ class PhantomNeedle:
         require_possible(length_mm >= 0.0, "screw", length_mm)
         require_possible(math.isfinite(angle_rad), "screw", angle_rad)
         self._direction = 1.0
-        seconds = max(
-            length_mm / self._needle.speed_mm_per_s, abs(angle_rad) / ROLL_RAD_PER_S
-        )
+        seconds = max(length_mm / self._needle.speed_mm_per_s, abs(angle_rad) / ROLL_RAD_PER_S)
         bent_mm = abs(self._spin_error) * length_mm
         self._advance(bent_mm, turned_rad=math.pi if self._spin_error > 0.0 else 0.0)
         before_rad = self._tip_rad
@@ -320,9 +318,7 @@ class PhantomNeedle:
 
     # Motion.
 
-    def _step(
-        self, left_mm: float, turned_rad: float = 0.0, *, is_straight: bool = False
-    ) -> float:
+    def _step(self, left_mm: float, turned_rad: float = 0.0, *, is_straight: bool = False) -> float:
         """Moves the tip within one cell or piece; returns by how much.
 
         Args:

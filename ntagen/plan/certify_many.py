@@ -179,9 +179,7 @@ class _Batch:
             since_mm = entered[:, number]
         return entered
 
-    def _enters(
-        self, start: Poses, length_mm: _Array, radius_mm: _Array, number: int
-    ) -> _Array:
+    def _enters(self, start: Poses, length_mm: _Array, radius_mm: _Array, number: int) -> _Array:
         """Where arcs first touch a target; not a number if they never do; see `Arc.enters_at`."""
         first = len(self._avoided) + number
         middle, target_mm = self._middles[first : first + 1], self._radii[first]

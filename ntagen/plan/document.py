@@ -133,10 +133,10 @@ def _action_to_json(action: Action) -> dict[str, float]:
 
 def _action_from_json(action: object) -> Action:
     match action:
-        case {"push_mm": float() | int() as length_mm, "spin": float() | int() as spin}:
+        case {"push_mm": float() | int() as length_mm, **rest} if isinstance(
+            spin := rest.get("spin", 0.0), float | int
+        ):
             return Push(float(length_mm), float(spin))
-        case {"push_mm": float() | int() as length_mm} if "spin" not in action:
-            return Push(float(length_mm))
         case {"roll_deg": float() | int() as angle_deg}:
             return Roll(rad_from_deg(float(angle_deg)))
         case {"wait_s": float() | int() as seconds}:

@@ -123,7 +123,10 @@ class _Search:
             everywhere = [end for some in ends.values() for end in some]
             rolled = [self.rolled(everywhere, one) for one in self.task.angles if everywhere]
             starts = {
-                spin: [*rolled, *(self.rolled(some, 0) for s, some in ends.items() if s != spin and some)]
+                spin: [
+                    *rolled,
+                    *(self.rolled(some, 0) for s, some in ends.items() if s != spin and some),
+                ]
                 for spin in spins
             }
         return False

@@ -204,9 +204,7 @@ def test_a_turn_that_is_slower_than_the_insertion_counts() -> None:
 def driven(name: str, journal: Journals, seed: int = 1, settings: Settings = SLOW) -> Result:
     needle = choose(name, Errors())
     settings = needle.fitting(needle.usual(settings, DEEP), DEEP, "all")
-    return simulate(
-        DEEP, synthesiser_for(settings), settings, journal, make=needle.make, seed=seed
-    )
+    return simulate(DEEP, synthesiser_for(settings), settings, journal, make=needle.make, seed=seed)
 
 
 @pytest.mark.parametrize("name", ["virtual", "phantom", "grbl+sim"])
@@ -307,8 +305,7 @@ def test_a_needle_is_seen_in_a_turn() -> None:
         moved = Stepped(VirtualNeedle(needle, (), Errors(), 1, SimulatedClock()), 1.0)
         if looks:
             actuator = moved.actuator
-            actuator.watch = lambda moved=moved: moved._settle()  # type: ignore[misc]  # noqa: SLF001
+            actuator.watch = lambda moved=moved: moved._settle()  # type: ignore[misc]
         Spun(moved).spin(6.0, 0.5)
         ways.append(moved.true_tip.position_mm)
     assert distance(*ways) < 0.02
-

@@ -63,9 +63,7 @@ def test_the_way_of_the_virtual_needle_is_near_the_arc() -> None:
     Spun(needle).spin(20.0, 0.5)
     arcs = needle.pierced
     places = [arc.pose_at(s).position_mm for arc in arcs for s in (0.0, 0.5 * arc.length_mm)]
-    away = [
-        abs(math.dist(place, (0.0, 0.0, -60.0)) - 60.0) for place in places
-    ]
+    away = [abs(math.dist(place, (0.0, 0.0, -60.0)) - 60.0) for place in places]
     assert max(away) < 0.005
 
 
@@ -201,8 +199,8 @@ def test_the_derivatives_of_a_spun_channel_are_right() -> None:
     from ntagen.needle.channels import place, positions
 
     estimator, _ = estimated(31.0, Priors(curvature_drift=0.1, turn_drift_rad=0.1))
-    channels = estimator._channels  # noqa: SLF001
-    count = len(estimator._stds)  # noqa: SLF001
+    channels = estimator._channels
+    count = len(estimator._stds)
     numbers = np.random.default_rng(1)
     unknowns = 0.02 * numbers.standard_normal(count)
 
