@@ -81,10 +81,8 @@ class ContentResolver:
                 self._query(statement, draft)
             case tree.Setting():
                 self._setting(statement, scope, draft)
-            case tree.Roll():
-                self._roll(statement, scope, draft)
-            case tree.Spin():
-                self._spin(statement, scope, draft)
+            case tree.Roll() | tree.Spin():
+                self._turns(statement, scope, draft)
             case tree.Wait() | tree.Gate():
                 self._moves.rest(statement, scope, draft)
             case tree.Choice() | tree.Tissue():
@@ -230,6 +228,13 @@ class ContentResolver:
             dimension, role = NUMBERS[statement.keyword]
             number = self._evaluator.number(statement.value, scope, dimension, role)
             draft.numbers[statement.keyword] = Placed(number, span)
+
+    def _turns(self, statement: tree.Roll | tree.Spin, scope: Scope, draft: Draft) -> None:
+        """How the needle may be turned between pushes, or in them."""
+        if isinstance(statement, tree.Roll):
+            self._roll(statement, scope, draft)
+        else:
+            self._spin(statement, scope, draft)
 
     def _roll(self, statement: tree.Roll, scope: Scope, draft: Draft) -> None:
         """The rolls that may be chosen, and their limits."""

@@ -212,8 +212,8 @@ def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
 
     The words of later shapes are words only in a region, from the shape's word on, which is the
     first thing behind the region's name; those of a motion from `moves` on; and those of waits,
-    gates and spins only in the braces of `motion`. All of them not in parentheses, and not where a value must
-    begin.
+    gates and spins only in the braces of `motion`. All of them not in parentheses, and not where a
+    value must begin.
     """
     named: list[Token | Comment] = []
     words = _Words()

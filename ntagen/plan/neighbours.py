@@ -97,7 +97,8 @@ def neighbours(plan: Plan, scene: Scene) -> Iterator[Plan]:
     """The plans with one small change.
 
     A roll comes one step earlier or later, or by the next smaller or larger angle; or the needle
-    spins more or less between two rolls; or the plan is one step shorter or longer. Where regions move there are none: they would meet other places.
+    spins more or less between two rolls; or the plan is one step shorter or longer. Where regions
+    move there are none: they would meet other places.
     """
     if scene.breath is not None:
         return

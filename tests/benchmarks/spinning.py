@@ -1,13 +1,13 @@
 """What spinning the needle gives on random tasks: tasks with a plan, and drives that arrive.
 
-    python tests/benchmarks/spinning.py [--count 100] [--first 0] [--radii 30,164] [--spins 20,40,60]
-        [--drives 1] [--needle phantom] [--timeout 60]
+    python tests/benchmarks/spinning.py [--count 100] [--first 0] [--radii 30,164]
+        [--spins 20,40,60] [--drives 1] [--needle phantom] [--timeout 60] [--oracle]
 
 Each task has one target 40 to 100 mm deep, and up to seven spheres, capsules and boxes to avoid.
-Printed are the tasks that have a plan without and with `spin`, what both syntheses take, and how the
-drives with `spin` end: all of them, and those of the tasks that have a plan with it only. Drives have
-ten minutes on the needle's clock. Whether a region was touched is computed here from the arcs that
-were really cut.
+Printed are the tasks that have a plan without and with `spin`, what both syntheses take, and how
+the drives with `spin` end: all of them, and those of the tasks that have a plan with it only.
+Drives have ten minutes on the needle's clock. Whether a region was touched is computed here from
+the arcs that were really cut.
 
 A task has a plan if the model has a strategy. With --oracle the verdicts with `spin` of tasks with
 one roll are compared with all plans on exact circles: where a plan keeps 0.1 mm from everything,

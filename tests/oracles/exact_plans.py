@@ -122,11 +122,9 @@ class _Search:
                         return True
             everywhere = [end for some in ends.values() for end in some]
             rolled = [self.rolled(everywhere, one) for one in self.task.angles if everywhere]
+            kept = {spin: self.rolled(some, 0) for spin, some in ends.items() if some}
             starts = {
-                spin: [
-                    *rolled,
-                    *(self.rolled(some, 0) for s, some in ends.items() if s != spin and some),
-                ]
+                spin: [*rolled, *(some for other, some in kept.items() if other != spin)]
                 for spin in spins
             }
         return False

@@ -1,7 +1,7 @@
 """All plans of a needle that may spin, by brute force on exact circles, one push after the other.
 
-It shares no code with the product. The needle starts at the entry of the scene; regions to avoid and
-the only target are spheres, which are asked about at the ends of pushes.
+It shares no code with the product. The needle starts at the entry of the scene; regions to avoid
+and the only target are spheres, which are asked about at the ends of pushes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Plans of a needle that spins in a part of the way: their form, and those that the engine finds."""
+"""Plans of a needle that spins in a part of the way: their form, and what the engine finds."""
 
 from __future__ import annotations
 
@@ -246,7 +246,7 @@ def test_a_deep_target_is_reached_only_by_spinning() -> None:
 
 @pytest.mark.parametrize("spins", [(0.0,), (1.0,), (0.4, 0.4), (math.nan,)])
 def test_a_scene_refuses_other_spins(spins: tuple[float, ...]) -> None:
-    with pytest.raises(InputError, match="spun fraction|written twice"):
+    with pytest.raises(InputError, match=r"spun fraction|written twice"):
         replace(scene().limits, spins=spins)
 
 
