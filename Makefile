@@ -108,6 +108,7 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 	$(BIN)/python tests/benchmarks/needle.py
 	$(BIN)/python tests/benchmarks/syntheses.py
 	$(BIN)/python tests/benchmarks/rounding.py
+	$(BIN)/python tests/benchmarks/spinning.py --drives 0
 	$(BIN)/python tests/benchmarks/many_regions.py
 	$(BIN)/python tests/benchmarks/moving.py
 	$(BIN)/python tests/benchmarks/fields.py

@@ -16,6 +16,7 @@ from ntagen.drive.spinning import push_seconds
 from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
 from ntagen.drive.timing import timed
+from ntagen.drive.torsion import Lag
 from ntagen.drive.tube import Tube
 from ntagen.errors import LimitError
 from ntagen.needle.estimate import Estimate
@@ -188,12 +189,16 @@ class Planner:
         return Tube(scene, estimate, self._settings, regions)
 
     def _shorter(self, scene: Scene, back_mm: float) -> Scene:
-        """The scene with a needle so short that its plans, with all their rolls, end in time."""
+        """The scene with a needle so short that its plans, with all their rolls, end in time.
+
+        None of them spins the needle, since turns take time.
+        """
         angles_rad = (abs(Roll(one).turn_rad) for one in scene.limits.roll_angles_rad)
         turned_rad = (scene.limits.max_rolls + 1) * max(angles_rad, default=0.0)
         seconds = self._left_after_s(scene, back_mm) - turned_rad / self._settings.roll_rad_per_s
         length_mm = max(0.0, min(scene.needle.length_mm, seconds * scene.needle.speed_mm_per_s))
-        return replace(scene, needle=replace(scene.needle, length_mm=length_mm))
+        needle, limits = replace(scene.needle, length_mm=length_mm), replace(scene.limits, spins=())
+        return replace(scene, needle=needle, limits=limits)
 
     def _in_time(self, synthesis: Synthesis, back_mm: float) -> Synthesis:
         """The synthesis without the plans that cannot end within the time limit.
@@ -230,10 +235,13 @@ class Planner:
             periods_s = scene.breath.period_s * plan.roll_count
             return plan.length_mm / speed_mm_per_s + periods_s + plan.waits_s
         roll_rad_per_s = self._settings.roll_rad_per_s
+        lag = Lag(self._settings.compensated_lag_rad)
+        depth_mm, longer_s = self._needle.depth_mm, 0.0
+        for one in plan.actions:
+            if isinstance(one, Push):
+                depth_mm += one.length_mm
+            if isinstance(one, Push) and one.spin:
+                seconds = push_seconds(one, speed_mm_per_s, roll_rad_per_s, lag.at_rad(depth_mm))
+                longer_s += seconds - one.length_mm / speed_mm_per_s
         rolls_rad = sum(abs(one.turn_rad) for one in plan.actions if isinstance(one, Roll))
-        pushes_s = sum(
-            push_seconds(one.length_mm, one.spin, speed_mm_per_s, roll_rad_per_s)
-            for one in plan.actions
-            if isinstance(one, Push)
-        )
-        return pushes_s + rolls_rad / roll_rad_per_s
+        return plan.length_mm / speed_mm_per_s + rolls_rad / roll_rad_per_s + longer_s

@@ -21,6 +21,7 @@ from typing import Final
 from ntagen.drive.device import CANNOT_SPIN, Actuator, can_screw, rest, screw_on
 from ntagen.errors import DeviceError, Halted, InputError
 from ntagen.needle.screws import TURN_RAD
+from ntagen.plan.actions import Push
 from ntagen.scene import Scene
 
 CYCLE_MM: Final = 1.0
@@ -33,15 +34,21 @@ def cycles_of(length_mm: float) -> int:
     return max(1, math.ceil(length_mm / CYCLE_MM - 1e-9))
 
 
-def push_seconds(
-    length_mm: float, spin: float, speed_mm_per_s: float, roll_rad_per_s: float
-) -> float:
-    """How long a push takes; in a turn of a spin, the slower of both motions counts."""
-    seconds = length_mm / speed_mm_per_s
-    if not spin:
+def push_seconds(push: Push, speed_mm_per_s: float, roll_rad_per_s: float, lag_rad: float) -> float:
+    """How long a push takes.
+
+    Args:
+        push: The push; in a turn of its spin, the slower of both motions counts.
+        speed_mm_per_s: The speed of insertion.
+        roll_rad_per_s: The speed of turns.
+        lag_rad: By so much the base is turned ahead before each turn, and back after it.
+    """
+    seconds = push.length_mm / speed_mm_per_s
+    if not push.spin:
         return seconds
-    turns_s = cycles_of(length_mm) * TURN_RAD / roll_rad_per_s
-    return (1.0 - spin) * seconds + max(spin * seconds, turns_s)
+    cycles = cycles_of(push.length_mm)
+    spun_s = max(push.spin * seconds, cycles * TURN_RAD / roll_rad_per_s)
+    return (1.0 - push.spin) * seconds + spun_s + cycles * 2.0 * lag_rad / roll_rad_per_s
 
 
 def spun(actuator: Actuator, scene: Scene) -> Actuator:

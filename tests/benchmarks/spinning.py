@@ -125,12 +125,14 @@ def main() -> None:
             found.counts["LOST: a plan without, and none with"] += 1
         if arguments.oracle:
             compare(task, verdicts["with"], found)
-        for drive in range(arguments.drives if verdicts["with"] else 0):
-            end = driven(task, scene, arguments.needle, 100 * number + drive)
-            found.drives[end] += 1
-            if verdicts["without"] is False:
-                found.only_with[end] += 1
-        print(f"{number}: radius {task.radius}, {verdicts}", flush=True)
+        ends = [
+            driven(task, scene, arguments.needle, 100 * number + drive)
+            for drive in range(arguments.drives if verdicts["with"] else 0)
+        ]
+        found.drives.update(ends)
+        if verdicts["without"] is False:
+            found.only_with.update(ends)
+        print(f"{number}: radius {task.radius}, {verdicts}, {ends}", flush=True)
     for word, seconds_of in found.seconds.items():
         middle, longest = statistics.median(seconds_of), max(seconds_of)
         print(f"synthesis {word} spin: median {middle:.3f} s, at most {longest:.1f} s")

@@ -193,9 +193,10 @@ def test_pieces_are_cycles_and_change_the_circle() -> None:
 
 
 def test_a_turn_that_is_slower_than_the_insertion_counts() -> None:
-    assert push_seconds(10.0, 0.0, 2.0, math.pi) == 5.0
-    assert push_seconds(10.0, 0.4, 2.0, math.pi) == 3.0 + 20.0
-    assert push_seconds(10.0, 0.4, 0.1, math.pi) == 100.0
+    assert push_seconds(Push(10.0), 2.0, math.pi, 0.1) == 5.0
+    assert push_seconds(Push(10.0, 0.4), 2.0, math.pi, 0.0) == 3.0 + 20.0
+    assert push_seconds(Push(10.0, 0.4), 2.0, math.pi, 0.25 * math.pi) == 3.0 + 25.0
+    assert push_seconds(Push(10.0, 0.4), 0.1, math.pi, 0.0) == 100.0
 
 
 # ------------------------------------------------------------------------------------------ drives
