@@ -34,6 +34,11 @@ def cycles_of(length_mm: float) -> int:
     return max(1, math.ceil(length_mm / CYCLE_MM - 1e-9))
 
 
+def bent_last_mm(push: Push) -> float:
+    """How much of a push with a spin comes after its last turn."""
+    return 0.5 * (1.0 - push.spin) * push.length_mm / cycles_of(push.length_mm)
+
+
 def push_seconds(push: Push, speed_mm_per_s: float, roll_rad_per_s: float, lag_rad: float) -> float:
     """How long a push takes.
 

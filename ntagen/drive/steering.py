@@ -19,6 +19,8 @@ from ntagen.drive.lateness import Lateness
 from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
+from ntagen.drive.spinning import bent_last_mm, push_seconds
+from ntagen.drive.torsion import Lag
 from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
@@ -59,6 +61,8 @@ class Steering:
         self._lateness = Lateness()
         self._speed_mm_per_s = needle.speed_mm_per_s
         self._pull_speed_mm_per_s = settings.pull_speed_ratio * needle.speed_mm_per_s
+        self._roll_rad_per_s = settings.roll_rad_per_s
+        self._lag = Lag(settings.compensated_lag_rad)
         self._radius_mm = needle.radius_mm
         self._cut_mm = self._all_cut_mm = 0.0
         self._left: tuple[Arc, ...] = ()
@@ -115,12 +119,26 @@ class Steering:
         finally:
             from_mm = self._estimator.depth_mm
             self._estimator.push(made_mm, spin)
-            self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._speed_mm_per_s)
+            self._note(began_s, from_mm, action)
             self.path = self.path.push(action.radius_mm(self._radius_mm), made_mm)
             self._all_cut_mm += max(0.0, self.path.depth_mm - self._cut_mm)
             self._cut_mm = max(self._cut_mm, self.path.depth_mm)
             self._has_grown = True
         return True
+
+    def _note(self, began_s: float, from_mm: float, action: Push) -> None:
+        """Notes a push for late measurements: turns take time, and what comes after them less."""
+        to_mm, speed_mm_per_s = self._estimator.depth_mm, self._speed_mm_per_s
+        if action.spin:
+            lag_rad = self._lag.at_rad(self.path.depth_mm)
+            last_mm = bent_last_mm(action)
+            seconds = push_seconds(action, speed_mm_per_s, self._roll_rad_per_s, lag_rad)
+            seconds -= last_mm / speed_mm_per_s
+            first_mm = action.length_mm - last_mm
+            turned_mm = min(to_mm, from_mm + first_mm)
+            self._lateness.note(began_s, from_mm, turned_mm, first_mm / seconds)
+            began_s, from_mm = began_s + seconds, turned_mm
+        self._lateness.note(began_s, from_mm, to_mm, speed_mm_per_s)
 
     def settle(self) -> None:
         """Ends a turn in which a push with a spin was ended early."""
