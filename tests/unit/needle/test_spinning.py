@@ -195,10 +195,44 @@ def test_drifts_do_not_disturb_spins() -> None:
     assert estimate.radius_mm == pytest.approx(30.0, rel=0.02)
 
 
-def test_the_derivatives_of_a_spun_channel_are_right() -> None:
+@pytest.mark.parametrize("priors", [Priors(), Priors(curvature_drift=0.1, turn_drift_rad=0.1)])
+def test_a_spin_changes_what_is_expected_and_no_unknown(priors: Priors) -> None:
+    """Each stretch of 5 mm has its unknowns once, also if the spin changes in it."""
+    even, spun = Estimator(ENTRY, 30.0, priors), Estimator(ENTRY, 30.0, priors)
+    for length_mm, spin in ((3.0, 0.4), (2.0, 0.0), (4.0, 0.0), (3.0, 0.6)):
+        even.push(length_mm)
+        spun.push(length_mm, spin)
+    assert spun._stds == even._stds
+    stretches = spun._channels[0].stretches
+    inner = [5.0, 9.0, 10.0] if priors.curvature_drift else [9.0]
+    assert [one.offset_mm for one in stretches] == [0.0, 3.0, *inner]
+    assert [one.spin for one in stretches][:2] == [0.4, 0.0]
+    assert stretches[-1].spin == 0.6
+    assert spun.estimate().radius_mm == pytest.approx(30.0)
+    depths_mm = [arc.length_mm for arc in spun.estimate().path.arcs]
+    radii_mm = [arc.radius_mm for arc in spun.estimate().path.arcs]
+    assert sum(depths_mm) == pytest.approx(12.0)
+    assert radii_mm[:2] == pytest.approx([50.0, 30.0])
+    assert radii_mm[-1] == pytest.approx(75.0)
+
+
+def test_what_a_bite_takes_away_is_less_by_the_spin() -> None:
+    """A length without bend, at the beginning of a channel that leaves another one by spinning."""
+    priors = Priors(bite_mm=2.0)
+    estimator = Estimator(ENTRY, 30.0, priors)
+    estimator.push(20.0)
+    estimator.pull(8.0)
+    estimator.push(10.0, 0.4)
+    headings = [pose.heading for pose in (ENTRY, estimator.estimate().tip)]
+    assert math.acos(dot(*headings)) == pytest.approx((12.0 + 0.6 * (10.0 - 2.0)) / 30.0)
+
+
+@pytest.mark.parametrize("bite_mm", [0.0, 1.5])
+def test_the_derivatives_of_a_spun_channel_are_right(bite_mm: float) -> None:
     from ntagen.needle.channels import place, positions
 
-    estimator, _ = estimated(31.0, Priors(curvature_drift=0.1, turn_drift_rad=0.1))
+    priors = Priors(curvature_drift=0.1, turn_drift_rad=0.1, first_ratio=0.2, bite_mm=bite_mm)
+    estimator, _ = estimated(31.0, priors)
     channels = estimator._channels
     count = len(estimator._stds)
     numbers = np.random.default_rng(1)
