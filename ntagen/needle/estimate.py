@@ -245,7 +245,8 @@ class Estimator:
             return
         channel, inserted_mm = self._inserted[-1] if self._inserted else (ENTRY, 0.0)
         # A tip that turns does not follow an old channel.
-        leaves = channel != ENTRY and spin > 0.0 and inserted_mm < self._channels[channel].extent_mm
+        old_mm = self._channels[channel].extent_mm - inserted_mm if channel != ENTRY else 0.0
+        leaves = spin > 0.0 and old_mm > 1e-9
         if channel != ENTRY and not self._pending_rolls and not leaves:
             self._inserted[-1] = (channel, inserted_mm + length_mm)
             self._extend(channel, inserted_mm + length_mm, spin)

@@ -216,6 +216,18 @@ def test_a_spin_changes_what_is_expected_and_no_unknown(priors: Priors) -> None:
     assert radii_mm[-1] == pytest.approx(75.0)
 
 
+def test_a_needle_at_the_end_of_its_channel_has_none_to_leave() -> None:
+    """Rounding of the lengths does not count."""
+    estimator = Estimator(ENTRY, 30.0, Priors(bite_mm=2.0))
+    estimator.push(0.7)
+    estimator.pull(0.6)
+    for _ in range(3):
+        estimator.push(0.6 / 3.0)
+    assert 0.0 < 0.7 - estimator.depth_mm < 1e-9
+    estimator.push(10.0, 0.4)
+    assert len(estimator._channels) == 1
+
+
 def test_what_a_bite_takes_away_is_less_by_the_spin() -> None:
     """A length without bend, at the beginning of a channel that leaves another one by spinning."""
     priors = Priors(bite_mm=2.0)
