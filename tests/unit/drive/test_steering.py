@@ -6,10 +6,13 @@ import math
 
 import pytest
 
+from ntagen.drive.device import Assembly
 from ntagen.drive.settings import Settings
+from ntagen.drive.spinning import Spun
 from ntagen.drive.steering import Steering
 from ntagen.needle.errors import Errors
 from ntagen.needle.virtual import SimulatedClock, VirtualNeedle
+from ntagen.plan.actions import Push
 from tests.drive.runs import Diary
 from tests.steering import PAPER
 
@@ -17,7 +20,7 @@ from tests.steering import PAPER
 def steering() -> Steering:
     needle = PAPER.needle
     device = VirtualNeedle(needle, (), Errors(), 1, SimulatedClock())
-    return Steering(needle, device, Settings(), Diary(), lambda: None)
+    return Steering(needle, Assembly(Spun(device), device), Settings(), Diary(), lambda: None)
 
 
 def pushed(needle: Steering, length_mm: float) -> list[bool]:
@@ -25,7 +28,7 @@ def pushed(needle: Steering, length_mm: float) -> list[bool]:
     cuts = []
     for _ in range(round(length_mm)):
         cuts.append(needle.cuts)
-        needle.push(1.0)
+        needle.push(Push(1.0))
     return cuts
 
 
@@ -56,3 +59,12 @@ def test_a_roll_in_the_old_channel_leaves_it_at_once() -> None:
     needle.roll(0.5 * math.pi)
     assert all(pushed(needle, 3.0))
     assert needle.cut_mm == pytest.approx(13.0)
+
+
+def test_a_spin_in_the_old_channel_leaves_it_at_once() -> None:
+    needle = steering()
+    pushed(needle, 10.0)
+    needle.pull_back_to(5.0)
+    needle.push(Push(2.0, 0.5))
+    assert needle.cuts
+    assert needle.cut_mm == pytest.approx(12.0)
