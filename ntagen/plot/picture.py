@@ -418,7 +418,9 @@ def _set_scales(
     axes.set_ylim(limits[1])
     axes.set_zlim(limits[2] if picture.scene.axis[depth] <= 0.0 else limits[2][::-1])
     for name, i in zip("xyz", order, strict=True):
-        getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=8)
+        # The numbers of the upright axis stand beside it, where its label is.
+        pad = 16 if name == "z" else 8
+        getattr(axes, f"set_{name}label")(f"{_AXES[i]} [mm]", fontsize=8, labelpad=pad)
     axes.tick_params(labelsize=6.5, pad=0)
     lengths = [high - low for low, high in limits]
     for pane, length_mm in zip((axes.xaxis, axes.yaxis, axes.zaxis), lengths, strict=True):
