@@ -94,7 +94,7 @@ class Learner:
         return self._rise is not None
 
     def learn(self) -> None:
-        """Turns a rise that was felt into a region, ahead of the place where it began."""
+        """Turns a rise that was felt into a region, ahead of where it was felt."""
         rise, self._rise = self._rise, None
         if rise is None:
             return

@@ -53,7 +53,7 @@ class Tube:
         self._roll_rad = settings.priors.roll_std_rad(estimate.path.depth_mm)
         # The spread grows evenly enough between three places.
         self._at_mm = (0.0, 0.5 * self._length_mm, self._length_mm)
-        self._std_mm = [estimate.position_std_mm(at_mm) for at_mm in self._at_mm if regions]
+        self._std_mm = [estimate.position_std_mm(at_mm) for at_mm in self._at_mm] if regions else []
 
     def confidence(self, plan: Plan) -> float:
         """The probability that the tip touches no region until the driver looks again."""
