@@ -467,7 +467,8 @@ PARAMETERS: Final = (
         "timeout_s",
         "time limit",
         "time",
-        "Stop the run after this time on the needle's clock.",
+        "Stop the run after this time on the needle's clock; if it is not given, after three "
+        "straight insertions to the last target, but not before 120 s.",
         is_above=True,
         option="--timeout",
     ),

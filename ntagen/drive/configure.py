@@ -5,8 +5,10 @@ The command line wins over the file, and the file over the defaults. Each value 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
+from itertools import pairwise
 from typing import Final
 
 from ntagen.drive.needles import Chosen, choose
@@ -14,6 +16,7 @@ from ntagen.drive.reliance import with_default_margins
 from ntagen.drive.settings import STEERING, Settings, value_of, with_values
 from ntagen.errors import InputError
 from ntagen.needle.errors import Errors
+from ntagen.needle.vectors import distance
 from ntagen.parameters import NEEDLE, PARAMETERS, Given, Parameter, Value
 from ntagen.scene import Scene
 from ntagen.values import dataclass
@@ -26,6 +29,11 @@ DEFAULT: Final = "default"
 
 _RADIUS: Final = f"{NEEDLE}.radius_mm"
 _RADIUS_ERROR: Final = f"{NEEDLE}.radius_ratio"
+_WAYS: Final = 3.0
+"""A run may take as long as so many insertions along the straight way to the last target, if that
+is more than the usual limit: after a failure half way, the next plan may begin at the entry; ours.
+"""
+
 _NO_FORCE: Final = "follows from force sensing off"
 _AS_NEEDLE: Final = "follows from the scene and the needle"
 
@@ -105,7 +113,7 @@ def configure(
     steering = {p.field: values[p.field] for p in STEERING if p.field in values}
     try:
         default = Settings()
-        usual = its_needle.usual(default, scene)
+        usual = its_needle.usual(replace(default, timeout_s=_limit_s(default, scene)), scene)
         for p in STEERING:
             if p.field not in origins and value_of(usual, p.field) != value_of(default, p.field):
                 origins[p.field] = _AS_NEEDLE
@@ -118,6 +126,13 @@ def configure(
     seed = values.get(f"{NEEDLE}.seed", 0)
     whole_seed = int(seed) if isinstance(seed, int) else 0
     return Configuration(settings, errors, whole_seed, origins, its_needle)
+
+
+def _limit_s(default: Settings, scene: Scene) -> float:
+    """The time limit of a run if nobody gives one."""
+    places = [scene.needle.tip.position_mm, *(target.center_mm for target in scene.targets)]
+    way_mm = sum(distance(one, other) for one, other in pairwise(places))
+    return max(default.timeout_s, math.ceil(_WAYS * way_mm / scene.needle.speed_mm_per_s))
 
 
 def _exact(given: Given) -> Value:

@@ -240,6 +240,8 @@ class Controller:
                 places.append((depth_mm, best))
                 if is_enough(best.certificate, self._needle.known, _ENOUGH_BEHIND_MM):
                     break
+        if not places and self._learner.doubt():
+            return self._look_back()
         if not places:
             event, self.reason = self._planner.lack.event()
             return event

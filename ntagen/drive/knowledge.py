@@ -13,6 +13,9 @@ an earlier ball, no plan can pass between the two, and one ball replaces them: t
 all contacts and the channels that were cut (`ntagen.needle.contact`), else the smallest ball
 around both. The shell of a learned region contains all its contacts, so the driver cannot try the
 same path for ever. No learned region is put over a channel that was cut safely, or a safe region.
+
+If no plan is left with the regions as they are assumed, smaller ones are assumed (`doubted`): only
+contacts are facts, and the force is watched wherever the needle goes.
 """
 
 from __future__ import annotations
@@ -205,6 +208,27 @@ class Knowledge:
         known = self._with_ball(_Felt(ball, (contact,)), assumed, channels)
         return replace(known, contacts=contacts)
 
+    def doubted(self, assumed: Assumed) -> Knowledge | None:
+        """The knowledge with smaller learned regions; None if they are as small as can be.
+
+        How large a region is, is a guess; only its contacts are facts.
+        """
+        contacts = dict(self.felt)
+        balls = [region for region in self.learned if region.kind == "critical"]
+        if all(ball.radius_mm <= _LEAST_GUESS_MM for ball in balls):
+            return None
+        smaller = []
+        for ball in balls:
+            felt = contacts.get(ball.name, ())
+            radius_mm = min(ball.radius_mm, max(_LEAST_GUESS_MM, 0.5 * ball.radius_mm))
+            center = ball.center_mm
+            if len(felt) == 1:
+                ahead_mm = felt[0].away_mm + radius_mm
+                center = combine(1.0, felt[0].position_mm, ahead_mm, felt[0].heading)
+            shape = Sphere(center, radius_mm)
+            smaller.append(_Felt(replace(ball, shape=shape), felt))
+        return self._with_felt(smaller, assumed)
+
     def _felt(
         self, place: Vector, margin_mm: float, unsure_mm: float, clock_s: float
     ) -> Region | None:
@@ -252,8 +276,12 @@ class Knowledge:
             else:
                 balls = [one for one in balls if one not in near]
                 pending.append(joined)
+        return self._with_felt([*balls, *apart], assumed)
+
+    def _with_felt(self, balls: Sequence[_Felt], assumed: Assumed) -> Knowledge:
+        """The same with these learned balls, and their shells."""
         known = [r for r in self.learned if r.kind == "detection" and r.name.endswith(" felt")]
-        kept = [one.clear_of(self.a_priori.safe) for one in (*balls, *apart)]
+        kept = [one.clear_of(self.a_priori.safe) for one in balls]
         regions = [one.region for one in kept]
         shells = [
             Region.ball(
@@ -339,6 +367,9 @@ _PASSED_SPACING_MM = 2.0
 
 _LEAST_RADIUS_MM = 0.1
 """A learned region is at least this large, also if it was felt at a safe one."""
+
+_LEAST_GUESS_MM = 0.5
+"""No region is assumed smaller than this."""
 
 _MOST_UNSURE_MM = 2.0
 """The shell of a learned region is made wider by its uncertainty, but not by more than this."""

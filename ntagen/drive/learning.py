@@ -99,14 +99,26 @@ class Learner:
         if rise is None:
             return
         self._force.forget_rise()
-        before = self.knowledge.learned
-        self.knowledge = self.knowledge.with_contact(
+        known = self.knowledge.with_contact(
             self._contact(rise),
             assumed_of(self._settings),
             self._needle.channels,
             position_unsure_mm(self._settings),
             self.clock_s(self._needle.seen_s),
         )
+        self._know(known)
+
+    def doubt(self) -> bool:
+        """Assumes smaller regions where some were felt; whether any got smaller."""
+        known = self.knowledge.doubted(assumed_of(self._settings))
+        if known is None:
+            return False
+        self._know(known)
+        return True
+
+    def _know(self, known: Knowledge) -> None:
+        """Records what is learned, and what is not assumed any more."""
+        before, self.knowledge = self.knowledge.learned, known
         for region in self.knowledge.learned:
             if region not in before:
                 self._journal.record(Learned.of(self._needle.now_s(), region))

@@ -68,7 +68,8 @@ class Settings:
         accept: A needle that does not bend exactly as planned is pushed only if it touches no known
             critical region with this confidence until the driver looks again (`ntagen.drive.tube`),
             and it has reached the last target if it is there with this confidence.
-        timeout_s: A run ends after this time (paper, section 4).
+        timeout_s: A run ends after this time (paper, section 4); `ntagen.drive.configure` gives
+            more for deep targets.
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
             ours.
         learned_radius_mm: The radius of a learned critical region; ours.

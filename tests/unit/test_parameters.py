@@ -18,6 +18,7 @@ from ntagen.drive.settings import Settings, value_of
 from ntagen.errors import InputError
 from ntagen.needle.virtual import Errors
 from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, Given, Parameter, Value
+from ntagen.shapes import Sphere
 from tests.scenes import PAPER, paper
 
 BODY = (
@@ -134,6 +135,17 @@ def test_the_priors_follow_the_errors_of_the_needle_unless_they_are_given() -> N
     wrong = configure((noisy, on_line("prior noise", "0.2mm")), PAPER)
     assert wrong.settings.priors.noise_mm == 0.2
     assert wrong.errors.noise_mm == 0.7
+
+
+def test_a_deep_target_has_more_time() -> None:
+    assert configure((), PAPER).settings.timeout_s == 150.0
+    (target,) = PAPER.targets
+    deep = dataclasses.replace(target, shape=Sphere((0.0, -80.0, 0.0), 5.0))
+    assert configure((), PAPER.with_targets([deep])).settings.timeout_s == 240.0
+    near = dataclasses.replace(target, shape=Sphere((0.0, -20.0, 0.0), 5.0))
+    assert configure((), PAPER.with_targets([near])).settings.timeout_s == 120.0
+    given = configure((on_line("time limit", "90s"),), PAPER.with_targets([deep]))
+    assert given.settings.timeout_s == 90.0
 
 
 def test_without_force_sensing_plans_keep_a_distance() -> None:

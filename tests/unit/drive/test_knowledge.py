@@ -167,3 +167,36 @@ def test_a_learned_region_does_not_reach_into_a_safe_one() -> None:
     ball, shell = knowledge.learned
     assert ball.radius_mm == pytest.approx(1.0)
     assert distance(tip.position_mm, shell.center_mm) <= shell.radius_mm + 1e-9
+
+
+def test_a_smaller_region_has_its_surface_where_it_was_felt() -> None:
+    contact = felt_at(pose_at(0.0, -20.0, 0.0), away_mm=0.75)
+    assumed = replace(ASSUMED, clearance_mm=0.75)
+    known = Knowledge(scene()).with_contact(contact, assumed)
+    for radius_mm in (1.0, 0.5):
+        smaller = known.doubted(assumed)
+        assert smaller is not None
+        ball, shell = smaller.learned
+        assert ball.radius_mm == radius_mm
+        assert ball.distance_mm(contact.position_mm) == pytest.approx(0.75)
+        # So the same way is not tried again.
+        assert shell.distance_mm(contact.position_mm) == pytest.approx(0.0, abs=1e-9)
+        known = smaller
+    assert known.doubted(assumed) is None
+
+
+def test_a_smaller_region_keeps_all_its_contacts_in_its_shell() -> None:
+    contacts = [felt_at(pose_at(x, -20.0, 0.0)) for x in (-2.0, 2.0)]
+    known = Knowledge(scene())
+    for one in contacts:
+        known = known.with_contact(one, ASSUMED)
+    smaller = known.doubted(ASSUMED)
+    assert smaller is not None
+    ball, shell = smaller.learned
+    assert ball.radius_mm < known.learned[0].radius_mm
+    assert all(shell.distance_mm(one.position_mm) <= 1e-9 for one in contacts)
+
+
+def test_nothing_that_was_told_gets_smaller() -> None:
+    known = Knowledge(scene(CRITICAL, DETECTION))
+    assert known.doubted(ASSUMED) is None
