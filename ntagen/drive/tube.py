@@ -54,12 +54,20 @@ class Tube:
         # The spread grows evenly enough between three places.
         self._at_mm = (0.0, 0.5 * self._length_mm, self._length_mm)
         self._std_mm = [estimate.position_std_mm(at_mm) for at_mm in self._at_mm] if regions else []
+        # Many plans begin alike.
+        self._known: dict[Plan, float] = {}
 
     def confidence(self, plan: Plan) -> float:
         """The probability that the tip touches no region until the driver looks again."""
         if not self._regions:
             return 1.0
         first = first_part(plan, self._length_mm)
+        if first not in self._known:
+            self._known[first] = self._confidence(first)
+        return self._known[first]
+
+    def _confidence(self, first: Plan) -> float:
+        """That of what is done until the driver looks again."""
         is_rolled = any(isinstance(action, Roll) for action in first.actions)
         points, std_mm, way_mm = [], [], 0.0
         for arc in first.arcs(self._needle) or (Arc(self._needle.tip, math.inf, 0.0),):

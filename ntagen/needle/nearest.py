@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 TOLERANCE_MM: Final = 1e-3
 """A distance to a shape that is no sphere is at most this much too small, and never too great."""
 
-_SLOPE_MM: Final = 0.25 * TOLERANCE_MM
+SLOPE_MM: Final = 0.25 * TOLERANCE_MM
 """A slope is that between two places so far from each other."""
 
 _FIRST_PIECE_MM: Final = 4.0
@@ -58,9 +58,14 @@ def nearest_to(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
     if isinstance(shape, Sphere):
         found = nearest_on(tuple(arcs), entry_mm, shape.middle_mm)
         return Nearest(found.distance_mm - shape.radius_mm, found.at_mm)
-    is_smooth = shape.is_convex and shape.error_mm == 0.0
-    found = (_nearest_to_convex if is_smooth else _nearest_by_pieces)(arcs, entry_mm, shape)
+    find = _nearest_to_convex if is_smooth(shape) else _nearest_by_pieces
+    found = find(arcs, entry_mm, shape)
     return Nearest(found.distance_mm - TOLERANCE_MM - shape.excess_mm, found.at_mm)
+
+
+def is_smooth(shape: Shape) -> bool:
+    """Whether it is no sphere, and slopes of its distance tell where an arc comes nearest."""
+    return not isinstance(shape, Sphere) and shape.is_convex and shape.error_mm == 0.0
 
 
 def _nearest_to_convex(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> Nearest:
@@ -87,8 +92,8 @@ def _nearest_to_convex(arcs: Sequence[Arc], entry_mm: Vector, shape: Shape) -> N
             best_mm, best_at_mm = away_mm, start_mm + at_mm
         if away_mm - half_mm >= best_mm - 0.5 * TOLERANCE_MM:
             continue
-        next_mm = shape.distance_at_mm(arc.position_at(at_mm + _SLOPE_MM))
-        slope = (next_mm - away_mm) / _SLOPE_MM + 0.5 * _SLOPE_MM / arc.radius_mm
+        next_mm = shape.distance_at_mm(arc.position_at(at_mm + SLOPE_MM))
+        slope = (next_mm - away_mm) / SLOPE_MM + 0.5 * SLOPE_MM / arc.radius_mm
         bend_mm = 0.5 * half_mm**2 / arc.radius_mm
         quarter_mm = 0.5 * half_mm
         for side in (-1.0, 1.0):

@@ -293,6 +293,16 @@ class PhantomNeedle:
         return self._parameters
 
     @property
+    def radius_mm(self) -> float:
+        """The nominal radius; for reports and tests."""
+        return self._needle.radius_mm
+
+    @property
+    def tissue(self) -> Tissue:
+        """The tissue; for reports and tests."""
+        return self._tissue
+
+    @property
     def base_rad(self) -> float:
         """The angle of the base; for reports and tests."""
         return self._base_rad

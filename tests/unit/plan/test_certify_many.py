@@ -10,16 +10,18 @@ from dataclasses import replace
 import pytest
 
 from ntagen import checker
+from ntagen.needle.nearest import TOLERANCE_MM
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import Certificate, certify
 from ntagen.plan.certify_many import certify_all
 from ntagen.plan.document import plan_document, plan_line
 from ntagen.plan.extract import extract, pages_of
+from ntagen.plan.prospects import first_part
 from ntagen.plan.rank import Candidate
 from ntagen.plan.synthesise import STRATEGY_QUERY, Margins
 from ntagen.render import render
 from ntagen.scene import Region, Scene
-from ntagen.shapes import Capsule
+from ntagen.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
 from tests.scenes import PAPER, with_limits
 
 NEAR_MM = 1e-9
@@ -34,6 +36,15 @@ SCENES = {
             Region("V", "critical", Capsule((-9.0, -20.0, 4.0), (9.0, -20.0, 4.0), 1.0, 1.0)),
             *PAPER.criticals,
         ),
+    ),
+    "solids": replace(
+        PAPER,
+        criticals=(
+            *PAPER.criticals,
+            Region("B", "critical", Box((5.0, -30.0, 2.0), (4.0, 6.0, 3.0)).grown(0.7)),
+            Region("C", "critical", Cylinder((-6.0, -40.0, 0.0), (-6.0, -40.0, 9.0), 2.0)),
+        ),
+        unexplored=(Region("H", "unexplored", HalfSpace((0.0, 0.0, 40.0), (0.0, 0.1, 1.0))),),
     ),
     "free bevel": with_limits(PAPER, free_bevel=True),
 }
@@ -53,11 +64,15 @@ def some_plans() -> list[Plan]:
 def numbers(certificate: Certificate) -> list[float]:
     """All lengths and places of a certificate; -1 where a target is not entered."""
     found = [*certificate.end_mm, certificate.end_distance_mm, certificate.length_mm]
-    found += [one.distance_mm for one in certificate.clearances]
     for arrival in certificate.arrivals:
         entered_mm = -1.0 if arrival.entered_at_mm is None else arrival.entered_at_mm
         found += [entered_mm, arrival.depth_mm]
     return found
+
+
+def error_mm(region: Region) -> float:
+    """How far two certificates may be apart."""
+    return NEAR_MM if isinstance(region.shape, Sphere) else TOLERANCE_MM
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -69,9 +84,17 @@ def test_many_certificates_are_those_of_single_plans(name: str) -> None:
         assert together.roll_count == alone.roll_count
         names = [(one.region, one.kind) for one in together.clearances]
         assert names == [(one.region, one.kind) for one in alone.clearances]
-        for near, same in zip(together.clearances, alone.clearances, strict=True):
+        for near, same, region in zip(
+            together.clearances, alone.clearances, scene.avoided, strict=True
+        ):
+            assert near.distance_mm == pytest.approx(same.distance_mm, abs=error_mm(region))
             # Where two places are equally near, either may be given.
-            assert near.at_mm == pytest.approx(same.at_mm, abs=1e-6)
+            if error_mm(region) == NEAR_MM:
+                assert near.at_mm == pytest.approx(same.at_mm, abs=1e-6)
+                continue
+            place = Plan.of(first_part(plan, near.at_mm).actions).end(scene.needle).position_mm
+            away_mm = region.distance_mm(place)
+            assert 0.0 <= away_mm - near.distance_mm <= TOLERANCE_MM + NEAR_MM
 
 
 @pytest.mark.parametrize("name", SCENES)
