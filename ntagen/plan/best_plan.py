@@ -12,7 +12,8 @@ single plan, several times, each time for more than the best plan so far has:
 3. with that clearance, and fewer rolls.
 
 If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
-Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
+Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less;
+and none for fewer rolls, which changed no drive.
 If nothing known is in the straight way to the target, the plans along it are listed last: there
 a region that nobody told of is least likely, since it is the way that the operator looked at.
 
@@ -112,7 +113,7 @@ class BestPlanSynthesiser:
             known.lower_rolls()
             known.straighten()
             is_listed = sequences(scene) <= MOST_WHEN_NARROW
-            if known.is_narrow and is_listed and scene.breath is None:
+            if known.asks_for_list and is_listed and scene.breath is None:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
                 return self.engine(scene)
@@ -156,10 +157,15 @@ class _Known:
         return len(self._plans)
 
     @property
-    def is_narrow(self) -> bool:
-        """Whether the best plan is so near to a region that a better one is worth waiting for."""
+    def asks_for_list(self) -> bool:
+        """Whether no plan holds, or a better one than the best is worth waiting for.
+
+        Where the reserve counts, the list of all plans changed no drive.
+        """
         best = self._best()
-        return best is None or best.certificate.critical_clearance_mm < _NARROW_MM
+        if best is None or self._counts_reserve:
+            return best is None
+        return best.certificate.critical_clearance_mm < _NARROW_MM
 
     def raise_worth(self) -> None:
         """Asks for more than the best plan has, as far as it is useful."""
@@ -212,13 +218,13 @@ class _Known:
     def lower_rolls(self) -> None:
         """Asks for fewer rolls at the clearance of the best plan."""
         best = self._best()
-        if "rolls" not in self._asker.engine.ranking or best is None:
+        # Where the reserve counts, other plans are chosen for what they do first.
+        if self._counts_reserve or "rolls" not in self._asker.engine.ranking or best is None:
             return
         if best.certificate.roll_count == 0:
             return
         fewer = replace(self._scene.limits, max_rolls=best.certificate.roll_count - 1)
-        most_mm = USEFUL_RESERVE_MM if self._counts_reserve else USEFUL_CLEARANCE_MM
-        useful_mm = min(most_mm, self._worth_mm())
+        useful_mm = min(USEFUL_CLEARANCE_MM, self._worth_mm())
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
     def straighten(self) -> None:

@@ -50,6 +50,9 @@ _LEAST_APART_MM: Final = 4.0
 _SAMPLE_MM: Final = 2.0
 """Ways are sampled this densely for what they touch."""
 
+_PIECE_MM: Final = 8.0
+"""Ways are looked at in pieces of this length first."""
+
 SOFT_MM: Final = 1.0
 """Over this length at the surface of the target, an error counts in part: a prospect that jumps
 would make the driver jump."""
@@ -151,6 +154,15 @@ def _squares(points: _Array, places: _Array) -> _Array:
     """The squares of the distances of all points to all places."""
     squares = np.einsum("ni,ni->n", points, points)[:, None] - 2.0 * points @ places.T
     return np.asarray(squares + np.einsum("ki,ki->k", places, places))
+
+
+def _pieces(length_mm: _Array, most_mm: float) -> tuple[_Rows, _Array, _Array]:
+    """Equal pieces, at most so long: of which length each is one, its middle and its half."""
+    counts = np.maximum(1, np.ceil(length_mm / most_mm)).astype(np.intp)
+    owners = np.repeat(np.arange(len(counts)), counts)
+    half_mm = (0.5 * length_mm / counts)[owners]
+    number = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return owners, (2 * number + 1) * half_mm, half_mm
 
 
 class Prospects:
@@ -307,16 +319,25 @@ class Prospects:
         regions = self._scene.avoided
         if not regions or not len(rows):
             return np.full(len(rows), math.inf)
-        counts = np.maximum(1, np.ceil(length_mm / _SAMPLE_MM)).astype(np.intp)
-        starts = np.cumsum(counts) - counts
-        number = np.arange(1, counts.sum() + 1) - np.repeat(starts, counts)
-        at_mm = np.minimum(_SAMPLE_MM * number, np.repeat(length_mm, counts))
-        owners = np.repeat(rows, counts)
-        points = arcs.start.at(owners).places(arcs.radius_mm[owners], at_mm)
-        touches = np.zeros(len(points), dtype=bool)
-        for region in regions:
-            touches |= region.shape.distance_mm(points) <= 0.0
-        return np.asarray(np.minimum.reduceat(np.where(touches, at_mm, math.inf), starts))
+        # Of pieces of this length, most are nowhere near a region.
+        pieces, middle_mm, half_mm = _pieces(length_mm, _PIECE_MM)
+        is_near = self._away_mm(arcs, rows[pieces], middle_mm) <= half_mm + _TINY_MM
+        pieces, middle_mm, half_mm = pieces[is_near], middle_mm[is_near], half_mm[is_near]
+        if not len(pieces):
+            return np.full(len(rows), math.inf)
+        parts, along_mm, apart_mm = _pieces(2.0 * half_mm, _SAMPLE_MM)
+        # Each part is looked at where it ends.
+        at_mm = (middle_mm - half_mm)[parts] + along_mm + apart_mm
+        touches = self._away_mm(arcs, rows[pieces[parts]], at_mm) <= 0.0
+        touched_mm = np.full(len(rows), math.inf)
+        np.minimum.at(touched_mm, pieces[parts[touches]], at_mm[touches])
+        return touched_mm
+
+    def _away_mm(self, arcs: _Arcs, rows: _Rows, at_mm: _Array) -> _Array:
+        """The least distance to what is to be avoided at places of arcs; negative inside."""
+        points = arcs.start.at(rows).places(arcs.radius_mm[rows], at_mm)
+        away = [one.shape.distance_mm(points) for one in self._scene.avoided]
+        return np.asarray(np.min(away, axis=0))
 
     def _plan(self, levels: list[_Arcs], index: int, row: int, foot_mm: float) -> Plan:
         """The way that ends on this arc of a level."""
