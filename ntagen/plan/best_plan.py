@@ -9,11 +9,11 @@ single plan, several times, each time for more than the best plan so far has:
    not much longer than the first. Where there is none, less is asked for: half of what is between.
    Where there is one, but its exact path comes nearer than the model's, small changes make it
    better (`ntagen.plan.neighbours`);
-3. with that clearance, and fewer rolls.
+3. with that clearance, and fewer rolls, if they come before the length in the ranking: else the
+   answer changed no drive.
 
 If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
-Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less;
-and none for fewer rolls, which changed no drive.
+Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
 If nothing known is in the straight way to the target, the plans along it are listed last: there
 a region that nobody told of is least likely, since it is the way that the operator looked at.
 
@@ -218,13 +218,13 @@ class _Known:
     def lower_rolls(self) -> None:
         """Asks for fewer rolls at the clearance of the best plan."""
         best = self._best()
-        # Where the reserve counts, other plans are chosen for what they do first.
-        if self._counts_reserve or "rolls" not in self._asker.engine.ranking or best is None:
+        if not _prefers_few_rolls(self._asker.engine.ranking) or best is None:
             return
         if best.certificate.roll_count == 0:
             return
         fewer = replace(self._scene.limits, max_rolls=best.certificate.roll_count - 1)
-        useful_mm = min(USEFUL_CLEARANCE_MM, self._worth_mm())
+        most_mm = USEFUL_RESERVE_MM if self._counts_reserve else USEFUL_CLEARANCE_MM
+        useful_mm = min(most_mm, self._worth_mm())
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
     def straighten(self) -> None:
@@ -287,6 +287,12 @@ class _Known:
         if self._counts_reserve:
             return reserve_of(best.certificate)
         return best.certificate.critical_clearance_mm
+
+
+def _prefers_few_rolls(ranking: tuple[str, ...]) -> bool:
+    """Whether rolls come before the length in a ranking."""
+    before, _, _ = ",".join(ranking).partition("length")
+    return "rolls" in before
 
 
 def sequences(scene: Scene) -> float:

@@ -36,7 +36,9 @@ def useful_mm(synthesis: Synthesis) -> float:
 def test_its_best_plan_is_about_as_good_as_the_best_of_all(where: Scene) -> None:
     within_budget, all_listed = both(where)
     assert useful_mm(within_budget) >= useful_mm(all_listed) - 0.7
-    assert set(within_budget.candidates) <= set(all_listed.candidates)
+    # Certificates that are computed together may differ in the last digits.
+    every = {one.plan for one in all_listed.candidates}
+    assert {one.plan for one in within_budget.candidates} <= every
     assert within_budget.found < all_listed.found
     assert (within_budget.is_complete, all_listed.is_complete) == (False, True)
 
