@@ -189,6 +189,9 @@ def _run(
         target_mm=target_mm,
         depth_mm=ended.depth_mm,
         adjustments=ended.adjustments,
+        cut_mm=ended.cut_mm,
+        confidence=ended.confidence if says_reached else None,
+        error_mm=ended.error_mm if says_reached else None,
         needle_s=ended.time_s,
         syntheses=tuple(
             Synthesised(one.found, one.hold, one.engine_seconds, one.loop_seconds)
@@ -215,6 +218,9 @@ def _broken(row: Row, seed: int, error: Exception, log: str) -> Run:
         target_mm=None,
         depth_mm=0.0,
         adjustments=0,
+        cut_mm=0.0,
+        confidence=None,
+        error_mm=None,
         needle_s=0.0,
         syntheses=(),
         profile=Profile(),

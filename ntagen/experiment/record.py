@@ -81,6 +81,10 @@ class Run:
         target_mm: The distance of the true tip to the last target's surface; negative inside.
         depth_mm: The insertion depth at the end.
         adjustments: How often the needle was pulled back.
+        cut_mm: The length of all channels that were cut.
+        confidence: The probability that the tip is in the last target, by the last estimate; None
+            if the driver does not say that it is there.
+        error_mm: The standard deviation of the tip's position by that estimate.
         needle_s: The time on the needle's clock, which stands still during syntheses.
         syntheses: Each synthesis.
         profile: The run by its depth.
@@ -99,6 +103,9 @@ class Run:
     target_mm: float | None
     depth_mm: float
     adjustments: int
+    cut_mm: float
+    confidence: float | None
+    error_mm: float | None
     needle_s: float
     syntheses: tuple[Synthesised, ...]
     profile: Profile

@@ -67,7 +67,8 @@ def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
     """A row of the table.
 
     The hit rate is about the needle's true path, and so is "reached": the driver says so, and the
-    true tip is in the target. Overall times are those of the needle and of all syntheses of a run.
+    true tip is in the target. Confidence and error of the tip are those of the driver, in runs that end
+    with the tip in the target. Overall times are those of the needle and of all syntheses of a run.
     """
     sound = [run for run in runs if run.target_mm is not None]
     syntheses = [one for run in sound for one in run.syntheses]
@@ -96,6 +97,9 @@ def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
         "hit_high": hit.high,
         "outcomes": dict(sorted(Counter(run.outcome for run in runs).items())),
         "adjustments": _spread(spread_of(run.adjustments for run in sound)),
+        "cut_mm": _spread(spread_of(run.cut_mm for run in sound)),
+        "confidence": _spread(spread_of(one.confidence for one in sound if one.confidence)),
+        "error_mm": _spread(spread_of(one.error_mm for one in sound if one.error_mm)),
         "syntheses": _spread(spread_of(len(run.syntheses) for run in sound)),
         "plans": _spread(spread_of(plans)),
         "plans_total": sum(plans),

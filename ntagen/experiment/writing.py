@@ -18,6 +18,8 @@ HEADINGS: Final = (
     "Runs",
     "TR reach (95 %)",
     "CR hit (95 %)",
+    "Confidence",
+    "Error [mm]",
     "Adjustments",
     "Plans",
     "Synthesis [s]",
@@ -27,6 +29,8 @@ HEADINGS: Final = (
 
 NOTE: Final = (
     "In brackets: least, mean and greatest value. Intervals are those of Clopper and Pearson. "
+    "Confidence is the probability that the tip is in the target, as the driver says it when it "
+    "ends there; error is the standard deviation of the tip then. "
     "Plans are those of all runs together. A synthesis is the engine's time for it; overall is the "
     "time on the needle's clock, and that of all syntheses of a run. Lines of the paper were "
     "measured on its computer."
@@ -122,6 +126,8 @@ def _line(row: Mapping[str, Any]) -> tuple[str, ...]:
         str(row["runs"]) if row["runs"] == row["wanted"] else f"{row['runs']} of {row['wanted']}",
         _rate(row, "reach"),
         _rate(row, "hit"),
+        _spread(row["confidence"], 3),
+        _spread(row["error_mm"], 2),
         _spread(row["adjustments"], 2),
         str(row["plans_total"]),
         _spread(row["synthesis_s"], 3),
@@ -136,6 +142,8 @@ def _paper_line(line: Mapping[str, Any]) -> tuple[str, ...]:
         "5 to 7" if line["runs"] is None else str(line["runs"]),
         f"{line['reach_rate']:.1%}",
         f"{line['hit_rate']:.1%}",
+        "",
+        "",
         _spread(_named(line["adjustments"]), 2),
         str(line["plans"]),
         _spread(_named(line["synthesis_s"]), 2),

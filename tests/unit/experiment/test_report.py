@@ -45,6 +45,9 @@ def run(row: str, seed: int, *, reached: bool = True, clear_mm: float = 1.0, **m
         clearance_mm=clear_mm,
         target_mm=-1.0 if reached else 5.0,
         depth_mm=40.0,
+        cut_mm=45.0,
+        confidence=0.96 + 0.01 * (seed % 4) if reached else None,
+        error_mm=0.2 if reached else None,
         needle_s=40.0 + seed,
         syntheses=(Synthesised(10, 8, 0.01, 0.05), Synthesised(4, 0, 0.02, 0.06)),
         profile=Profile((0, 1, 2), (3.0, 2.0, clear_mm), (None, 0.1, 0.2)),
@@ -79,6 +82,10 @@ def test_rows_count_reached_and_hits(document: Mapping[str, Any]) -> None:
     assert (row["reached"], row["hits"], row["runs"], row["wanted"]) == (2, 1, 4, 4)
     assert (row["plans_total"], row["plans_hold_total"]) == (56, 32)
     assert row["adjustments"] == {"min": 0, "avg": 0.75, "max": 2}
+    assert row["cut_mm"] == {"min": 45.0, "avg": 45.0, "max": 45.0}
+    # Only of runs that end in the target.
+    assert row["confidence"]["min"] == pytest.approx(0.96)
+    assert row["error_mm"] == {"min": 0.2, "avg": pytest.approx(0.2), "max": 0.2}
     assert row["synthesis_s"] == {"min": 0.01, "avg": pytest.approx(0.015), "max": 0.02}
     assert row["overall_s"]["max"] == pytest.approx(44.11)
     assert row["settings"] == {"noise": "0.1 mm"}
@@ -88,9 +95,10 @@ def test_rows_count_reached_and_hits(document: Mapping[str, Any]) -> None:
 def test_lines_have_those_of_the_paper_below_them(document: Mapping[str, Any]) -> None:
     first, paper, free = lines_of(document)
     assert first[:5] == ("a_b%", "none", "4", "50.0% (6.8 to 93.2)", "25.0% (0.6 to 80.6)")
-    assert first[5:] == ("(0, 0.75, 2)", "56", "(0.010, 0.015, 0.020)", "(41.1, 42.6, 44.1)")
+    assert first[5:7] == ("(0.960, 0.965, 0.970)", "(0.20, 0.20, 0.20)")
+    assert first[7:] == ("(0, 0.75, 2)", "56", "(0.010, 0.015, 0.020)", "(41.1, 42.6, 44.1)")
     assert paper[:4] == ("paper: Small/None", "", "50", "100.0%")
-    assert paper[7:] == ("(6.63, 6.71, 6.96)", "(18.8, 23.8, 33.3)")
+    assert paper[9:] == ("(6.63, 6.71, 6.96)", "(18.8, 23.8, 33.3)")
     assert free[2] == "1 of 2"
 
 
