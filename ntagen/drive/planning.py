@@ -155,7 +155,9 @@ class Planner:
 
     def _found(self, scene: Scene, rest: Plan | None) -> Synthesis:
         """The plans of a scene, and the rest of a plan if that holds, best first."""
-        found = self._synthesise(scene)
+        asks_more = prefers(self._settings) and scene.breath is None
+        asked = self.tube(scene, self._needle.known).asked() if asks_more else None
+        found = self._synthesise(scene) if asked is None else self._synthesise(scene, asked)
         if rest is not None:
             found = found.with_plan(rest)
         if not prefers(self._settings):
