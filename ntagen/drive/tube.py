@@ -18,11 +18,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cached_property
 from statistics import NormalDist
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ntagen.drive.records import Foreseen
 from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import Arc
@@ -31,6 +34,8 @@ from ntagen.plan.prospects import first_part
 from ntagen.plan.stricter import deeper
 from ntagen.rounding import MOST_ERROR_MM
 from ntagen.scene import Region, Scene
+
+_Array = NDArray[np.float64]
 
 _SAMPLE_MM: Final = 0.5
 """Ways are sampled this densely."""
@@ -64,31 +69,55 @@ class Tube:
         self._roll_rad = settings.priors.roll_std_rad(estimate.path.depth_mm)
         # The spread grows evenly enough between three places.
         self._at_mm = (0.0, 0.5 * self._length_mm, self._length_mm)
-        self._std_mm = [estimate.position_std_mm(at_mm) for at_mm in self._at_mm] if regions else []
+        self._estimate = estimate
+
+    @cached_property
+    def _std_mm(self) -> list[float]:
+        return [self._estimate.position_std_mm(at_mm) for at_mm in self._at_mm]
 
     def confidence(self, plan: Plan) -> float:
         """The probability that the tip touches no region until the driver looks again."""
         if not self._regions:
             return 1.0
-        first = first_part(plan, self._length_mm)
-        is_rolled = any(isinstance(action, Roll) for action in first.actions)
-        points, std_mm, way_mm = [], [], 0.0
-        for arc in first.arcs(self._needle) or (Arc(self._needle.tip, math.inf, 0.0),):
-            count = max(1, math.ceil(arc.length_mm / _SAMPLE_MM))
-            for along_mm in np.linspace(0.0, arc.length_mm, count + 1):
-                points.append(arc.pose_at(float(along_mm)).position_mm)
-                at_mm = way_mm + float(along_mm)
-                # A roll that errs turns the bend after it to the side.
-                aside_mm = self._roll_rad * at_mm**2 / (2.0 * self._needle.radius_mm)
-                known_mm = float(np.interp(at_mm, self._at_mm, self._std_mm))
-                std_mm.append(math.hypot(known_mm, aside_mm if is_rolled else 0.0))
-            way_mm += arc.length_mm
-        places, stds_mm = np.array(points), np.maximum(_LEAST_STD_MM, std_mm)
+        _, places, stds_mm = self._along(plan)
         touched = 0.0
         for region in self._regions:
             sigmas = float(np.min(region.shape.distance_mm(places) / stds_mm))
             touched += _NORMAL.cdf(-sigmas)
         return max(0.0, 1.0 - touched)
+
+    def foreseen(self, plan: Plan, time_s: float, depth_mm: float) -> Foreseen:
+        """The record of the tube of a plan that begins at this time and depth."""
+        lengths_mm, places, stds_mm = self._along(plan)
+        x_mm, y_mm, z_mm = places.T.tolist()
+        return Foreseen(
+            time_s=time_s,
+            depth_mm=depth_mm,
+            length_mm=tuple(lengths_mm.tolist()),
+            std_mm=tuple(stds_mm.tolist()),
+            x_mm=tuple(x_mm),
+            y_mm=tuple(y_mm),
+            z_mm=tuple(z_mm),
+            confidence=self.confidence(plan),
+        )
+
+    def _along(self, plan: Plan) -> tuple[_Array, _Array, _Array]:
+        """Samples of a plan's first part: lengths from the tip, places, standard deviations."""
+        first = first_part(plan, self._length_mm)
+        is_rolled = any(isinstance(action, Roll) for action in first.actions)
+        lengths_mm, points, std_mm, way_mm = [], [], [], 0.0
+        for arc in first.arcs(self._needle) or (Arc(self._needle.tip, math.inf, 0.0),):
+            count = max(1, math.ceil(arc.length_mm / _SAMPLE_MM))
+            for along_mm in np.linspace(0.0, arc.length_mm, count + 1):
+                points.append(arc.pose_at(float(along_mm)).position_mm)
+                at_mm = way_mm + float(along_mm)
+                lengths_mm.append(at_mm)
+                # A roll that errs turns the bend after it to the side.
+                aside_mm = self._roll_rad * at_mm**2 / (2.0 * self._needle.radius_mm)
+                known_mm = float(np.interp(at_mm, self._at_mm, self._std_mm))
+                std_mm.append(math.hypot(known_mm, aside_mm if is_rolled else 0.0))
+            way_mm += arc.length_mm
+        return np.array(lengths_mm), np.array(points), np.maximum(_LEAST_STD_MM, std_mm)
 
     def asked(self) -> Scene:
         """The scene that the model is asked for plans of: nearly all of them hold in the tube.

@@ -140,3 +140,17 @@ def test_the_model_starts_outside_of_its_regions_and_ends_deep_in_the_target() -
     depth_mm = where.targets[-1].radius_mm - asked.targets[-1].radius_mm
     assert depth_mm == pytest.approx(SETTINGS.margins.depth_mm + 0.05)
     assert (asked.safety, asked.resolution_per_mm) == ("swept", None)
+
+
+def test_the_record_of_a_tube_says_how_far_the_tip_may_be_off() -> None:
+    region = beside(END, 1.5 * STD_MM)
+    tube = Tube(here(), ESTIMATE, SETTINGS, (region,))
+    record = tube.foreseen(STRAIGHT_ON, 7.0, 10.0)
+    assert (record.time_s, record.depth_mm) == (7.0, 10.0)
+    assert record.confidence == tube.confidence(STRAIGHT_ON) < 1.0
+    assert record.length_mm[0] == 0.0
+    assert record.length_mm[-1] == pytest.approx(SETTINGS.review_mm)
+    assert record.std_mm[0] == pytest.approx(ESTIMATE.position_std_mm(0.0))
+    assert record.std_mm[-1] == pytest.approx(STD_MM)
+    end_mm = (record.x_mm[-1], record.y_mm[-1], record.z_mm[-1])
+    assert end_mm == pytest.approx(END.position_mm)
