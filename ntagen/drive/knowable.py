@@ -2,7 +2,7 @@
 
 At best, the needle bends as expected, is never rolled or pulled back, and is measured all along the
 way. What the estimator then knows of the tip at the target is not exceeded in a run: in random
-tasks with the phantom needle, runs end with the same standard deviation, or up to 6 % more.
+tasks with the phantom needle, runs end with the same standard deviation, or up to 7 % more.
 """
 
 from __future__ import annotations
