@@ -93,6 +93,7 @@ class Parameter:
         most: A value must be less than this, if it is given.
         option: Its option of ``ntagen drive``; by default made of its words.
         choices: The words that it can have.
+        sample: A value as an example; by default that of its kind.
     """
 
     field: str
@@ -104,6 +105,7 @@ class Parameter:
     option: str = ""
     choices: tuple[str, ...] = ()
     most: float | None = None
+    sample: str = ""
 
     @property
     def flag(self) -> str:
@@ -124,7 +126,7 @@ class Parameter:
     @property
     def example(self) -> str:
         """How it is written in a file, as an example."""
-        return f"{self.words} {MEASURES[self.kind].example}"
+        return f"{self.words} {self.sample or MEASURES[self.kind].example}"
 
     def breach(self, value: Value) -> Breach | None:
         """What is wrong with a value in the unit of the field, or None."""
@@ -164,7 +166,7 @@ class Parameter:
         if match is None or factor is None:
             units = ", ".join(unit for unit in measure.units if unit)
             hint = f"; units are {units}" if units else ""
-            example = measure.example.replace(" ", "")
+            example = (self.sample or measure.example).replace(" ", "")
             raise ValueError(f"'{text}' is not {measure.noun}; write for example {example}{hint}")
         value = float(match[1]) * factor
         breach = self.breach(value)
@@ -462,6 +464,7 @@ PARAMETERS: Final = (
         "at, and the tip is in the target.",
         is_above=True,
         most=1.0,
+        sample="0.95",
     ),
     Parameter(
         "timeout_s",

@@ -11,6 +11,7 @@ from dataclasses import field, fields, replace
 from itertools import pairwise
 from typing import Final
 
+from ntagen.drive.knowable import require_knowable
 from ntagen.drive.needles import Chosen, choose
 from ntagen.drive.reliance import with_default_margins
 from ntagen.drive.settings import STEERING, Settings, value_of, with_values
@@ -120,6 +121,7 @@ def configure(
         settings = with_values(usual, steering)
         settings = _fitting(settings, its_needle, scene, known, origins)
         settings = _with_margins(settings, origins)
+        require_knowable(settings, scene)
     except InputError as error:
         said = [f"`{one.parameter.words}`: {one.origin}" for one in chosen.values()]
         raise InputError("\n".join([str(error), *(f"note: {line}" for line in said)])) from error

@@ -378,6 +378,7 @@ class Controller:
             self._rest = rest
             return Event.PLAN_IS_THIN
         self._follow(scene, rest)
+        self._planner.note_tube(rest, scene, estimate)
         return Event.AS_PREDICTED
 
     def _left(self, estimate: Estimate) -> tuple[Scene, Plan]:
@@ -448,6 +449,7 @@ class Controller:
             raise AssertionError("a synthesis without a plan was adopted")
         self._agree(f"follow the plan {best.plan}")
         self._follow(synthesis.scene, best.plan)
+        self._planner.note_tube(best.plan, synthesis.scene, self._needle.known)
         self._reviewed_mm = self._needle.depth_mm
 
     def _keep_pace(self, action: Action) -> bool:

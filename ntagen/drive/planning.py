@@ -155,7 +155,9 @@ class Planner:
 
     def _found(self, scene: Scene, rest: Plan | None) -> Synthesis:
         """The plans of a scene, and the rest of a plan if that holds, best first."""
-        found = self._synthesise(scene)
+        has_tube = self._has_tube(scene)
+        asked = self.tube(scene, self._needle.known).asked() if has_tube else None
+        found = self._synthesise(scene) if asked is None else self._synthesise(scene, asked)
         if rest is not None:
             found = found.with_plan(rest)
         if not prefers(self._settings):
@@ -165,7 +167,7 @@ class Planner:
 
     def _sure(self, synthesis: Synthesis) -> Synthesis:
         """The synthesis without the plans that may soon touch a known critical region."""
-        if not synthesis.candidates:
+        if not synthesis.candidates or not self._has_tube(synthesis.scene):
             return synthesis
         tube = self.tube(synthesis.scene, self._needle.known)
         sure, best = [], 0.0
@@ -184,9 +186,19 @@ class Planner:
         Only regions that were told count. Where a learned one lies is a guess, and the force is
         watched there. Regions that move are left to the certificates, which follow them in time.
         """
-        is_judged = prefers(self._settings) and scene.breath is None
-        regions = self._learner.a_priori.criticals if is_judged else ()
+        regions = self._learner.a_priori.criticals if self._has_tube(scene) else ()
         return Tube(scene, estimate, self._settings, regions)
+
+    def note_tube(self, plan: Plan, scene: Scene, estimate: Estimate) -> None:
+        """Records the tube of a plan that is followed from where the needle is."""
+        if self._has_tube(scene):
+            tube = self.tube(scene, estimate)
+            now_s, depth_mm = self._needle.now_s(), self._needle.depth_mm
+            self._journal.record(tube.foreseen(plan, now_s, depth_mm))
+
+    def _has_tube(self, scene: Scene) -> bool:
+        """Whether plans are judged by their tubes."""
+        return prefers(self._settings) and scene.breath is None
 
     def _shorter(self, scene: Scene, back_mm: float) -> Scene:
         """The scene with a needle so short that its plans, with all their rolls, end in time.

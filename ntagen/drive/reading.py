@@ -56,6 +56,9 @@ _PIECE_BYTES: Final = 2**16
 
 _START_BYTES: Final = 16
 
+_LISTS: Final = frozenset({"way", "length_mm", "std_mm", "x_mm", "y_mm", "z_mm"})
+"""The fields of records that are lists; other tuples are vectors."""
+
 _LARGEST_WINDOW_BYTES: Final = 8 * 2**20
 """The largest window of compressed data; more than any common setting needs."""
 
@@ -173,8 +176,8 @@ def _flat(fields: dict[str, Any]) -> dict[str, Any]:
     for name, value in fields.items():
         if not isinstance(value, tuple):
             found[name] = value
-        elif name == "way":
-            found[name] = " ".join(f"{one:g}" for one in value)
+        elif name in _LISTS:
+            found[name] = " ".join(f"{one:.9g}" for one in value)
         else:
             base = name.removesuffix("_mm")
             unit = name[len(base) :]

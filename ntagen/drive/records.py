@@ -293,6 +293,33 @@ class Guaranteed(Record):
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Foreseen(Record):
+    """The tube of a plan, or of the rest of one, that is followed from here (`ntagen.drive.tube`).
+
+    It ends where the driver looks at its plan again. Needles that bend exactly as planned have
+    none. The lists have an item for each of the same places.
+
+    Attributes:
+        depth_mm: The insertion depth at its start.
+        length_mm: How far the places are from there along the plan.
+        std_mm: The standard deviation of the tip's position there, in the direction that is known
+            worst.
+        x_mm: Where the places are.
+        y_mm: The same.
+        z_mm: The same.
+        confidence: The probability that the tip touches no known critical region in the tube.
+    """
+
+    depth_mm: float
+    length_mm: tuple[float, ...]
+    std_mm: tuple[float, ...]
+    x_mm: tuple[float, ...]
+    y_mm: tuple[float, ...]
+    z_mm: tuple[float, ...]
+    confidence: float
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

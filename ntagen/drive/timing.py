@@ -21,10 +21,10 @@ class TimedSynthesiser:
 
     inner: BestPlanSynthesiser
 
-    def __call__(self, scene: Scene) -> Synthesis:
+    def __call__(self, scene: Scene, asked: Scene | None = None) -> Synthesis:
         """The synthesis, with its time."""
         start_s = time.perf_counter()
-        synthesis = self.inner(scene)
+        synthesis = self.inner(scene, asked)
         return replace(synthesis, loop_seconds=time.perf_counter() - start_s)
 
 

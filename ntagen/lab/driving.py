@@ -79,9 +79,9 @@ def drive_in(
     """
     clock = Clock(lab.speed)
 
-    def timeless(scene: Scene) -> Synthesis:
+    def timeless(scene: Scene, asked: Scene | None = None) -> Synthesis:
         with clock.at_rate(0.0):
-            return synthesise(scene)
+            return synthesise(scene, asked)
 
     text = f"{lab.tracker_address},stale={STALE_S:g}s"
     with (

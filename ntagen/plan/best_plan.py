@@ -97,7 +97,7 @@ class BestPlanSynthesiser:
 
     engine: EngineSynthesiser
 
-    def __call__(self, scene: Scene) -> Synthesis:
+    def __call__(self, scene: Scene, asked: Scene | None = None) -> Synthesis:
         """A synthesis with the best plan that was found, and those that were found on the way.
 
         Raises:
@@ -105,8 +105,10 @@ class BestPlanSynthesiser:
         """
         asks = self.engine.ranking[0] in ("clearance", "reserve")
         if sequences(scene) <= _MOST_LISTED or not asks:
-            return self.engine(scene)
-        first = self.one(scene, keeps_strategy=self.engine.keeps_strategy)
+            return self.engine(scene, asked)
+        first = self.one(asked or scene, keeps_strategy=self.engine.keeps_strategy)
+        if asked is not None and not first.plans:
+            return self(scene)
         known = _Known(self, scene, first)
         if first.plans:
             known.raise_worth()
@@ -116,7 +118,7 @@ class BestPlanSynthesiser:
             if known.asks_for_list and is_listed and scene.breath is None:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
-                return self.engine(scene)
+                return self.engine(scene, asked)
             if not known.candidates and scene.breath is None:
                 return replace(self.engine, max_plans=min(_MOST_TRIED, self.engine.max_plans))(
                     scene

@@ -129,8 +129,14 @@ class Listing:
 class Synthesiser(Protocol):
     """Anything that can find the plans of a scene."""
 
-    def __call__(self, scene: Scene) -> Synthesis:
-        """The plans of a scene; equal scenes have equal answers, except for the seconds."""
+    def __call__(self, scene: Scene, asked: Scene | None = None) -> Synthesis:
+        """The plans of a scene; equal scenes have equal answers, except for the seconds.
+
+        Args:
+            scene: The scene, in which plans must hold.
+            asked: The scene whose model is asked, if that is a stricter one. If it has no plan that
+                holds, that of the scene itself is asked.
+        """
 
 
 def select(
@@ -171,18 +177,21 @@ class EngineSynthesiser:
     keeps_strategy: bool = False
     listen: Callable[[], None] = lambda: None
 
-    def __call__(self, scene: Scene) -> Synthesis:
+    def __call__(self, scene: Scene, asked: Scene | None = None) -> Synthesis:
         """The plans of a scene.
 
         Raises:
             InputError, LimitError, ModelError, KeyboardInterrupt: See `listed`.
         """
-        listing = self.listed(scene)
+        listing = self.listed(asked or scene)
+        candidates = select(self._heard(listing.plans), scene, self.margins, self.ranking)
+        if asked is not None and not candidates:
+            return self(scene)
         return Synthesis(
             scene=scene,
             model_xml=listing.model_xml,
             found=len(listing.plans),
-            candidates=select(self._heard(listing.plans), scene, self.margins, self.ranking),
+            candidates=candidates,
             seconds=listing.seconds,
             margins=self.margins,
             ranking=self.ranking,

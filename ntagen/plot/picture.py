@@ -13,10 +13,11 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.plot.arrange import cells, fit_planes, fit_space
-from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
+from ntagen.plot.colours import EXPECTED, MEASURED, NEEDLE, OTHER, TRUE
 from ntagen.plot.names import write_names
 from ntagen.plot.seeming import Seeming, note_of, seeming
 from ntagen.scene import Region, Scene, Vector
@@ -47,6 +48,8 @@ GAP_MM: Final = 1.0
 """Tip positions farther apart than this are on different lines: the tip was pulled back."""
 
 Curve = Sequence[Vector]
+Tube = Sequence[tuple[Vector, float]]
+"""Places of a path, and how far the tip may be from each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +78,8 @@ class Picture:
         best: The path of the best plan.
         bent: The parts of it in which the needle does not spin; none if it never does.
         spun: The parts of it in which the needle spins, which are dashed.
+        tubes: How far the tip was expected around the plans that were followed.
+        tube_label: What they are in the legend.
         others: The paths of other plans.
         true_path: The true path of the tip (simulation only).
         measured: Measured positions of the tip.
@@ -106,6 +111,8 @@ class Picture:
     clock_s: float = 0.0
     bent: Sequence[Curve] = ()
     spun: Sequence[Curve] = ()
+    tubes: Sequence[Tube] = ()
+    tube_label: str = "tube"
 
 
 def draw(picture: Picture) -> Figure:
@@ -228,6 +235,8 @@ def draw_projection(
         outline = axes.add_patch(outline_of(region, shown, face_of(region, picture)))
         outlines.append((region, outline))
         seen.append(seeming(picture.best, region, outline, shown))
+    if picture.tubes:
+        axes.add_patch(_band(picture, shown))
     for style, curves in _curves(picture):
         for curve in _few(curves):
             axes.plot([p[across] for p in curve], [p[depth] for p in curve], **style)
@@ -376,6 +385,27 @@ def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
         ({"color": MEASURED, **dots, "label": "measured", "zorder": 6}, measured),
         (true | {"zorder": 7}, picture.true_path),
     ]
+
+
+def _band(picture: Picture, shown: tuple[int, int]) -> Any:  # noqa: ANN401
+    """What all tubes look like along an axis: one patch, so that parts do not darken each other."""
+    import numpy as np
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    angles = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    rims = []
+    for tube in picture.tubes:
+        discs = [np.array([place[axis] for axis in shown]) + by * circle for place, by in tube]
+        # From each place to the next, the band is the hull of two discs.
+        for pair in pairwise(discs):
+            points = np.concatenate(pair)
+            farthest = np.argmax(points @ circle.T, axis=0)
+            rims.append(points[[*farthest, farthest[0]]])
+    path = Path.make_compound_path(*(Path(rim) for rim in rims))
+    style = {"facecolor": (*_rgb(EXPECTED), 0.8), "edgecolor": "none", "zorder": 6.5}
+    return PathPatch(path, label=picture.tube_label, **style)
 
 
 def _few(curves: Sequence[Curve]) -> Sequence[Curve]:

@@ -6,13 +6,15 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from statistics import NormalDist
+from typing import Any, Final
 
 from ntagen.drive.reading import RunLog
 from ntagen.drive.records import (
     Breathed,
     Ended,
     Followed,
+    Foreseen,
     Guaranteed,
     Learned,
     Measured,
@@ -101,6 +103,7 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
         moments=moments_of(log.records),
         appears_s=_learned_at(log.records),
         clock_s=_clock_s(log),
+        **_tubes(log),
     )
 
 
@@ -212,6 +215,23 @@ def _plans_in(data: bytes, shown: int) -> list[Plan]:
         return [plan_from_json(item["actions"]) for item in items]
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"the plans of the run cannot be read: {error!r}") from error
+
+
+def _tubes(log: RunLog) -> dict[str, Any]:
+    """How far from its plans the tip was expected, at the confidence that was asked for."""
+    foreseen = [record for record in log.records if isinstance(record, Foreseen)]
+    if not foreseen:
+        return {}
+    accept = log.settings.accept
+    sigmas = max(0.0, NormalDist().inv_cdf(accept))
+    tubes = [
+        [
+            ((x, y, z), sigmas * std_mm)
+            for x, y, z, std_mm in zip(one.x_mm, one.y_mm, one.z_mm, one.std_mm, strict=False)
+        ]
+        for one in foreseen
+    ]
+    return {"tubes": tubes, "tube_label": f"tube ({100.0 * accept:g} %)"}
 
 
 def _split(points: list[Vector]) -> list[Curve]:

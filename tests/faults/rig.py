@@ -102,10 +102,10 @@ class Rig:
         settings = self.configuration.settings
         inner = synthesiser_for(settings, self.operator.listen)
 
-        def synthesise(scene: Scene) -> Synthesis:
+        def synthesise(scene: Scene, asked: Scene | None = None) -> Synthesis:
             self._syntheses += 1
             self.before_synthesis()
-            return inner(scene)
+            return inner(scene, asked)
 
         def run(*journals: Log) -> Driven:
             journal = Journals(*journals, self.diary)

@@ -12,8 +12,10 @@ from tests.oracles import planner
 
 
 @lru_cache(maxsize=100)
-def oracle_synthesis(scene: Scene) -> Synthesis:
+def oracle_synthesis(scene: Scene, asked: Scene | None = None) -> Synthesis:
     """All plans of a scene by brute force; several targets are planned one after the other.
+
+    It has no model, so no stricter one is asked for.
 
     The same scenes come in many runs, and in their replays: their plans are computed once.
     """

@@ -100,3 +100,57 @@ def test_the_tip_is_in_a_target_as_surely_as_it_is_deep() -> None:
     assert confidence_in(target, ESTIMATE) == pytest.approx(0.8413, abs=1e-3)
     outside = sphere("T", "target", (x, y + 4.0, z), 3.0)
     assert confidence_in(outside, ESTIMATE) < 0.01
+
+
+def grown_mm(where: Scene, tube: Tube) -> dict[str, float]:
+    """By how much the model's regions are larger than those of the scene."""
+    radii = {one.name: one.radius_mm for one in where.criticals}
+    return {one.name: one.radius_mm - radii[one.name] for one in tube.asked().criticals}
+
+
+def test_the_model_is_asked_for_what_the_tube_needs() -> None:
+    near, far = beside(END, 1.0), beside(push(ESTIMATE.tip, RADIUS_MM, 25.0), 9.0)
+    where = here().with_regions(near, replace(far, name="far"))
+    by_mm = grown_mm(where, Tube(where, ESTIMATE, SETTINGS, where.criticals))
+    std_mm = ESTIMATE.position_std_mm(0.0)
+    assert 1.5 * std_mm < by_mm["C"] < 2.0 * STD_MM
+    assert by_mm["far"] == pytest.approx(0.05)
+    wider = replace(SETTINGS, accept=0.99)
+    assert grown_mm(where, Tube(where, ESTIMATE, wider, where.criticals))["C"] > by_mm["C"]
+    # What nobody told of is judged by the force, and not by the tube.
+    assert grown_mm(where, Tube(where, ESTIMATE, SETTINGS, ()))["C"] == pytest.approx(0.05)
+
+
+def test_a_plan_that_keeps_out_of_the_larger_region_is_sure() -> None:
+    ahead = push(ESTIMATE.tip, ESTIMATE.radius_mm, SETTINGS.review_mm)
+    x, y, z = (p + 3.0 * h for p, h in zip(ahead.position_mm, ahead.heading, strict=True))
+    where = here().with_regions(sphere("C", "critical", (x, y, z), 2.8))
+    by_mm = grown_mm(where, Tube(where, ESTIMATE, SETTINGS, where.criticals))["C"]
+    # What is made larger by so much would just be touched at the end of the tube.
+    touched = (sphere("C", "critical", (x, y, z), 3.0 - by_mm),)
+    sure = Tube(where, ESTIMATE, SETTINGS, touched).confidence(Plan.of([Push(5.0)]))
+    assert sure == pytest.approx(SETTINGS.accept, abs=0.002)
+
+
+def test_the_model_starts_outside_of_its_regions_and_ends_deep_in_the_target() -> None:
+    where = here().with_regions(beside(ESTIMATE.tip, 0.3))
+    tube = Tube(where, ESTIMATE, replace(SETTINGS, accept=1.0 - 1e-9), where.criticals)
+    asked = tube.asked()
+    assert asked.criticals[0].distance_mm(ESTIMATE.tip.position_mm) == pytest.approx(0.1)
+    depth_mm = where.targets[-1].radius_mm - asked.targets[-1].radius_mm
+    assert depth_mm == pytest.approx(SETTINGS.margins.depth_mm + 0.05)
+    assert (asked.safety, asked.resolution_per_mm) == ("swept", None)
+
+
+def test_the_record_of_a_tube_says_how_far_the_tip_may_be_off() -> None:
+    region = beside(END, 1.5 * STD_MM)
+    tube = Tube(here(), ESTIMATE, SETTINGS, (region,))
+    record = tube.foreseen(STRAIGHT_ON, 7.0, 10.0)
+    assert (record.time_s, record.depth_mm) == (7.0, 10.0)
+    assert record.confidence == tube.confidence(STRAIGHT_ON) < 1.0
+    assert record.length_mm[0] == 0.0
+    assert record.length_mm[-1] == pytest.approx(SETTINGS.review_mm)
+    assert record.std_mm[0] == pytest.approx(ESTIMATE.position_std_mm(0.0))
+    assert record.std_mm[-1] == pytest.approx(STD_MM)
+    end_mm = (record.x_mm[-1], record.y_mm[-1], record.z_mm[-1])
+    assert end_mm == pytest.approx(END.position_mm)

@@ -10,6 +10,7 @@ import pytest
 from ntagen.needle.path import sample_poses
 from ntagen.plan.best_plan import BestPlanSynthesiser, _gates, sequences
 from ntagen.plan.rank import ROBUST_RANKING, USEFUL_CLEARANCE_MM, reserve_of
+from ntagen.plan.stricter import deeper
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis
 from ntagen.scene import Scene
 from tests.steering import CRITICAL, PAPER, scene, sphere
@@ -127,3 +128,29 @@ def test_few_sequences_are_listed() -> None:
     assert sequences(near) < sequences(PAPER) < sequences(THREE_ROLLS)
     within_budget, all_listed = both(near)
     assert within_budget.candidates == all_listed.candidates
+
+
+@pytest.mark.parametrize("where", [PAPER, BESIDE], ids=lambda one: one.name)
+def test_plans_of_a_stricter_model_hold(where: Scene) -> None:
+    engine = EngineSynthesiser(ranking=ROBUST_RANKING)
+    where = replace(where, resolution_per_mm=None)
+    asked = replace(deeper(where, engine.margins.depth_mm + 0.05), safety="swept")
+    plain, strict = engine(where), engine(where, asked)
+    assert len(plain.candidates) < 0.9 * plain.found
+    assert len(strict.candidates) == strict.found > 0
+    # Those that end too near to the surface go on for another step.
+    deep = {one for one in plain.candidates if one.certificate.target_depth_mm > 0.4}
+    assert deep <= set(strict.candidates)
+    within_budget = BestPlanSynthesiser(engine)(where, asked)
+    assert len(within_budget.candidates) == within_budget.found > 0
+
+
+@pytest.mark.parametrize("rolls", [1, 2])
+def test_without_a_plan_of_the_stricter_model_that_of_the_scene_is_asked(rolls: int) -> None:
+    where = replace(BESIDE, limits=replace(BESIDE.limits, max_rolls=rolls))
+    asked = where.with_regions(*BLOCKED.criticals)
+    engine = EngineSynthesiser()
+    for ask in (engine, BestPlanSynthesiser(engine)):
+        answer = ask(where, asked)
+        assert answer.found > 0
+        assert replace(answer, seconds=0.0) == replace(ask(where), seconds=0.0)

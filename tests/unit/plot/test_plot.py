@@ -11,6 +11,7 @@ from matplotlib.patches import Circle
 
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.reading import read_log
+from ntagen.drive.records import Foreseen
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
 from ntagen.errors import InputError
@@ -70,6 +71,25 @@ def test_the_caption_says_what_the_best_plan_is() -> None:
 def test_a_run_shows_truth_measurements_and_what_was_learned(tmp_path: Path) -> None:
     shown = labels(run_picture(tmp_path))
     assert {"true path", "measured", "last plan", "critical (learned)"} <= shown
+
+
+def test_a_run_shows_the_tube_as_wide_as_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    ways_mm = ((0.0, 0.0, 0.0), (0.0, -5.0, -10.0), (0.0, 0.0, 0.0))
+    one = Foreseen(1.0, 0.0, (0.0, 5.0, 10.0), (0.5, 0.5, 1.0), *ways_mm, confidence=1.0)
+    settings = replace(Settings(), accept=0.975)
+    with Log(path, metadata_of({"settings": settings.to_json()}), {}) as log:
+        log.started(PAPER)
+        log.record(one)
+    assert read_log(path).rows()[0]["y_mm"] == "0 -5 -10"
+    picture = picture_of_run(read_log(path), 10)
+    assert "tube (97.5 %)" in labels(picture)
+    patch = next(one for one in panels(picture)[0].patches if one.get_label() == "tube (97.5 %)")
+    low, high = patch.get_path().get_extents().get_points()
+    assert (low[0], high[0]) == pytest.approx((-1.96, 1.96), abs=0.01)
+    assert (low[1], high[1]) == pytest.approx((-11.96, 0.98), abs=0.01)
+    # Earlier logs have none.
+    assert not run_picture(tmp_path).tubes
 
 
 def test_a_pull_back_divides_the_true_path(tmp_path: Path) -> None:
