@@ -67,8 +67,8 @@ def row_of(row: Row, runs: Sequence[Run]) -> dict[str, Any]:
     """A row of the table.
 
     The hit rate is about the needle's true path, and so is "reached": the driver says so, and the
-    true tip is in the target. Confidence and error of the tip are those of the driver, in runs that end
-    with the tip in the target. Overall times are those of the needle and of all syntheses of a run.
+    true tip is in the target. Confidence and error of the tip are those of the driver, when it
+    says that the tip is there. Overall times are those of the needle and of all syntheses of a run.
     """
     sound = [run for run in runs if run.target_mm is not None]
     syntheses = [one for run in sound for one in run.syntheses]
