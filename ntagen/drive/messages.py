@@ -43,6 +43,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Breathed,
     records.Followed,
     records.Guaranteed,
+    records.Promised,
 )
 """All kinds of records, in the order of the file of descriptors."""
 
