@@ -20,6 +20,7 @@ from statistics import NormalDist
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ntagen.drive.prospect import prefers
 from ntagen.drive.settings import Settings
@@ -73,10 +74,23 @@ def bounds_of(scene: Scene, estimate: Estimate, settings: Settings, length_mm: f
     # A roll later on errs more, but the needle bends for a shorter way after it.
     middle_mm = estimate.path.depth_mm + 0.5 * length_mm
     roll_rad = sigmas * settings.priors.roll_std_rad(middle_mm) if rolls else 0.0
-    off_mm = math.sqrt(squared_length_bound(risk) * float(np.linalg.eigvalsh(bend.rest_mm2)[-1]))
+    off_mm = _length_bound_mm(bend.rest_mm2, risk)
     # The strategy has answers to corners and the middle. What lies between is half a step off.
     between_mm = length_mm**2 / (4.0 * estimate.radius_mm) * (curvature_ratio + roll_rad)
     return Tissue("adversarial", curvature_ratio, roll_rad, off_mm + between_mm)
+
+
+def _length_bound_mm(moments_mm2: NDArray[np.float64], risk: float) -> float:
+    """The length that an error with these second moments passes with this probability.
+
+    Its square has about a chi-square distribution with the same mean and variance (F. E.
+    Satterthwaite, "An approximate distribution of estimates of variance components", 1946).
+    """
+    mean = float(np.trace(moments_mm2))
+    squares = float(np.sum(moments_mm2**2))
+    if squares <= 0.0:
+        return 0.0
+    return math.sqrt(squares / mean * squared_length_bound(risk, mean**2 / squares))
 
 
 def promise_of(
