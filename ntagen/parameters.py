@@ -457,6 +457,14 @@ PARAMETERS: Final = (
         1.0,
     ),
     Parameter(
+        "guarantee",
+        "guarantee",
+        "switch",
+        "Whether a strategy is followed as soon as one wins against all that the estimate leaves "
+        "open.",
+        choices=("on", "off"),
+    ),
+    Parameter(
         "accept",
         "accept",
         "ratio",

@@ -11,6 +11,7 @@ import click
 from ntagen.cli.effects import say_idle
 from ntagen.cli.gathered import gathered
 from ntagen.errors import InputError
+from ntagen.units import deg_from_rad
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -175,10 +176,24 @@ def maker(
 
 
 def guarantee_of(result: Driven, scene: Scene, course: Course | None) -> dict[str, Any] | None:
-    """What was guaranteed in a run, for --json; None in a tissue that does not answer."""
+    """What was guaranteed in a run, for --json; None if nothing ever was."""
+    followed, promised = result.guaranteed, result.promised
+    if promised is not None and followed is not None:
+        return {
+            "by": "estimate",
+            "branches": promised.branches,
+            "from_mm": promised.depth_mm,
+            "curvature_ratio": promised.curvature_ratio,
+            "roll_deg": deg_from_rad(promised.roll_rad),
+            "tip_mm": promised.tip_mm,
+            "confidence": promised.confidence,
+            "held": not followed.reason,
+            "until_mm": followed.until_mm,
+            "most_off_mm": followed.most_off_mm,
+            "reason": followed.reason,
+        }
     if not scene.tissue.is_adversarial:
         return None
-    followed = result.guaranteed
     tree = None if course is None else course.tree
     return {
         "by": "plans" if tree is None else "strategy",

@@ -127,7 +127,8 @@ def command(
     rises, the driver stops, pulls back, and looks for a new strategy with what it has learned.
 
     In a tissue that answers (tissue adversarial), the driver follows a strategy that wins whatever
-    the tissue picks, and says up to which depth its guarantee held.
+    the tissue picks, and says up to which depth its guarantee held. A phantom or real needle is led
+    by such a strategy as soon as one wins against all that the estimate leaves open (--guarantee).
 
     Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
     once. Two runs cannot write the same log at the same time.

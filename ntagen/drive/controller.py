@@ -12,7 +12,7 @@ The safety rules:
 * the needle is pulled back only along its channel. Rolls are undone where they were made, and there
   are no alarms during the pull (paper, section 3.2);
 * the driver follows a plan only if its certificate holds for the newest estimate of pose and
-  radius.
+  radius, and a strategy only if all its branches hold.
 
 If there is no plan, the driver does not pull back at once. It first looks for a place behind the
 tip, on the known channel, from which there is a strategy. If there is none back to the entry, the
@@ -43,8 +43,9 @@ from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import Moves, pieces
 from ntagen.drive.planning import Lack, Planner
+from ntagen.drive.posterior import promise_of
 from ntagen.drive.prospect import prefers
-from ntagen.drive.records import Ended, Journal, Predicted, Record, Relied
+from ntagen.drive.records import Ended, Journal, Predicted, Promised, Record, Relied
 from ntagen.drive.reliance import relies_on
 from ntagen.drive.reserve import is_enough, is_surely_in
 from ntagen.drive.settings import Settings
@@ -104,6 +105,7 @@ class Controller:
     ) -> None:
         self._settings = settings
         self._journal = journal
+        self._listen = listen
         self._supervisor = supervisor or Supervisor()
         self._agree = agree
         self._needle = Steering(scene.needle, device, settings, journal, listen)
@@ -219,7 +221,7 @@ class Controller:
 
     def _begin_strategy(self) -> Event:
         """Begins to follow the strategy against the tissue, if its longest branch ends in time."""
-        if self._guide.longest_s() > self._planner.left_s():
+        if self._guide.longest_s(self._guide.root) > self._planner.left_s():
             self.reason = "the strategy against the tissue may not end within the time limit"
             return Event.NO_TIME_LEFT
         self._agree(self._guide.text)
@@ -290,6 +292,8 @@ class Controller:
         move = self._guide.next()
         if move is None:
             self._guide.leave()
+            if self._guide.course is None:
+                return Event.PLAN_DONE
             # The tip is near the end of a branch, and those ends are deep enough in the target.
             self._learner.visit(self._predicted.position_mm, last_too=True)
             self.reason = "the tip is in the last target, where the branch that was followed ends"
@@ -331,7 +335,45 @@ class Controller:
         if self._guide.forbids_plans:
             self.reason = self._guide.reason
             return Event.NOT_GUARANTEED
+        if event is Event.AS_PREDICTED and self._guide.course is None:
+            return self._review_branch(measurement)
         return event
+
+    def _review_branch(self, measurement: Measurement) -> Event:
+        """Whether the tip is there before the branch ends; else looks for a newer strategy."""
+        if self._is_there(measurement):
+            self._guide.leave()
+            return Event.IN_TARGET
+        depth_mm = self._needle.depth_mm
+        if depth_mm - self._reviewed_mm >= self._settings.review_mm - _SMALL_MM:
+            self._reviewed_mm = depth_mm
+            estimate = self._needle.glance()
+            scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
+            self._look_for_promise(scene, estimate)
+        return Event.AS_PREDICTED
+
+    def _look_for_promise(self, scene: Scene, estimate: Estimate) -> None:
+        """Follows a strategy that wins from here against all that the estimate leaves open."""
+        depth_mm = self._needle.depth_mm
+        if self._guide.course is not None or depth_mm <= _SMALL_MM:
+            return
+        promise = promise_of(scene, estimate, self._settings, self._listen)
+        if promise is None or self._guide.longest_s(promise.tree) > self._planner.left_s():
+            return
+        bounds, confidence = promise.scene.tissue, self._settings.accept
+        self._note(
+            Promised(
+                self._now_s(),
+                depth_mm,
+                promise.tree.leaves,
+                bounds.curvature_ratio,
+                bounds.roll_rad,
+                bounds.tip_mm,
+                confidence,
+            )
+        )
+        self._guide.begin(promise)
+        self._agree(self._guide.text)
 
     def _note_predicted(self, measurement: Measurement) -> None:
         """Records where the tip was expected, and how far from there it is."""
@@ -379,6 +421,7 @@ class Controller:
             return Event.PLAN_IS_THIN
         self._follow(scene, rest)
         self._planner.note_tube(rest, scene, estimate)
+        self._look_for_promise(scene, estimate)
         return Event.AS_PREDICTED
 
     def _left(self, estimate: Estimate) -> tuple[Scene, Plan]:
@@ -451,6 +494,7 @@ class Controller:
         self._follow(synthesis.scene, best.plan)
         self._planner.note_tube(best.plan, synthesis.scene, self._needle.known)
         self._reviewed_mm = self._needle.depth_mm
+        self._look_for_promise(synthesis.scene, self._needle.known)
 
     def _keep_pace(self, action: Action) -> bool:
         """Waits until the breath is where the plan expects it; whether the plan still holds.

@@ -196,6 +196,7 @@ class Following:
         tree: The strategy.
         scene: The scene for which it was made.
         settings: How pushes are divided, and the noise of the tracker.
+        depth_mm: The insertion depth at which the strategy begins.
 
     Attributes:
         readings: How many readings are averaged, at most.
@@ -203,7 +204,9 @@ class Following:
         held_until_mm: The depth up to which the tip was near enough.
     """
 
-    def __init__(self, tree: Segment, scene: Scene, settings: Settings) -> None:
+    def __init__(
+        self, tree: Segment, scene: Scene, settings: Settings, depth_mm: float = 0.0
+    ) -> None:
         self._spacing_mm = settings.spacing_mm
         self._radius_mm = scene.needle.radius_mm
         self._tip_mm = max(scene.tissue.tip_mm, _SMALL_MM)
@@ -214,10 +217,10 @@ class Following:
         bound = squared_length_bound(settings.false_alarm / readings)
         self._noise_mm = settings.priors.noise_mm * math.sqrt(bound)
         self.most_off_mm = 0.0
-        self.held_until_mm = 0.0
+        self.held_until_mm = depth_mm
         # Differences from the branches that were followed in earlier segments.
         self._before: list[_Array] = []
-        self._enter([_Node((), tree, Path(orthonormal(scene.needle.tip)))], 0.0)
+        self._enter([_Node((), tree, Path(orthonormal(scene.needle.tip)))], depth_mm)
 
     def _enter(self, nodes: Sequence[_Node], depth_mm: float) -> None:
         """A segment begins; the roll before it is the same on all ways."""

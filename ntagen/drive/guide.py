@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ntagen.drive.following import Course, Following
+from ntagen.drive.posterior import Promise
 from ntagen.drive.records import Followed, Guaranteed, Journal
 from ntagen.drive.settings import Settings
 from ntagen.drive.steering import Steering
@@ -41,10 +42,17 @@ class Guide:
         self._needle = needle
         self._journal = journal
         self._scene = scene
+        self._tree: Segment | None = None if course is None else course.tree
         self._following: Following | None = None
-        if course is not None and course.tree is not None:
-            self._following = Following(course.tree, scene, settings)
+        if self._tree is not None:
+            self._following = Following(self._tree, scene, settings)
         self.reason = "" if course is None else course.lack
+
+    def begin(self, promise: Promise) -> None:
+        """Follows a strategy that begins where the needle is now, instead of another one."""
+        self._scene, self._tree = promise.scene, promise.tree
+        depth_mm = self._needle.depth_mm
+        self._following = Following(promise.tree, promise.scene, self._settings, depth_mm)
 
     @property
     def is_on(self) -> bool:
@@ -64,15 +72,14 @@ class Guide:
     @property
     def text(self) -> str:
         """The strategy in words, for the operator."""
-        tree = self._tree()
-        return f"follow the strategy against the tissue, with {tree.leaves} branches"
+        return f"follow the strategy against the tissue, with {self.root.leaves} branches"
 
-    def longest_s(self) -> float:
-        """How long the longest branch takes, with as many rolls as may be made."""
+    def longest_s(self, tree: Segment) -> float:
+        """How long the longest branch of a strategy takes, with as many rolls as may be made."""
         rolls = self._scene.limits.max_rolls + 1
         speed_mm_per_s = self._scene.needle.speed_mm_per_s
         rolls_s = rolls * math.pi / self._settings.roll_rad_per_s
-        return _longest_mm(self._tree()) / speed_mm_per_s + rolls_s
+        return _longest_mm(tree) / speed_mm_per_s + rolls_s
 
     def next(self) -> tuple[Action, Pose] | None:
         """See `Following.next`."""
@@ -86,7 +93,8 @@ class Guide:
         """Takes a reading; records the end of a branch."""
         following = self._on()
         following.note(self._needle.depth_mm, position_mm)
-        self._needle.believe(following.path())
+        if self.course is not None:
+            self._needle.believe(following.path())
         seen = following.seen() if following.is_near() else None
         if seen is None:
             return
@@ -135,10 +143,12 @@ class Guide:
             raise AssertionError("no strategy is followed")
         return self._following
 
-    def _tree(self) -> Segment:
-        if self.course is None or self.course.tree is None:
+    @property
+    def root(self) -> Segment:
+        """The strategy that was followed last."""
+        if self._tree is None:
             raise AssertionError("there is no strategy")
-        return self.course.tree
+        return self._tree
 
 
 def _longest_mm(tree: Segment) -> float:

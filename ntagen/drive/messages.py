@@ -44,6 +44,7 @@ KINDS: Final[tuple[type[Record], ...]] = (
     records.Followed,
     records.Guaranteed,
     records.Foreseen,
+    records.Promised,
 )
 """All kinds of records, in the order of the file of descriptors."""
 

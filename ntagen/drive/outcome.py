@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ntagen.drive.records import Ended, Guaranteed, Record
+from ntagen.drive.records import Ended, Guaranteed, Promised, Record
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
 
@@ -34,11 +34,13 @@ class Driven:
         ended: The driver's own last record.
         syntheses: Every synthesis, in order.
         guaranteed: How long the guarantee of a strategy held that was followed.
+        promised: What it promised where it began, against all that the estimate left open.
     """
 
     ended: Ended
     syntheses: tuple[Made, ...]
     guaranteed: Guaranteed | None
+    promised: Promised | None
 
 
 class SynthesisCounter:
@@ -47,16 +49,23 @@ class SynthesisCounter:
     Attributes:
         syntheses: What was noted.
         guaranteed: What was noted.
+        promised: What the last guarantee promised where it began.
     """
 
     def __init__(self) -> None:
         self.syntheses: list[Made] = []
         self.guaranteed: Guaranteed | None = None
+        self.promised: Promised | None = None
+        self._is_promised = False
 
     def record(self, record: Record) -> None:
         """Notes how long a guarantee held."""
         if isinstance(record, Guaranteed):
             self.guaranteed = record
+            self._is_promised = False
+        elif isinstance(record, Promised) and not self._is_promised:
+            self.promised = record
+            self._is_promised = True
 
     def started(self, scene: Scene) -> None:
         """Does nothing: the scene is known."""

@@ -86,4 +86,4 @@ def drive(
         course,
     )
     ended = controller.run()
-    return Driven(ended, tuple(counter.syntheses), counter.guaranteed)
+    return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)

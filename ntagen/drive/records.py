@@ -320,6 +320,27 @@ class Foreseen(Record):
     confidence: float
 
 
+@dataclass(frozen=True, slots=True)
+class Promised(Record):
+    """From here on a strategy reaches the target, whatever the tissue does within bounds.
+
+    Attributes:
+        depth_mm: The insertion depth.
+        branches: The number of ways on which the strategy reaches the target.
+        curvature_ratio: The curvature may differ by this part from the estimate.
+        roll_rad: Each roll may err by this.
+        tip_mm: The tip may be off the way for other reasons by this.
+        confidence: The probability that the tissue stays within these bounds, by the estimate.
+    """
+
+    depth_mm: float
+    branches: int
+    curvature_ratio: float
+    roll_rad: float
+    tip_mm: float
+    confidence: float
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

@@ -68,6 +68,8 @@ class Settings:
         accept: A needle that does not bend exactly as planned is pushed only if it touches no known
             critical region with this confidence until the driver looks again (`ntagen.drive.tube`),
             and it has reached the last target if it is there with this confidence.
+        guarantee: Whether such a needle is led by a strategy as soon as one wins against all that
+            the estimate leaves open (`ntagen.drive.posterior`).
         timeout_s: A run ends after this time (paper, section 4); `ntagen.drive.configure` gives
             more for deep targets.
         sensing_margin_mm: The expected distance from an unknown region at which the force rises;
@@ -100,6 +102,7 @@ class Settings:
     pull_speed_ratio: float = 5.0
     roll_rad_per_s: float = math.pi
     accept: float = 0.95
+    guarantee: bool = True
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0
     learned_radius_mm: float = 2.0

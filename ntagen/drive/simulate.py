@@ -210,6 +210,7 @@ def simulate(
         pierced=needle.pierced,
         syntheses=tuple(counter.syntheses),
         guaranteed=counter.guaranteed,
+        promised=counter.promised,
     )
 
 

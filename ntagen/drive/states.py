@@ -19,7 +19,8 @@ tells about the needle may give a plan.
 
 In a tissue that answers, a strategy may be followed instead of plans: then `synthesise` leads to
 `execute` at once, and the end of a branch to the target. Where no branch fits any more, the way
-leads to `estimate`, and plans follow, or the run ends.
+leads to `estimate`, and plans follow, or the run ends. Where a strategy wins against all that the
+estimate leaves open, `execute` follows it instead of the plan, and its end leads to `estimate`.
 
 Each state is a task that ends with one of its events; the table gives the next state. `EVENTS`
 lists the events of each state, and `TRANSITIONS` has exactly one entry for each pair of state and

@@ -10,6 +10,7 @@ from ntagen.drive.records import (
     Forgotten,
     Guaranteed,
     Learned,
+    Promised,
     Record,
     Relied,
     Synthesised,
@@ -52,10 +53,8 @@ def _text(record: Record) -> str | None:
             return f"{record.kind} region '{record.name}' is now part of a larger one"
         case CutShort():
             return f"{record.reason}: stop after {record.made_mm:.2f} mm of the push"
-        case Followed():
-            return followed(record)
-        case Guaranteed():
-            return guaranteed(record)
+        case Followed() | Guaranteed() | Promised():
+            return of_strategy(record)
         case Relied():
             return record.text
         case Visited():
@@ -93,7 +92,14 @@ def _synthesis(record: Synthesised) -> str:
     return f"{place}: {count}; best: {record.plan}{clearance}"
 
 
-def followed(record: Followed) -> str:
+def of_strategy(record: Followed | Guaranteed | Promised) -> str:
+    """What a strategy against the tissue promises, sees and has held."""
+    if isinstance(record, Followed):
+        return _followed(record)
+    return _promised(record) if isinstance(record, Promised) else guaranteed(record)
+
+
+def _followed(record: Followed) -> str:
     """What the driver has seen of the tissue at the end of a branch, and what it does then."""
     tissue = f"the needle bends {record.factor:g} times as expected"
     if abs(record.roll_error_rad) > _NO_ROLL_RAD:
@@ -103,6 +109,19 @@ def followed(record: Followed) -> str:
     return (
         f"{record.depth_mm:.2f} mm deep: {tissue} ({record.off_mm:.2f} mm off); "
         f"so: {record.decision}"
+    )
+
+
+def _promised(record: Promised) -> str:
+    """What a strategy wins against."""
+    bounds = [f"bends within {100.0 * record.curvature_ratio:.3g} % of the estimate"]
+    if record.roll_rad > 0.0:
+        bounds.append(f"rolls within {deg_from_rad(record.roll_rad):.3g} deg of the command")
+    return (
+        f"{record.depth_mm:.2f} mm deep: a strategy with {record.branches} branches is guaranteed "
+        f"to reach the target while the needle {', '.join(bounds)}, and is at most "
+        f"{record.tip_mm:.2f} mm off for other reasons; all this with a confidence of "
+        f"{record.confidence:g}"
     )
 
 

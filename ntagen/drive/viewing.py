@@ -37,13 +37,14 @@ from ntagen.drive.records import (
     Learned,
     Measured,
     Predicted,
+    Promised,
     Record,
     Relied,
     Transition,
     Visited,
 )
 from ntagen.drive.states import Event
-from ntagen.drive.story import followed, guaranteed
+from ntagen.drive.story import of_strategy
 from ntagen.needle.kinematics import bending_axis
 from ntagen.needle.path import sample_poses
 from ntagen.plan.synthesise import Synthesis
@@ -191,10 +192,8 @@ def _text(record: Record) -> str:
             return f"learned {record.kind} region '{record.name}'"
         case CutShort():
             return f"{record.reason}: the push ended after {record.made_mm:.2f} mm"
-        case Followed():
-            return followed(record)
-        case Guaranteed():
-            return guaranteed(record)
+        case Followed() | Guaranteed() | Promised():
+            return of_strategy(record)
         case Relied():
             return record.text
         case Visited():

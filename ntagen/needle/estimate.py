@@ -23,6 +23,7 @@ Cost and errors on phantom needles: `tests/benchmarks/predictions.py` measures t
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -136,6 +137,26 @@ class Estimate:
         largest = np.linalg.eigvalsh(self.position_covariance_mm2(length_mm))[-1]
         return math.sqrt(max(0.0, float(largest)))
 
+    def bend(self, length_mm: float) -> Bend:
+        """How the needle may bend over a further push of this length, greater than 0, in mm."""
+        return self.ahead.bend(self.tip, self.radius_mm, length_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Bend:
+    """How a needle may bend over a push, and what that does not explain of where the push ends.
+
+    Attributes:
+        mean: The logarithm of the mean curvature, relative to that of the expected circle.
+        std: Its standard deviation.
+        rest_mm2: The second moments of the distance from the end of the circle that has the true
+            mean curvature, along x, y and z.
+    """
+
+    mean: float
+    std: float
+    rest_mm2: _Array
+
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
@@ -159,8 +180,36 @@ class Ahead:
         second order (M. Nørgaard, N. K. Poulsen, O. Ravn, "New developments in state estimation for
         nonlinear systems", Automatica 36, 2000): on 30 mm of a bend the first is not enough.
         """
+        expected_mm = np.array(pushed_to(tip, radius_mm, length_mm))
+
+        def off_mm(errors: _Array) -> _Array:
+            return np.asarray(_ends(tip, radius_mm, length_mm, errors) - expected_mm)
+
+        return self._moments_mm2(length_mm, off_mm)
+
+    def bend(self, tip: Pose, radius_mm: float, length_mm: float) -> Bend:
+        """See `Estimate.bend`."""
+        used = self._used(length_mm)
+        grown, weights = slice(6, 6 + used), _weights(length_mm)[:used]
+        mean = float(weights @ self.differences[:used])
+        variance = float(weights @ self.covariance[grown, grown] @ weights)
+
+        def off_mm(errors: _Array) -> _Array:
+            circles = np.zeros_like(errors)
+            circles[:, grown] = (errors[:, grown] @ weights)[:, None]
+            ends_mm = _ends(tip, radius_mm, length_mm, errors)
+            return np.asarray(ends_mm - _ends(tip, radius_mm, length_mm, circles))
+
+        return Bend(mean, math.sqrt(max(0.0, variance)), self._moments_mm2(length_mm, off_mm))
+
+    def _used(self, length_mm: float) -> int:
+        """The number of steps in which a push of this length lies."""
         steps = len(self.differences) // 2
-        used = min(steps, max(1, math.ceil(length_mm / _STEP_MM - 1e-9)))
+        return min(steps, max(1, math.ceil(length_mm / _STEP_MM - 1e-9)))
+
+    def _moments_mm2(self, length_mm: float, off_mm: Callable[[_Array], _Array]) -> _Array:
+        """The second moments of what errors of a push do; one row of errors for each case."""
+        steps, used = len(self.differences) // 2, self._used(length_mm)
         chosen = np.r_[0:6, 6 : 6 + used, 6 + steps : 6 + steps + used]
         variances, axes = np.linalg.eigh(self.covariance[np.ix_(chosen, chosen)])
         moved = (axes * np.sqrt(np.maximum(0.0, variances))).T
@@ -169,13 +218,12 @@ class Ahead:
         pairs = moved[-1 - one] + moved[-1 - other]
         errors = np.concatenate([np.zeros_like(moved[:1]), moved, -moved, pairs])
         errors[:, 6:] += np.r_[self.differences[:used], self.differences[steps : steps + used]]
-        ends = _ends(tip, radius_mm, length_mm, errors)
-        middle, more, less, both = np.split(ends, [1, 1 + len(moved), 1 + 2 * len(moved)])
+        middle, more, less, both = np.split(off_mm(errors), [1, 1 + len(moved), 1 + 2 * len(moved)])
         first, second = 0.5 * (more - less), 0.5 * (more + less) - middle
         mixed = both - more[-1 - one] - more[-1 - other] + middle
-        off_mm = (middle + second.sum(axis=0))[0] - np.array(pushed_to(tip, radius_mm, length_mm))
+        mean_mm = (middle + second.sum(axis=0))[0]
         covariance = first.T @ first + 2.0 * second.T @ second + mixed.T @ mixed
-        return np.asarray(covariance + np.outer(off_mm, off_mm))
+        return np.asarray(covariance + np.outer(mean_mm, mean_mm))
 
 
 def _ends(tip: Pose, radius_mm: float, length_mm: float, errors: _Array) -> _Array:
@@ -454,11 +502,11 @@ class Estimator:
         return Path(entry.start, tuple(stretches), pending_rad), tip
 
 
-def _weights() -> _Array:
-    """How much each step counts for the place at the end of `_AHEAD_MM`: by the length left."""
+def _weights(length_mm: float = _AHEAD_MM) -> _Array:
+    """How much each step counts for the place at the end of a push: by the length left."""
     begins_mm = _STEP_MM * np.arange(_STEPS)
-    left_mm = np.maximum(0.0, _AHEAD_MM - begins_mm) ** 2
-    left_mm -= np.maximum(0.0, _AHEAD_MM - begins_mm - _STEP_MM) ** 2
+    left_mm = np.maximum(0.0, length_mm - begins_mm) ** 2
+    left_mm -= np.maximum(0.0, length_mm - begins_mm - _STEP_MM) ** 2
     return np.asarray(left_mm / np.sum(left_mm))
 
 

@@ -33,6 +33,7 @@ syntax match nslSetting /\<pull\>/ contained
 syntax match nslSetting /\<overrun\>/ contained
 syntax match nslSetting /\<accept\>/ contained
 syntax match nslSetting /\<noise\>/ contained
+syntax match nslSetting /\<guarantee\>/ contained
 syntax match nslSetting /\<force\>/ contained
 syntax match nslSetting /\<deviation\>/ contained
 syntax match nslSetting /\<delay\>/ contained
