@@ -10,7 +10,7 @@ the medians of syntheses, pull-backs, cut length and time; median and 99th perce
 synthesis. What was touched is computed here from the arcs that were really cut.
 
 The parts: ``processes`` (curvature and bend plane swing along the depth; without, they are
-constant), ``tube`` (`ntagen.drive.tube`), ``prospects`` (`ntagen.plan.prospects`), ``patience`` (a
+constant), ``tube`` (`ntagen.drive.tube`), ``guarantee`` (`ntagen.drive.posterior`), ``prospects`` (`ntagen.plan.prospects`), ``patience`` (a
 plan with enough reserve is kept; without, a plan is looked for at each review), ``passing`` (a
 region that is felt may be passed), ``smaller`` (learned regions are assumed smaller before the
 driver gives up), ``time`` (deep targets have more time than 120 s). Ends with 1 if a region was
@@ -104,6 +104,7 @@ def _plain(settings: Settings) -> Settings:
 CHANGES: Final[dict[str, Callable[[Settings], Settings]]] = {
     "processes": _plain,
     "tube": lambda settings: replace(settings, accept=1e-9),
+    "guarantee": lambda settings: replace(settings, guarantee=False),
     "passing": lambda settings: replace(settings, felt_clearance_mm=settings.sensing_margin_mm),
     "time": lambda settings: replace(settings, timeout_s=Settings().timeout_s),
 }
