@@ -10,11 +10,11 @@ the medians of syntheses, pull-backs, cut length and time; median and 99th perce
 synthesis. What was touched is computed here from the arcs that were really cut.
 
 The parts: ``processes`` (curvature and bend plane swing along the depth; without, they are
-constant), ``tube`` (`ntagen.drive.tube`), ``guarantee`` (`ntagen.drive.posterior`), ``prospects`` (`ntagen.plan.prospects`), ``patience`` (a
-plan with enough reserve is kept; without, a plan is looked for at each review), ``passing`` (a
-region that is felt may be passed), ``smaller`` (learned regions are assumed smaller before the
-driver gives up), ``time`` (deep targets have more time than 120 s). Ends with 1 if a region was
-touched.
+constant), ``tube`` (`ntagen.drive.tube`), ``guarantee`` (`ntagen.drive.posterior`), ``prospects``
+(`ntagen.plan.prospects`), ``patience`` (a plan with enough reserve is kept; without, a plan is
+looked for at each review), ``passing`` (a region that is felt may be passed), ``smaller`` (learned
+regions are assumed smaller before the driver gives up), ``time`` (deep targets have more time than
+120 s). Ends with 1 if a region was touched.
 """
 
 from __future__ import annotations
