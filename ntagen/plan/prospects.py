@@ -124,11 +124,7 @@ class _Arcs:
     def nearest(self, rows: _Rows, places: _Array) -> tuple[_Array, _Array]:
         """The least distance of arcs to places, and where; see `Arc.nearest_to`."""
         start, radius_mm = self.start.at(rows), self.radius_mm[rows, None]
-        heading, bevel = start.heading, start.bevel
-        center = start.position - radius_mm * bevel
-        # As products of matrices: there may be a hundred thousand pairs.
-        sine = heading @ places.T - np.einsum("ni,ni->n", heading, center)[:, None]
-        cosine = bevel @ places.T - np.einsum("ni,ni->n", bevel, center)[:, None]
+        center, sine, cosine = self._in_plane(start, radius_mm, places)
         at_mm = np.arctan2(sine, cosine) * radius_mm
         at_mm = np.where(at_mm < 0.0, at_mm + 2.0 * math.pi * radius_mm, at_mm)
         in_plane = np.hypot(sine, cosine)
@@ -148,6 +144,34 @@ class _Arcs:
             ends_mm = np.where(is_last, length_mm[beyond, None], 0.0)
             at_mm[beyond] = np.where(is_beyond, ends_mm, at_mm[beyond])
         return away, at_mm
+
+    @staticmethod
+    def _in_plane(start: Poses, radius_mm: _Array, places: _Array) -> tuple[_Array, _Array, _Array]:
+        """The centres of circles, and the places along the heading and the bevel from there."""
+        heading, bevel = start.heading, start.bevel
+        center = start.position - radius_mm * bevel
+        # As products of matrices: there may be a hundred thousand pairs.
+        sine = heading @ places.T - np.einsum("ni,ni->n", heading, center)[:, None]
+        cosine = bevel @ places.T - np.einsum("ni,ni->n", bevel, center)[:, None]
+        return center, sine, cosine
+
+    def least(self, rows: _Rows, places: _Array) -> _Array:
+        """The least distance of any of these arcs to each place.
+
+        It is that of `nearest`, without where: no angle is computed, and one root for a pair.
+        """
+        start, radius_mm = self.start.at(rows), self.radius_mm[rows, None]
+        center, sine, cosine = self._in_plane(start, radius_mm, places)
+        in_plane2 = sine**2 + cosine**2
+        # The square of the distance to the circle; rounding may make the first part negative.
+        away2 = _squares(center, places) - in_plane2 + (np.sqrt(in_plane2) - radius_mm) ** 2
+        turn = self.length_mm[rows, None] / radius_mm
+        after_start, before_end = sine >= 0.0, np.sin(turn) * cosine >= np.cos(turn) * sine
+        on_arc = np.where(turn <= math.pi, after_start & before_end, after_start | before_end)
+        end = start.places(radius_mm[:, 0], self.length_mm[rows])
+        ends2 = np.minimum(_squares(start.position, places), _squares(end, places))
+        least2 = np.where(on_arc | (turn >= 2.0 * math.pi), away2, ends2).min(axis=0)
+        return np.asarray(np.sqrt(np.maximum(0.0, least2)))
 
 
 def _squares(points: _Array, places: _Array) -> _Array:
@@ -234,8 +258,7 @@ class Prospects:
             free = foot_mm < self._touched_at(arcs, rows, foot_mm)
             rows, away_mm, foot_mm = rows[free], away_mm[free], foot_mm[free]
             if len(rows):
-                found_mm = arcs.nearest(rows, places)[0]
-                best_mm = np.minimum(best_mm, found_mm.min(axis=0))
+                best_mm = np.minimum(best_mm, arcs.least(rows, places))
                 one = int(np.argmin(away_mm))
                 if away_mm[one] < middle_mm and (way_rolls is None or index <= way_rolls):
                     middle_mm = float(away_mm[one])

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ntagen.needle.kinematics import Arc, roll
+from ntagen.needle.poses import Poses
 from ntagen.plan.actions import Plan, Push, Roll, Wait
 from ntagen.plan.certify import certify
 from ntagen.plan.prospects import (
@@ -17,6 +18,7 @@ from ntagen.plan.prospects import (
     ROLL_PLACES,
     SOFT_MM,
     Prospects,
+    _Arcs,
     first_part,
 )
 from ntagen.scene import Pose, Scene, Vector
@@ -25,6 +27,28 @@ from tests.steering import CRITICAL, ENTRY, PAPER, scene, sphere
 DEPTH_MM = 0.3
 ROUND = np.eye(3)
 FREE = scene(targets=[sphere("T", "target", (0.0, -40.0, 0.0), 3.0)])
+
+
+def test_the_least_distance_of_arcs_is_that_of_each_arc() -> None:
+    draw = np.random.default_rng(5)
+    places = 30.0 * draw.normal(size=(12, 3))
+    for _ in range(300):
+        heading, other = draw.normal(size=(2, 3))
+        heading /= np.linalg.norm(heading)
+        bevel = np.cross(heading, other)
+        bevel /= np.linalg.norm(bevel)
+        # Up to two turns of a circle.
+        radius_mm = float(draw.uniform(10.0, 160.0))
+        length_mm = float(draw.uniform(0.0, 120.0))
+        start = Pose(*(tuple(one.tolist()) for one in (5.0 * other, heading, bevel)))
+        arc = Arc(start, radius_mm, length_mm)
+        rows = Poses(*(np.array([one]) for one in (start.position_mm, heading, bevel)))
+        none = np.zeros(1)
+        arcs = _Arcs(
+            rows, np.array([length_mm]), np.array([radius_mm]), np.zeros(1, int), none, none, none
+        )
+        expected = [arc.nearest_to(tuple(one)).distance_mm for one in places.tolist()]
+        assert arcs.least(np.zeros(1, int), places) == pytest.approx(expected, abs=1e-6)
 
 
 def judged(of: Scene, place: Pose = ENTRY, std_mm: float = 1.0) -> float:
