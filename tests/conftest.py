@@ -3,11 +3,16 @@
 `make quick` takes the profile ``quick``, which tries fewer examples of each property. A shell
 starts a job in the background with SIGINT ignored, and commands inherit that; what is tested is a
 command that can be interrupted.
+
+Tests run in one process for each processor, so matrices take one thread, as in the program.
 """
 
+import os
 import signal
 
 from hypothesis import HealthCheck, settings
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 settings.register_profile("ntagen", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("quick", settings.get_profile("ntagen"), max_examples=25)

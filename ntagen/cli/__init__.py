@@ -64,6 +64,11 @@ _OBJECTS_BETWEEN_COLLECTIONS: Final = 50_000
 """Modules, models and plans are many objects, none of them garbage. At Python's usual number, 700,
 looking for garbage takes a tenth of the time until the first plan."""
 
+_BLAS_THREADS: Final = ("OPENBLAS_NUM_THREADS", "1")
+"""NumPy's matrices are small here. A second thread for them is never faster; it waits busily, and
+takes a processor from the engine and from other runs. Whoever sets the variable has the last word.
+"""
+
 DEBUG_VARIABLE: Final = "NTAGEN_DEBUG"
 """If it is set to anything but 0, an error also prints where in the program it came from."""
 
@@ -133,6 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
+    os.environ.setdefault(*_BLAS_THREADS)
     for stream in (sys.stdout, sys.stderr):
         # A pipe on Windows has few characters; the others are shown by their numbers.
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":

@@ -53,6 +53,9 @@ _SAMPLE_MM: Final = 2.0
 _PIECE_MM: Final = 8.0
 """Ways are looked at in pieces of this length first."""
 
+_ROWS: Final = 128
+"""So many arcs are compared with the target at once."""
+
 SOFT_MM: Final = 1.0
 """Over this length at the surface of the target, an error counts in part: a prospect that jumps
 would make the driver jump."""
@@ -208,6 +211,8 @@ class Prospects:
         self._rolls_rad, self._spins_after = np.array(choices).T
         target = scene.targets[-1]
         self._middle = np.array(target.center_mm)
+        self._centers = np.array([one.center_mm for one in scene.avoided]).reshape(-1, 3)
+        self._reaches_mm = np.array([one.shape.reach_mm() for one in scene.avoided])
         self._reach_mm = target.shape.reach_mm()
         self._inside_mm = max(_LEAST_MM, target.shape.depth_mm - depth_mm)
 
@@ -258,7 +263,7 @@ class Prospects:
             free = foot_mm < self._touched_at(arcs, rows, foot_mm)
             rows, away_mm, foot_mm = rows[free], away_mm[free], foot_mm[free]
             if len(rows):
-                best_mm = np.minimum(best_mm, arcs.least(rows, places))
+                self._look(arcs, rows[np.argsort(away_mm)], places, best_mm)
                 one = int(np.argmin(away_mm))
                 if away_mm[one] < middle_mm and (way_rolls is None or index <= way_rolls):
                     middle_mm = float(away_mm[one])
@@ -271,6 +276,18 @@ class Prospects:
                 clear = branches.branch_mm < touched_mm[branches.parent]
         counted = np.clip((self._inside_mm - best_mm) / SOFT_MM + 0.5, 0.0, 1.0)
         return Judged(float(counted.mean()), None if way is None else self._plan(levels, *way))
+
+    def _look(self, arcs: _Arcs, rows: _Rows, places: _Array, best_mm: _Array) -> None:
+        """Makes the least distance to each place smaller where these arcs pass nearer.
+
+        What counts in full already is not looked at again, and the first rows reach most.
+        """
+        for first in range(0, len(rows), _ROWS):
+            is_open = best_mm > self._inside_mm - 0.5 * SOFT_MM
+            if not is_open.any():
+                return
+            found_mm = arcs.least(rows[first : first + _ROWS], places[is_open])
+            best_mm[is_open] = np.minimum(best_mm[is_open], found_mm)
 
     def _levels(
         self,
@@ -339,28 +356,26 @@ class Prospects:
 
     def _touched_at(self, arcs: _Arcs, rows: _Rows, length_mm: _Array) -> _Array:
         """Where arcs touch something first, if they are not longer than this; else infinite."""
-        regions = self._scene.avoided
-        if not regions or not len(rows):
-            return np.full(len(rows), math.inf)
-        # Of pieces of this length, most are nowhere near a region.
-        pieces, middle_mm, half_mm = _pieces(length_mm, _PIECE_MM)
-        is_near = self._away_mm(arcs, rows[pieces], middle_mm) <= half_mm + _TINY_MM
-        pieces, middle_mm, half_mm = pieces[is_near], middle_mm[is_near], half_mm[is_near]
-        if not len(pieces):
-            return np.full(len(rows), math.inf)
-        parts, along_mm, apart_mm = _pieces(2.0 * half_mm, _SAMPLE_MM)
-        # Each part is looked at where it ends.
-        at_mm = (middle_mm - half_mm)[parts] + along_mm + apart_mm
-        touches = self._away_mm(arcs, rows[pieces[parts]], at_mm) <= 0.0
         touched_mm = np.full(len(rows), math.inf)
-        np.minimum.at(touched_mm, pieces[parts[touches]], at_mm[touches])
+        if not self._scene.avoided or not len(rows):
+            return touched_mm
+        # Most pieces are nowhere near the ball around a region.
+        pieces, middle_mm, half_mm = _pieces(length_mm, _PIECE_MM)
+        middles = arcs.start.at(rows[pieces]).places(arcs.radius_mm[rows[pieces]], middle_mm)
+        squares = _squares(middles, self._centers)
+        near = squares <= (self._reaches_mm + half_mm[:, None] + _TINY_MM) ** 2
+        for number, region in enumerate(self._scene.avoided):
+            chosen = np.flatnonzero(near[:, number])
+            if not len(chosen):
+                continue
+            parts, along_mm, apart_mm = _pieces(2.0 * half_mm[chosen], _SAMPLE_MM)
+            # Each part is looked at where it ends.
+            at_mm = (middle_mm - half_mm)[chosen][parts] + along_mm + apart_mm
+            owners = pieces[chosen][parts]
+            points = arcs.start.at(rows[owners]).places(arcs.radius_mm[rows[owners]], at_mm)
+            touches = region.shape.distance_mm(points) <= 0.0
+            np.minimum.at(touched_mm, owners[touches], at_mm[touches])
         return touched_mm
-
-    def _away_mm(self, arcs: _Arcs, rows: _Rows, at_mm: _Array) -> _Array:
-        """The least distance to what is to be avoided at places of arcs; negative inside."""
-        points = arcs.start.at(rows).places(arcs.radius_mm[rows], at_mm)
-        away = [one.shape.distance_mm(points) for one in self._scene.avoided]
-        return np.asarray(np.min(away, axis=0))
 
     def _plan(self, levels: list[_Arcs], index: int, row: int, foot_mm: float) -> Plan:
         """The way that ends on this arc of a level."""
