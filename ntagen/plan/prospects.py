@@ -38,7 +38,7 @@ _Flags = NDArray[np.bool_]
 ERRORS: Final = 48
 """So many errors of the end are looked at, always the same ones."""
 
-ROLL_PLACES: Final = (14, 8)
+ROLL_PLACES: Final = (10, 6)
 """Along an arc, the first roll is looked at in so many places, and each later one."""
 
 SPUN_PLACES: Final = (8, 4)
