@@ -44,7 +44,6 @@ from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import Moves, pieces
 from ntagen.drive.planning import Lack, Planner
 from ntagen.drive.posterior import promise_of
-from ntagen.drive.prospect import prefers
 from ntagen.drive.records import Ended, Journal, Predicted, Promised, Record, Relied
 from ntagen.drive.reliance import relies_on
 from ntagen.drive.reserve import is_enough, is_surely_in
@@ -195,7 +194,7 @@ class Controller:
     def _is_sure_of_target(self, estimate: Estimate) -> bool:
         """Whether the tip is in the last target with the confidence that is asked for."""
         target = self._learner.a_priori.targets[-1]
-        if target.motion is not None or not prefers(self._settings):
+        if target.motion is not None or not self._settings.counts_reserve:
             return True
         return confidence_in(target, estimate) >= self._settings.accept
 
@@ -344,13 +343,17 @@ class Controller:
         if self._is_there(measurement):
             self._guide.leave()
             return Event.IN_TARGET
-        depth_mm = self._needle.depth_mm
-        if depth_mm - self._reviewed_mm >= self._settings.review_mm - _SMALL_MM:
-            self._reviewed_mm = depth_mm
+        if self._is_review_due():
+            self._reviewed_mm = depth_mm = self._needle.depth_mm
             estimate = self._needle.glance()
             scene = self._learner.scene(estimate.tip, estimate.radius_mm, depth_mm)
             self._look_for_promise(scene, estimate)
         return Event.AS_PREDICTED
+
+    def _is_review_due(self) -> bool:
+        """Whether the needle was inserted far enough since the last look at what it follows."""
+        since_mm = self._needle.depth_mm - self._reviewed_mm
+        return since_mm >= self._settings.review_mm - _SMALL_MM
 
     def _look_for_promise(self, scene: Scene, estimate: Estimate) -> None:
         """Follows a strategy that wins from here against all that the estimate leaves open."""
@@ -405,10 +408,9 @@ class Controller:
         If it does, the tip is expected where the newest estimate says. If it has little reserve,
         a better plan is looked for, and the rest is one of the choices.
         """
-        depth_mm = self._needle.depth_mm
-        if depth_mm - self._reviewed_mm < self._settings.review_mm - _SMALL_MM or not self._moves:
+        if not self._is_review_due() or not self._moves:
             return Event.AS_PREDICTED
-        self._reviewed_mm = depth_mm
+        self._reviewed_mm = self._needle.depth_mm
         estimate = self._needle.glance()
         scene, rest = self._left(estimate)
         certificate = certify(rest, scene)

@@ -25,7 +25,7 @@ def require_knowable(settings: Settings, scene: Scene) -> None:
         InputError: The target is too small.
     """
     target = scene.targets[-1]
-    if settings.ranking[0] != "reserve" or target.motion is not None:
+    if not settings.counts_reserve or target.motion is not None:
         return
     depth_mm, std_mm = target.shape.depth_mm, _best_std_mm(settings, scene)
     normal = NormalDist()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from ntagen.drive.learning import Learner
-from ntagen.drive.prospect import by_prospect, prefers
+from ntagen.drive.prospect import by_prospect
 from ntagen.drive.records import Journal, Synthesised, Timed
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import push_seconds
@@ -160,7 +160,7 @@ class Planner:
         found = self._synthesise(scene) if asked is None else self._synthesise(scene, asked)
         if rest is not None:
             found = found.with_plan(rest)
-        if not prefers(self._settings):
+        if not self._settings.counts_reserve:
             return found
         estimate, left_s = self._needle.known, self.left_s()
         return timed(found, lambda one: by_prospect(one, estimate, self._settings, left_s))
@@ -198,7 +198,7 @@ class Planner:
 
     def _has_tube(self, scene: Scene) -> bool:
         """Whether plans are judged by their tubes."""
-        return prefers(self._settings) and scene.breath is None
+        return self._settings.counts_reserve and scene.breath is None
 
     def _shorter(self, scene: Scene, back_mm: float) -> Scene:
         """The scene with a needle so short that its plans, with all their rolls, end in time.

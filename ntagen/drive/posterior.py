@@ -22,7 +22,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.drive.prospect import prefers
 from ntagen.drive.settings import Settings
 from ntagen.errors import NtagenError
 from ntagen.needle.estimate import Estimate
@@ -109,7 +108,8 @@ def promise_of(
     """
     target = scene.targets[-1]
     is_static = scene.tissue.kind == "static" and scene.breath is None
-    if not (settings.guarantee and prefers(settings) and is_static and len(scene.targets) == 1):
+    is_played = settings.guarantee and settings.counts_reserve
+    if not (is_played and is_static and len(scene.targets) == 1):
         return None
     tip_mm = scene.needle.tip.position_mm
     straight_mm = math.dist(tip_mm, target.center_mm)

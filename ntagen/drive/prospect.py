@@ -30,11 +30,6 @@ _STEP: Final = 0.04
 """Prospects are compared in steps of this size: two errors of the end in 48."""
 
 
-def prefers(settings: Settings) -> bool:
-    """Whether plans are ranked by prospects: for needles that do not bend exactly as planned."""
-    return settings.ranking[0] == "reserve"
-
-
 def by_prospect(
     synthesis: Synthesis, estimate: Estimate, settings: Settings, left_s: float
 ) -> Synthesis:

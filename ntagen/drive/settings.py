@@ -134,6 +134,11 @@ class Settings:
             )
         parse_ranking(",".join(self.ranking))
 
+    @property
+    def counts_reserve(self) -> bool:
+        """Whether the reserve comes first: for needles that do not bend exactly as planned."""
+        return self.ranking[0] == "reserve"
+
     def with_spacing(self, spacing_mm: float) -> Settings:
         """The same settings with pushes of another length."""
         return dataclasses.replace(self, spacing_mm=spacing_mm)

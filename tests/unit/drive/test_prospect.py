@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import pytest
 
-from ntagen.drive.prospect import by_prospect, prefers
+from ntagen.drive.prospect import by_prospect
 from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate, Estimator, Priors
 from ntagen.needle.measurement import Measurement
@@ -117,4 +117,4 @@ def test_scenes_in_which_nothing_can_be_judged_stay_as_they_are() -> None:
 def test_prospects_count_where_the_reserve_comes_first(
     ranking: tuple[str, ...], expected: bool
 ) -> None:
-    assert prefers(replace(SETTINGS, ranking=ranking)) is expected
+    assert replace(SETTINGS, ranking=ranking).counts_reserve is expected
