@@ -9,7 +9,7 @@ they often begin alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,7 @@ from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import certify
-from ntagen.plan.prospects import Judged, Prospects, first_part
+from ntagen.plan.prospects import Judged, Place, Prospects, first_part
 from ntagen.plan.rank import Candidate, rank
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
@@ -47,17 +47,14 @@ def by_prospect(
     judge = _Judge(scene, estimate, settings, left_s)
     candidates = list(synthesis.candidates)
     # Nothing is better than a plan after which the target is reached whatever the error is.
-    is_sure = any(judge.prospect(one.plan) > 1.0 - 0.5 * _STEP for one in candidates)
-    for first in () if is_sure else _firsts(scene, judge.look_mm):
-        plan = judge.whole(first)
-        if plan is None:
-            continue
-        certificate = certify(plan, scene)
-        if settings.margins.allow(certificate):
-            candidates.append(Candidate(plan, certificate))
+    if max(judge.prospects(candidates), default=0.0) <= 1.0 - 0.5 * _STEP:
+        for plan in judge.wholes(_firsts(scene, judge.look_mm)):
+            certificate = certify(plan, scene)
+            if settings.margins.allow(certificate):
+                candidates.append(Candidate(plan, certificate))
     ranked = rank(candidates, synthesis.ranking)
-    prospects = [-round(judge.prospect(one.plan) / _STEP) for one in ranked]
-    order = sorted(range(len(ranked)), key=lambda index: (prospects[index], index))
+    steps = [-round(prospect / _STEP) for prospect in judge.prospects(ranked)]
+    order = sorted(range(len(ranked)), key=lambda index: (steps[index], index))
     return synthesis.with_candidates(ranked[index] for index in order)
 
 
@@ -91,30 +88,42 @@ class _Judge:
         self._covariance_mm2 = covariance + noise_mm2 * np.eye(3)
         self._known: dict[Plan, Judged] = {}
 
-    def prospect(self, plan: Plan) -> float:
-        """The prospect after the first part of a plan."""
-        return self._judged(first_part(plan, self.look_mm)).prospect
+    def prospects(self, candidates: Sequence[Candidate]) -> list[float]:
+        """The prospect after the first part of each plan."""
+        firsts = [first_part(one.plan, self.look_mm) for one in candidates]
+        return [one.prospect for one in self._judged(firsts)]
 
-    def whole(self, first: Plan) -> Plan | None:
-        """A plan that begins like this; None if there is none."""
-        way = self._judged(first).way
-        return None if way is None else Plan.of([*first.actions, *way.actions])
+    def wholes(self, firsts: Iterable[Plan]) -> list[Plan]:
+        """Plans that begin like these; none for those after which there is no way."""
+        firsts = list(firsts)
+        return [
+            Plan.of([*first.actions, *one.way.actions])
+            for first, one in zip(firsts, self._judged(firsts), strict=True)
+            if one.way is not None
+        ]
 
-    def _judged(self, first: Plan) -> Judged:
-        if first not in self._known:
-            since_mm, spin = math.inf, None
-            for action in first.actions:
-                if isinstance(action, Push):
-                    since_mm += action.length_mm
-                    spin = action.spin
-                elif isinstance(action, Roll):
-                    since_mm, spin = 0.0, None
-            self._known[first] = self._prospects.judge(
-                first.end(self._scene.needle),
-                self._left_mm,
-                self._covariance_mm2,
-                since_roll_mm=since_mm,
-                way_rolls=self._scene.limits.max_rolls - first.roll_count - first.spin_changes,
-                spin=spin,
-            )
-        return self._known[first]
+    def _judged(self, firsts: Iterable[Plan]) -> list[Judged]:
+        firsts = list(firsts)
+        # Each is judged once, in the order in which they come.
+        new = [one for one in dict.fromkeys(firsts) if one not in self._known]
+        if new:
+            places = [self._place(one) for one in new]
+            judged = self._prospects.judge(places, self._left_mm, self._covariance_mm2)
+            self._known.update(zip(new, judged, strict=True))
+        return [self._known[one] for one in firsts]
+
+    def _place(self, first: Plan) -> Place:
+        """Where the needle is after this."""
+        since_mm, spin = math.inf, None
+        for action in first.actions:
+            if isinstance(action, Push):
+                since_mm += action.length_mm
+                spin = action.spin
+            elif isinstance(action, Roll):
+                since_mm, spin = 0.0, None
+        return Place(
+            first.end(self._scene.needle),
+            since_mm,
+            self._scene.limits.max_rolls - first.roll_count - first.spin_changes,
+            spin,
+        )

@@ -14,12 +14,13 @@ about the first ones is not undone for the last. It says which of two places is 
 Rolls are looked at in a few places (`ROLL_PLACES`), and ways are sampled for what they touch; so a
 way of a prospect still needs its certificate. Of the spins, none and the greatest are looked at.
 
-Cost: 2 to 4 ms for a place with two rolls left, of five angles; where the needle may spin, 10 ms.
+Places are judged together: their ways are rows of the same arrays, which is sooner done.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Final
@@ -53,8 +54,8 @@ _SAMPLE_MM: Final = 2.0
 _PIECE_MM: Final = 8.0
 """Ways are looked at in pieces of this length first."""
 
-_ROWS: Final = 128
-"""So many arcs are compared with the target at once."""
+_ROWS: Final = 64
+"""So many arcs of a place are compared with the target at once."""
 
 SOFT_MM: Final = 1.0
 """Over this length at the surface of the target, an error counts in part: a prospect that jumps
@@ -96,6 +97,24 @@ ERROR_POINTS: Final = _normal_points(ERRORS)
 
 
 @dataclass(frozen=True, slots=True)
+class Place:
+    """Where the needle may come, and what it has done by then.
+
+    Attributes:
+        tip: The pose of the tip there.
+        since_roll_mm: How far the last roll is behind.
+        way_rolls: The way has at most so many rolls; None: as many as the scene allows.
+        spin: The spin of the push that led there, which counts until the next roll; None: any may
+            come.
+    """
+
+    tip: Pose
+    since_roll_mm: float = math.inf
+    way_rolls: int | None = None
+    spin: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Judged:
     """What is ahead of a place.
 
@@ -113,9 +132,11 @@ class Judged:
 class _Arcs:
     """Arcs as rows: their starts, how long they may be, and where they branch off from which.
 
-    Each has the roll before it, which is 0 where the spin alone changes, and its own spin.
+    Each belongs to the place that has its number, and has the roll before it, which is 0 where the
+    spin alone changes, and its own spin.
     """
 
+    place: _Rows
     start: Poses
     length_mm: _Array
     radius_mm: _Array
@@ -158,23 +179,23 @@ class _Arcs:
         cosine = bevel @ places.T - np.einsum("ni,ni->n", bevel, center)[:, None]
         return center, sine, cosine
 
-    def least(self, rows: _Rows, places: _Array) -> _Array:
-        """The least distance of any of these arcs to each place.
+    def least(self, rows: _Rows, ends: _Array, firsts: _Rows) -> _Array:
+        """The least distances of groups of arcs to ends; each group begins at one of `firsts`.
 
-        It is that of `nearest`, without where: no angle is computed, and one root for a pair.
+        They are those of `nearest`, without where: no angle is computed, and few roots.
         """
         start, radius_mm = self.start.at(rows), self.radius_mm[rows, None]
-        center, sine, cosine = self._in_plane(start, radius_mm, places)
+        center, sine, cosine = self._in_plane(start, radius_mm, ends)
         in_plane2 = sine**2 + cosine**2
         # The square of the distance to the circle; rounding may make the first part negative.
-        away2 = _squares(center, places) - in_plane2 + (np.sqrt(in_plane2) - radius_mm) ** 2
+        away2 = _squares(center, ends) - in_plane2 + (np.sqrt(in_plane2) - radius_mm) ** 2
         turn = self.length_mm[rows, None] / radius_mm
         after_start, before_end = sine >= 0.0, np.sin(turn) * cosine >= np.cos(turn) * sine
         on_arc = np.where(turn <= math.pi, after_start & before_end, after_start | before_end)
-        end = start.places(radius_mm[:, 0], self.length_mm[rows])
-        ends2 = np.minimum(_squares(start.position, places), _squares(end, places))
-        least2 = np.where(on_arc | (turn >= 2.0 * math.pi), away2, ends2).min(axis=0)
-        return np.asarray(np.sqrt(np.maximum(0.0, least2)))
+        last = start.places(radius_mm[:, 0], self.length_mm[rows])
+        outer2 = np.minimum(_squares(start.position, ends), _squares(last, ends))
+        least2 = np.where(on_arc | (turn >= 2.0 * math.pi), away2, outer2)
+        return np.asarray(np.sqrt(np.maximum(0.0, np.minimum.reduceat(least2, firsts))))
 
 
 def _squares(points: _Array, places: _Array) -> _Array:
@@ -190,6 +211,11 @@ def _pieces(length_mm: _Array, most_mm: float) -> tuple[_Rows, _Array, _Array]:
     half_mm = (0.5 * length_mm / counts)[owners]
     number = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
     return owners, (2 * number + 1) * half_mm, half_mm
+
+
+def _groups(owners: _Rows) -> tuple[_Rows, _Rows, _Rows]:
+    """The owners of rows that are in their order; where the rows of each begin, and how many."""
+    return np.unique(owners, return_index=True, return_counts=True)
 
 
 class Prospects:
@@ -222,38 +248,23 @@ class Prospects:
         return scene.breath is None and len(scene.targets) == 1
 
     def judge(
-        self,
-        place: Pose,
-        left_mm: float,
-        covariance_mm2: _Array,
-        *,
-        since_roll_mm: float = math.inf,
-        way_rolls: int | None = None,
-        spin: float | None = None,
-    ) -> Judged:
-        """What is ahead of a place.
+        self, places: Sequence[Place], left_mm: float, covariance_mm2: _Array
+    ) -> list[Judged]:
+        """What is ahead of each place.
 
         Args:
-            place: The pose of the tip there.
-            left_mm: How far the needle may still be inserted.
+            places: The places.
+            left_mm: How far the needle may still be inserted from them.
             covariance_mm2: That of the error of the end, along x, y and z.
-            since_roll_mm: How far the last roll is behind.
-            way_rolls: The way has at most so many rolls; by default as many as the scene allows.
-            spin: The spin of the push that led there, which counts until the next roll; by default
-                any may come.
         """
-        straight_mm = float(np.linalg.norm(self._middle - np.array(place.position_mm)))
-        left_mm = min(left_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
-        if left_mm <= 0.0:
-            return Judged(0.0, None)
         variances, axes = np.linalg.eigh(covariance_mm2)
         spread = axes * np.sqrt(np.maximum(variances, 0.0))
-        places = self._middle - ERROR_POINTS @ spread.T
+        ends = self._middle - ERROR_POINTS @ spread.T
         useful_mm = self._inside_mm + SOFT_MM
         useful_mm += _FARTHEST_SIGMAS * math.sqrt(max(0.0, float(variances[-1])))
-        best_mm, middle_mm, way = np.full(len(places), math.inf), self._inside_mm, None
-        spins = self._spins if spin is None else (spin,)
-        levels = self._levels(place, spins, left_mm, since_roll_mm, useful_mm)
+        best_mm = np.full((len(places), len(ends)), math.inf)
+        nearest_mm, ways = [self._inside_mm] * len(places), [(-1, 0, 0.0)] * len(places)
+        levels = self._levels(places, left_mm, useful_mm)
         clear: _Flags = np.ones(len(levels[0].length_mm), dtype=bool)
         for index, arcs in enumerate(levels):
             rows = np.flatnonzero(clear)
@@ -261,66 +272,89 @@ class Prospects:
             useful = near[0][:, 0] <= useful_mm
             rows, away_mm, foot_mm = rows[useful], near[0][useful, 0], near[1][useful, 0]
             free = foot_mm < self._touched_at(arcs, rows, foot_mm)
-            rows, away_mm, foot_mm = rows[free], away_mm[free], foot_mm[free]
-            if len(rows):
-                self._look(arcs, rows[np.argsort(away_mm)], places, best_mm)
-                one = int(np.argmin(away_mm))
-                if away_mm[one] < middle_mm and (way_rolls is None or index <= way_rolls):
-                    middle_mm = float(away_mm[one])
-                    way = (index, int(rows[one]), float(foot_mm[one]))
+            # Those of each place follow each other, the nearest one first.
+            order = np.flatnonzero(free)
+            order = order[np.lexsort((away_mm[order], arcs.place[rows[order]]))]
+            rows, away_mm, foot_mm = rows[order], away_mm[order], foot_mm[order]
+            owners, firsts, counts = _groups(arcs.place[rows])
+            self._look(arcs, rows, np.arange(len(rows)) - np.repeat(firsts, counts), ends, best_mm)
+            for owner, first in zip(owners.tolist(), firsts.tolist(), strict=True):
+                most = places[owner].way_rolls
+                if away_mm[first] < nearest_mm[owner] and (most is None or index <= most):
+                    nearest_mm[owner] = float(away_mm[first])
+                    ways[owner] = (index, int(rows[first]), float(foot_mm[first]))
             if index + 1 < len(levels):
                 branches = levels[index + 1]
                 touched_mm = np.zeros(len(clear))
                 all_rows = np.flatnonzero(clear)
                 touched_mm[all_rows] = self._touched_at(arcs, all_rows, arcs.length_mm[all_rows])
                 clear = branches.branch_mm < touched_mm[branches.parent]
-        counted = np.clip((self._inside_mm - best_mm) / SOFT_MM + 0.5, 0.0, 1.0)
-        return Judged(float(counted.mean()), None if way is None else self._plan(levels, *way))
+        counted = np.clip((self._inside_mm - best_mm) / SOFT_MM + 0.5, 0.0, 1.0).mean(axis=1)
+        return [
+            Judged(prospect, None if way[0] < 0 else self._plan(levels, *way))
+            for prospect, way in zip(counted.tolist(), ways, strict=True)
+        ]
 
-    def _look(self, arcs: _Arcs, rows: _Rows, places: _Array, best_mm: _Array) -> None:
-        """Makes the least distance to each place smaller where these arcs pass nearer.
+    def _look(
+        self, arcs: _Arcs, rows: _Rows, numbers: _Rows, ends: _Array, best_mm: _Array
+    ) -> None:
+        """Makes the least distances of places to ends smaller where these arcs pass nearer.
 
         What counts in full already is not looked at again, and the first rows reach most.
-        """
-        for first in range(0, len(rows), _ROWS):
-            is_open = best_mm > self._inside_mm - 0.5 * SOFT_MM
-            if not is_open.any():
-                return
-            found_mm = arcs.least(rows[first : first + _ROWS], places[is_open])
-            best_mm[is_open] = np.minimum(best_mm[is_open], found_mm)
 
-    def _levels(
-        self,
-        place: Pose,
-        spins: tuple[float, ...],
-        left_mm: float,
-        since_roll_mm: float,
-        useful_mm: float,
-    ) -> list[_Arcs]:
-        """All arcs: straight from the place, then those after one roll, two rolls and so on.
+        Args:
+            arcs: The arcs of a level.
+            rows: Those that count, those of each place together.
+            numbers: The number of each among those of its place.
+            ends: Where the middle of the target may be.
+            best_mm: The least distances: a row for each place, a column for each end.
+        """
+        for first in range(0, int(numbers.max(initial=-1)) + 1, _ROWS):
+            is_open = best_mm > self._inside_mm - 0.5 * SOFT_MM
+            chosen = (numbers >= first) & (numbers < first + _ROWS)
+            chosen &= is_open.any(axis=1)[arcs.place[rows]]
+            if not chosen.any():
+                return
+            columns = is_open.any(axis=0)
+            owners, firsts, _ = _groups(arcs.place[rows[chosen]])
+            found_mm = arcs.least(rows[chosen], ends[columns], firsts)
+            cells = np.ix_(owners, columns)
+            best_mm[cells] = np.minimum(best_mm[cells], found_mm)
+
+    def _levels(self, places: Sequence[Place], most_mm: float, useful_mm: float) -> list[_Arcs]:
+        """All arcs: straight from the places, then those after one roll, two rolls and so on.
 
         Those that come no nearer to the target than `useful_mm`, however they bend, are left out.
         """
         limits = self._scene.limits
-        vectors = (place.position_mm, place.heading, place.bevel)
-        count = len(spins)
-        start = Poses(*(np.array([vector] * count, dtype=np.float64) for vector in vectors))
-        none, spun = np.zeros(count), np.array(spins)
-        radii_mm = self._radius_mm / (1.0 - spun)
-        lengths_mm, rows = np.full(count, left_mm), np.arange(count)
-        levels = [_Arcs(start, lengths_mm, radii_mm, rows, none, none, spun)]
+        tips = [(one.tip.position_mm, one.tip.heading, one.tip.bevel) for one in places]
+        tip = Poses(*np.array(tips, dtype=np.float64).swapaxes(0, 1))
+        straight_mm = lengths(self._middle - tip.position)
+        left_mm = np.minimum(most_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
+        first = [
+            (number, spin)
+            for number, one in enumerate(places)
+            if left_mm[number] > 0.0
+            for spin in (self._spins if one.spin is None else (one.spin,))
+        ]
+        owner, spun = (
+            np.array([one[0] for one in first], np.intp),
+            np.array([one[1] for one in first]),
+        )
+        none, radii_mm = np.zeros(len(owner)), self._radius_mm / (1.0 - spun)
+        levels = [_Arcs(owner, tip.at(owner), left_mm[owner], radii_mm, owner, none, none, spun)]
         apart_mm = limits.min_roll_distance_mm
         roll_places = ROLL_PLACES if len(self._spins) == 1 else SPUN_PLACES
-        first_mm = max(0.0, apart_mm - since_roll_mm)
+        first_mm = np.array([max(0.0, apart_mm - one.since_roll_mm) for one in places])
         for number in range(limits.max_rolls):
             before = levels[-1]
             count = roll_places[min(number, len(roll_places) - 1)]
-            spacing_mm = left_mm / count
-            along_mm: _Array = first_mm + spacing_mm * np.arange(count, dtype=np.float64)
-            rows, places = np.nonzero(along_mm < before.length_mm[:, None] - _TINY_MM)
+            spacing_mm = left_mm[before.place] / count
+            along_mm = first_mm[before.place, None] + spacing_mm[:, None] * np.arange(count)
+            rows, columns = np.nonzero(along_mm < before.length_mm[:, None] - _TINY_MM)
             if not len(rows):
                 break
-            at_mm: _Array = along_mm[places]
+            at_mm = along_mm[rows, columns]
             start = before.start.at(rows).pushed(before.radius_mm[rows], at_mm)
             rest_mm = before.length_mm[rows] - at_mm
             kept = np.flatnonzero(self._can_reach(start, rest_mm, useful_mm))
@@ -333,11 +367,21 @@ class Prospects:
             if len(self._spins) > 1:
                 changes = (roll_rad != 0.0) | (spun != before.spin[rows[each]])
                 each, roll_rad, spun = each[changes], roll_rad[changes], spun[changes]
-            rolled, radii_mm = start.at(each).rolled(roll_rad), self._radius_mm / (1.0 - spun)
+            parent, rolled = rows[each], start.at(each).rolled(roll_rad)
+            radii_mm = self._radius_mm / (1.0 - spun)
             levels.append(
-                _Arcs(rolled, rest_mm[each], radii_mm, rows[each], at_mm[each], roll_rad, spun)
+                _Arcs(
+                    before.place[parent],
+                    rolled,
+                    rest_mm[each],
+                    radii_mm,
+                    parent,
+                    at_mm[each],
+                    roll_rad,
+                    spun,
+                )
             )
-            first_mm = max(apart_mm, _LEAST_APART_MM)
+            first_mm = np.full(len(places), max(apart_mm, _LEAST_APART_MM))
         return levels
 
     def _can_reach(self, start: Poses, rest_mm: _Array, useful_mm: float) -> _Flags:

@@ -15,7 +15,7 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import certify
-from ntagen.plan.prospects import Prospects, first_part
+from ntagen.plan.prospects import Place, Prospects, first_part
 from ntagen.plan.rank import ROBUST_RANKING, Candidate, rank
 from ntagen.plan.synthesise import Synthesis
 from ntagen.scene import Scene
@@ -61,7 +61,9 @@ def prospect(plan: Plan, here: Scene, estimate: Estimate) -> float:
     covariance = estimate.position_covariance_mm2(ahead_mm - look_mm)
     prospects = Prospects(here, SETTINGS.margins.depth_mm)
     place = first_part(plan, look_mm).end(here.needle)
-    return prospects.judge(place, here.needle.length_mm - look_mm, covariance).prospect
+    left_mm = here.needle.length_mm - look_mm
+    (judged,) = prospects.judge([Place(place)], left_mm, covariance)
+    return judged.prospect
 
 
 def test_plans_are_ordered_by_the_prospect_of_where_they_are_looked_at_again() -> None:

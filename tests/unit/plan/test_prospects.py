@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from ntagen.needle.kinematics import Arc, roll
 from ntagen.needle.poses import Poses
@@ -17,6 +18,8 @@ from ntagen.plan.prospects import (
     ERROR_POINTS,
     ROLL_PLACES,
     SOFT_MM,
+    Judged,
+    Place,
     Prospects,
     _Arcs,
     first_part,
@@ -45,14 +48,27 @@ def test_the_least_distance_of_arcs_is_that_of_each_arc() -> None:
         rows = Poses(*(np.array([one]) for one in (start.position_mm, heading, bevel)))
         none = np.zeros(1)
         arcs = _Arcs(
-            rows, np.array([length_mm]), np.array([radius_mm]), np.zeros(1, int), none, none, none
+            np.zeros(1, int),
+            rows,
+            np.array([length_mm]),
+            np.array([radius_mm]),
+            np.zeros(1, int),
+            none,
+            none,
+            none,
         )
         expected = [arc.nearest_to(tuple(one)).distance_mm for one in places.tolist()]
-        assert arcs.least(np.zeros(1, int), places) == pytest.approx(expected, abs=1e-6)
+        (least,) = arcs.least(np.zeros(1, int), places, np.zeros(1, int))
+        assert least == pytest.approx(expected, abs=1e-6)
+
+
+def judge(of: Scene, place: Place, left_mm: float, covariance_mm2: NDArray[np.float64]) -> Judged:
+    (found,) = Prospects(of, DEPTH_MM).judge([place], left_mm, covariance_mm2)
+    return found
 
 
 def judged(of: Scene, place: Pose = ENTRY, std_mm: float = 1.0) -> float:
-    return Prospects(of, DEPTH_MM).judge(place, 60.0, std_mm**2 * ROUND).prospect
+    return judge(of, Place(place), 60.0, std_mm**2 * ROUND).prospect
 
 
 def aside(x_mm: float, z_mm: float) -> Pose:
@@ -99,7 +115,7 @@ def test_a_prospect_is_that_of_all_arcs() -> None:
         stds_mm = (draw.uniform(0.2, 3.0), draw.uniform(0.2, 3.0), draw.uniform(0.2, 3.0))
         left_mm = draw.uniform(35.0, 80.0)
         covariance = np.diag(np.square(stds_mm))
-        found = Prospects(one_roll, DEPTH_MM).judge(place, left_mm, covariance).prospect
+        found = judge(one_roll, Place(place), left_mm, covariance).prospect
         expected = one_by_one(one_roll, place, left_mm, stds_mm)
         assert found == pytest.approx(expected, abs=1e-6)
         values.append(found)
@@ -131,7 +147,7 @@ def test_the_less_is_known_the_worse_is_a_place() -> None:
 def test_a_wall_leaves_no_way() -> None:
     wall = sphere("C", "critical", (0.0, -25.0, 0.0), 12.0)
     blocked = scene(wall, targets=FREE.targets)
-    found = Prospects(blocked, DEPTH_MM).judge(aside(0.0, 0.5), 60.0, ROUND)
+    found = judge(blocked, Place(aside(0.0, 0.5)), 60.0, ROUND)
     assert found.prospect == 0.0
     assert found.way is None
     assert judged(PAPER) > 0.9
@@ -147,8 +163,7 @@ def test_the_way_holds_in_exact_kinematics() -> None:
         )
         rolls = draw.choice([0, 1, 2])
         since_mm = draw.choice([0.0, 1.0, math.inf])
-        prospects = Prospects(of, DEPTH_MM)
-        found = prospects.judge(place, 70.0, ROUND, since_roll_mm=since_mm, way_rolls=rolls)
+        found = judge(of, Place(place, since_mm, rolls), 70.0, ROUND)
         if found.way is None:
             continue
         ways += 1
@@ -170,9 +185,37 @@ def test_the_way_holds_in_exact_kinematics() -> None:
 
 
 def test_a_needle_that_is_too_short_has_no_prospect() -> None:
-    found = Prospects(FREE, DEPTH_MM).judge(ENTRY, 20.0, 0.01 * ROUND)
-    assert found.prospect == 0.0
-    assert Prospects(FREE, DEPTH_MM).judge(ENTRY, 0.0, ROUND).prospect == 0.0
+    for left_mm in (20.0, 0.0):
+        found = judge(FREE, Place(ENTRY), left_mm, 0.01 * ROUND)
+        assert found.prospect == 0.0
+        assert found.way is None
+
+
+def test_places_that_are_judged_together_are_judged_as_alone() -> None:
+    draw = random.Random(3)
+    of = scene(CRITICAL, targets=[sphere("T", "target", (2.0, -45.0, 1.0), 3.0)])
+    spinning = replace(of, limits=replace(of.limits, spins=(0.25, 0.5)))
+    for one in (of, spinning):
+        places = [
+            Place(
+                roll(
+                    aside(draw.uniform(-9.0, 9.0), draw.uniform(-9.0, 9.0)), draw.uniform(0.0, 6.0)
+                ),
+                draw.choice([0.0, 1.0, math.inf]),
+                draw.choice([None, 0, 1, 2]),
+                draw.choice([None, 0.0]),
+            )
+            for _ in range(30)
+        ]
+        # From here, the target is too far away.
+        places.insert(7, Place(aside(500.0, 0.0)))
+        together = Prospects(one, DEPTH_MM).judge(places, 70.0, ROUND)
+        for place, found in zip(places, together, strict=True):
+            alone = judge(one, place, 70.0, ROUND)
+            assert found.prospect == pytest.approx(alone.prospect, abs=1e-9)
+            assert found.way == alone.way
+        assert len({round(found.prospect, 2) for found in together}) > 10
+        assert sum(found.way is not None for found in together) > 5
 
 
 def test_which_scenes_suit() -> None:
