@@ -12,10 +12,10 @@ single plan, several times, each time for more than the best plan so far has:
 3. with that clearance, and fewer rolls, if they come before the length in the ranking: else the
    answer changed no drive.
 
-If the ranking begins with the reserve, all regions to avoid are larger and the target is smaller.
-Then "no plan" is dearer to prove, so there are only two questions: for 3 mm, then for more or less.
-If nothing known is in the straight way to the target, the plans along it are listed last: there
-a region that nobody told of is least likely, since it is the way that the operator looked at.
+If the ranking begins with the reserve, one plan with 2 mm of it is asked for: in a scene in which
+all regions to avoid are larger and the target is smaller. Where there is none, any plan is asked
+for. Questions for more, or for what is between, changed no drive.
+
 
 Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
 equal scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
@@ -25,21 +25,17 @@ Cost: about 15 ms for a question about the paper's needle.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Final
 
 from ntagen.errors import LimitError
-from ntagen.needle.kinematics import Arc
-from ntagen.needle.nearest import nearest_to
-from ntagen.needle.vectors import combine, distance, scale, subtract
 from ntagen.plan.actions import Plan
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.neighbours import improved
 from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM, Candidate, rank, reserve_of
 from ntagen.plan.stricter import BETWEEN_STEPS_MM, shorter, stricter
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
-from ntagen.scene import Pose, Region, Scene
+from ntagen.scene import Scene
 
 _MOST_LISTED: Final = 600
 """All plans are listed if so few sequences of rolls can begin at so few places."""
@@ -65,23 +61,11 @@ _MORE_STEPS: Final = 2
 """A plan with more clearance may be so many steps longer than the first one that was found. Without
 this limit, the longest questions take twice as long, and their plans are not better."""
 
-_FIRST_RESERVE_MM: Final = 3.0
-"""The reserve that is asked for first: a needle in a phantom errs about that much in 30 mm."""
-
-_LESS_RESERVE_MM: Final = 1.5
-"""The reserve that is asked for if the first one cannot be had."""
+_RESERVE_MM: Final = 2.0
+"""The reserve that is asked for: a needle in a phantom errs about that much in 20 mm."""
 
 _SMALL_RESERVES_MM: Final = (1.0, 0.6, 0.3, 0.0)
 """What is asked for where regions move, until there is a plan that holds."""
-
-_GATE_RATIO: Final = 0.3
-"""The radius of a place on the straight way, relative to that of the target."""
-
-_GATE_FROM_RATIO: Final = 2.0
-"""From nearer than this many radii of the target, the way to it is what it is."""
-
-_MOST_STRAIGHT: Final = 12
-"""At most so many plans along the straight way are compared; they are much alike."""
 
 _RESOLUTION_MM: Final = 0.2
 """Less additional clearance than this is not asked for."""
@@ -106,52 +90,47 @@ class BestPlanSynthesiser:
         asks = self.engine.ranking[0] in ("clearance", "reserve")
         if sequences(scene) <= _MOST_LISTED or not asks:
             return self.engine(scene, asked)
-        first = self.one(asked or scene, keeps_strategy=self.engine.keeps_strategy)
-        if asked is not None and not first.plans:
-            return self(scene)
-        known = _Known(self, scene, first)
-        if first.plans:
-            known.raise_worth()
-            known.lower_rolls()
-            known.straighten()
-            is_listed = sequences(scene) <= MOST_WHEN_NARROW
-            if known.asks_for_list and is_listed and scene.breath is None:
+        known = _Known(self.engine, scene)
+        known.look(asked)
+        if known.found and known.asks_for_list and scene.breath is None:
+            if sequences(scene) <= MOST_WHEN_NARROW:
                 # Every plan that was found fails its certificate, or comes near a region: the list
                 # tells whether all do.
                 return self.engine(scene, asked)
-            if not known.candidates and scene.breath is None:
-                return replace(self.engine, max_plans=min(_MOST_TRIED, self.engine.max_plans))(
-                    scene
-                )
+            if not known.candidates:
+                few = min(_MOST_TRIED, self.engine.max_plans)
+                return replace(self.engine, max_plans=few)(scene)
         return Synthesis(
             scene=scene,
-            model_xml=first.model_xml,
+            model_xml=known.origin.model_xml,
             found=known.found,
             candidates=rank(known.candidates, self.engine.ranking),
             seconds=known.seconds,
             margins=self.engine.margins,
             ranking=self.engine.ranking,
-            strategy_json=first.strategy_json,
+            strategy_json=known.origin.strategy_json,
             # Without any plan nothing is left out.
-            is_complete=not first.plans,
+            is_complete=not known.found,
         )
-
-    def one(self, scene: Scene, *, keeps_strategy: bool = False) -> Listing:
-        """At most one plan of a scene, whether it holds or not."""
-        return replace(self.engine, max_plans=1, keeps_strategy=keeps_strategy).listed(scene)
 
 
 class _Known:
-    """What is known of a scene's plans so far."""
+    """What is known of a scene's plans so far.
 
-    def __init__(self, asker: BestPlanSynthesiser, scene: Scene, first: Listing) -> None:
-        self._asker = asker
+    Attributes:
+        candidates: The plans that hold.
+        seconds: The time that the engine took.
+        origin: The first answer with a plan; without any, the last answer.
+    """
+
+    origin: Listing
+
+    def __init__(self, engine: EngineSynthesiser, scene: Scene) -> None:
+        self._engine = replace(engine, max_plans=1)
         self._scene = scene
-        self._first = first
         self._plans: dict[Plan, None] = {}
         self.candidates: list[Candidate] = []
         self.seconds = 0.0
-        self._note(first)
 
     @property
     def found(self) -> int:
@@ -169,14 +148,37 @@ class _Known:
             return best is None
         return best.certificate.critical_clearance_mm < _NARROW_MM
 
-    def raise_worth(self) -> None:
-        """Asks for more than the best plan has, as far as it is useful."""
+    def look(self, asked: Scene | None) -> None:
+        """Asks for a plan of the scene, and for better ones if there is one.
+
+        Args:
+            asked: A stricter scene, that is asked before the scene itself if reserve counts.
+        """
         if self._counts_reserve:
-            self._raise_reserve()
-            return
+            self._look_for_reserve(asked)
+        else:
+            self._note(self._engine.listed(self._scene))
+            if self._plans:
+                self._raise_clearance()
+        if self.candidates:
+            self._lower_rolls()
+
+    def _look_for_reserve(self, asked: Scene | None) -> None:
+        found = self._ask(self._scene, _RESERVE_MM)
+        for scene in (self._scene,) if asked is None else (asked, self._scene):
+            if found is None:
+                found = self._note(self._engine.listed(scene))
+        if self._scene.breath is not None and self.found:
+            # A list of all plans would take too long.
+            for less_mm in _SMALL_RESERVES_MM:
+                if not self.candidates:
+                    self._ask(self._scene, less_mm)
+
+    def _raise_clearance(self) -> None:
+        """Asks for more clearance than the best plan has, as far as it is useful."""
         if not self._scene.criticals and self.candidates:
             return
-        longest_mm = self._first.plans[0].length_mm + _MORE_STEPS * step_length_mm(self._scene)
+        longest_mm = self.origin.plans[0].length_mm + _MORE_STEPS * step_length_mm(self._scene)
         no_longer = shorter(self._scene, longest_mm)
         wanted_mm = most_mm = USEFUL_CLEARANCE_MM
         for _ in range(_CLEARANCE_QUESTIONS):
@@ -193,34 +195,20 @@ class _Known:
                 most_mm = wanted_mm
             wanted_mm = 0.5 * (max(0.0, self._worth_mm()) + most_mm)
 
-    def _raise_reserve(self) -> None:
-        if self._worth_mm() < _FIRST_RESERVE_MM:
-            self._ask(self._scene, _FIRST_RESERVE_MM)
-        if self._worth_mm() >= _FIRST_RESERVE_MM:
-            if self._worth_mm() < USEFUL_RESERVE_MM:
-                self._ask(self._scene, USEFUL_RESERVE_MM)
-        elif self._worth_mm() < _LESS_RESERVE_MM:
-            self._ask(self._scene, _LESS_RESERVE_MM)
-        if self._scene.breath is not None:
-            # A list of all plans would take too long.
-            for less_mm in _SMALL_RESERVES_MM:
-                if not self.candidates:
-                    self._ask(self._scene, less_mm)
-
     def _change(self, found: Candidate) -> None:
         """Adds the best plan that small changes of a plan lead to, if the model has it."""
-        engine = self._asker.engine
+        engine = self._engine
         better = improved(found, self._scene, engine.margins.allow, engine.ranking)
         if better.plan in self._plans:
             return
-        if self._first.has(better.plan, self._scene):
+        if self.origin.has(better.plan, self._scene):
             self._plans[better.plan] = None
             self.candidates.append(better)
 
-    def lower_rolls(self) -> None:
-        """Asks for fewer rolls at the clearance of the best plan."""
+    def _lower_rolls(self) -> None:
+        """Asks for fewer rolls at the clearance or reserve of the best plan."""
         best = self._best()
-        if not _prefers_few_rolls(self._asker.engine.ranking) or best is None:
+        if not _prefers_few_rolls(self._engine.ranking) or best is None:
             return
         if best.certificate.roll_count == 0:
             return
@@ -229,38 +217,31 @@ class _Known:
         useful_mm = min(most_mm, self._worth_mm())
         self._ask(replace(self._scene, limits=fewer), useful_mm)
 
-    def straighten(self) -> None:
-        """Lists plans along the straight way to the target, if that is free."""
-        gates = _gates(self._scene)
-        # Where regions move, the straight way is another at each time.
-        if not self._counts_reserve or not gates or self._scene.breath is not None:
-            return
-        gated = self._scene.with_targets([*gates, *self._scene.targets])
-        wanted = self._strict(gated, min(USEFUL_RESERVE_MM, self._worth_mm()))
-        few = replace(self._asker.engine, max_plans=_MOST_STRAIGHT, keeps_strategy=False)
-        self._note(few.listed(wanted))
-
     @property
     def _counts_reserve(self) -> bool:
-        return self._asker.engine.ranking[0] == "reserve"
+        return self._engine.ranking[0] == "reserve"
 
     def _ask(self, scene: Scene, worth_mm: float) -> Candidate | None:
-        """Asks for a plan that has this clearance or reserve; gives one that holds, or None."""
-        asker = self._asker
+        """Asks for a plan that has this clearance or reserve; gives one that holds, or None.
+
+        A count of states is the same in replays.
+        """
+        most_states = self._engine.max_states
         if scene.breath is not None:
-            # Waits make "no" dear to prove. A count of states is the same in replays.
-            few = replace(asker.engine, max_states=_MOST_STATES_IN_TIME)
-            asker = replace(asker, engine=few)
+            # Waits make "no" dear to prove.
+            most_states = _MOST_STATES_IN_TIME
+        keeps_strategy = self._engine.keeps_strategy and not self._plans
+        engine = replace(self._engine, max_states=most_states, keeps_strategy=keeps_strategy)
         try:
-            return self._note(asker.one(self._strict(scene, worth_mm)))
+            return self._note(engine.listed(self._strict(scene, worth_mm)))
         except LimitError:
-            if scene.breath is None:
+            if most_states == self._engine.max_states:
                 raise
             return None
 
     def _strict(self, scene: Scene, worth_mm: float) -> Scene:
         """The scene whose plans have this clearance or reserve."""
-        depth_mm = self._asker.engine.margins.depth_mm
+        depth_mm = self._engine.margins.depth_mm
         shells_mm = min(worth_mm, BETWEEN_STEPS_MM)
         if self._counts_reserve:
             depth_mm = max(depth_mm, worth_mm)
@@ -271,14 +252,16 @@ class _Known:
     def _note(self, listing: Listing) -> Candidate | None:
         """Certifies what was found in the scene itself; one that holds, or None."""
         self.seconds += listing.seconds
-        engine = self._asker.engine
+        if not self._plans:
+            self.origin = listing
+        engine = self._engine
         holding = select(listing.plans, self._scene, engine.margins, engine.ranking)
         self.candidates += [one for one in holding if one.plan not in self._plans]
         self._plans.update(dict.fromkeys(listing.plans))
         return holding[0] if holding else None
 
     def _best(self) -> Candidate | None:
-        ranked = rank(self.candidates, self._asker.engine.ranking)
+        ranked = rank(self.candidates, self._engine.ranking)
         return ranked[0] if ranked else None
 
     def _worth_mm(self) -> float:
@@ -313,28 +296,3 @@ def sequences(scene: Scene) -> float:
     waits = 1.0 if scene.breath is None else scene.breath.period_s / scene.breath.wait_s
     pauses = 0 if scene.breath is None else min(scene.breath.max_pauses, _MOST_PAUSES)
     return float(bevels * (steps * angles) ** scene.limits.max_rolls) * (steps * waits) ** pauses
-
-
-def _gates(scene: Scene) -> list[Region]:
-    """Places to visit on the straight way to the only target; none if it is blocked or short."""
-    target, tip_mm = scene.targets[-1], scene.needle.tip.position_mm
-    away_mm = distance(tip_mm, target.center_mm)
-    reach_mm = target.shape.reach_mm()
-    if len(scene.targets) > 1 or away_mm < _GATE_FROM_RATIO * reach_mm:
-        return []
-    heading = scale(1.0 / away_mm, subtract(target.center_mm, tip_mm))
-    way = (Arc(Pose(tip_mm, heading, scene.needle.tip.bevel), math.inf, away_mm),)
-    if any(nearest_to(way, tip_mm, one.shape).distance_mm <= 0.0 for one in scene.avoided):
-        return []
-    shares = [reach_mm / away_mm]
-    if away_mm > 2.0 * _GATE_FROM_RATIO * reach_mm:
-        shares.insert(0, 0.5)
-    return [
-        Region.ball(
-            f"gate {number}",
-            "target",
-            combine(1.0 - share, target.center_mm, share, tip_mm),
-            _GATE_RATIO * target.shape.depth_mm,
-        )
-        for number, share in enumerate(shares)
-    ]

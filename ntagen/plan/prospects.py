@@ -61,9 +61,6 @@ SOFT_MM: Final = 1.0
 """Over this length at the surface of the target, an error counts in part: a prospect that jumps
 would make the driver jump."""
 
-_FARTHEST_SIGMAS: Final = 4.0
-"""Ways that miss the target by more standard deviations are of no use."""
-
 _LONGEST_RATIO: Final = 1.5
 """Ways are at most this much longer than the straight one."""
 
@@ -241,6 +238,8 @@ class Prospects:
         self._reaches_mm = np.array([one.shape.reach_mm() for one in scene.avoided])
         self._reach_mm = target.shape.reach_mm()
         self._inside_mm = max(_LEAST_MM, target.shape.depth_mm - depth_mm)
+        # What is farther away than this does not count.
+        self._counted_mm = self._inside_mm + 0.5 * SOFT_MM
 
     @staticmethod
     def suits(scene: Scene) -> bool:
@@ -260,8 +259,8 @@ class Prospects:
         variances, axes = np.linalg.eigh(covariance_mm2)
         spread = axes * np.sqrt(np.maximum(variances, 0.0))
         ends = self._middle - ERROR_POINTS @ spread.T
-        useful_mm = self._inside_mm + SOFT_MM
-        useful_mm += _FARTHEST_SIGMAS * math.sqrt(max(0.0, float(variances[-1])))
+        # What is farther from the middle than this is of no use for any end.
+        useful_mm = self._counted_mm + float(lengths(ends - self._middle).max())
         best_mm = np.full((len(places), len(ends)), math.inf)
         nearest_mm, ways = [self._inside_mm] * len(places), [(-1, 0, 0.0)] * len(places)
         levels = self._levels(places, left_mm, useful_mm)
@@ -277,7 +276,8 @@ class Prospects:
             order = order[np.lexsort((away_mm[order], arcs.place[rows[order]]))]
             rows, away_mm, foot_mm = rows[order], away_mm[order], foot_mm[order]
             owners, firsts, counts = _groups(arcs.place[rows])
-            self._look(arcs, rows, np.arange(len(rows)) - np.repeat(firsts, counts), ends, best_mm)
+            numbers = np.arange(len(rows)) - np.repeat(firsts, counts)
+            self._look(arcs, rows, numbers, away_mm, ends, best_mm)
             for owner, first in zip(owners.tolist(), firsts.tolist(), strict=True):
                 most = places[owner].way_rolls
                 if away_mm[first] < nearest_mm[owner] and (most is None or index <= most):
@@ -296,7 +296,13 @@ class Prospects:
         ]
 
     def _look(
-        self, arcs: _Arcs, rows: _Rows, numbers: _Rows, ends: _Array, best_mm: _Array
+        self,
+        arcs: _Arcs,
+        rows: _Rows,
+        numbers: _Rows,
+        away_mm: _Array,
+        ends: _Array,
+        best_mm: _Array,
     ) -> None:
         """Makes the least distances of places to ends smaller where these arcs pass nearer.
 
@@ -304,18 +310,22 @@ class Prospects:
 
         Args:
             arcs: The arcs of a level.
-            rows: Those that count, those of each place together.
+            rows: Those that count, those of each place together, the nearest to the middle first.
             numbers: The number of each among those of its place.
+            away_mm: The distance of each to the middle.
             ends: Where the middle of the target may be.
             best_mm: The least distances: a row for each place, a column for each end.
         """
+        moved_mm = lengths(ends - self._middle)
         for first in range(0, int(numbers.max(initial=-1)) + 1, _ROWS):
             is_open = best_mm > self._inside_mm - 0.5 * SOFT_MM
             chosen = (numbers >= first) & (numbers < first + _ROWS)
             chosen &= is_open.any(axis=1)[arcs.place[rows]]
-            if not chosen.any():
+            # An arc is at least as far from an end as from the middle, less what is between them.
+            least_mm = away_mm[chosen].min(initial=math.inf)
+            columns = is_open.any(axis=0) & (moved_mm > least_mm - self._counted_mm)
+            if not columns.any():
                 return
-            columns = is_open.any(axis=0)
             owners, firsts, _ = _groups(arcs.place[rows[chosen]])
             found_mm = arcs.least(rows[chosen], ends[columns], firsts)
             cells = np.ix_(owners, columns)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 
 import pytest
 
-from ntagen.needle.path import sample_poses
-from ntagen.plan.best_plan import BestPlanSynthesiser, _gates, sequences
+from ntagen.plan.best_plan import BestPlanSynthesiser, sequences
 from ntagen.plan.rank import ROBUST_RANKING, USEFUL_CLEARANCE_MM, reserve_of
 from ntagen.plan.stricter import deeper
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis
@@ -53,40 +51,6 @@ def test_its_best_plan_has_about_as_much_reserve_as_the_best_of_all(where: Scene
     best_mm = reserve_of(all_listed.best.certificate)
     assert reserve_of(within_budget.best.certificate) >= best_mm - 1.0
     assert within_budget.found <= 15 < all_listed.found
-
-
-def aside_mm(synthesis: Synthesis, where: Scene) -> float:
-    """How far the best plan gets from the straight way, which is the axis of the scene."""
-    assert synthesis.best is not None
-    poses = sample_poses(synthesis.best.plan.arcs(where.needle), 0.5)
-    return max(math.hypot(pose.position_mm[0], pose.position_mm[2]) for pose in poses)
-
-
-def test_a_free_straight_way_is_followed() -> None:
-    straight, swung = (
-        aside_mm(BestPlanSynthesiser(EngineSynthesiser(ranking=ranking))(OPEN), OPEN)
-        for ranking in (ROBUST_RANKING, ("reserve", "rolls", "length"))
-    )
-    # One roll less, and the needle swings out twice as far.
-    assert 1.8 * straight < swung
-
-
-@pytest.mark.parametrize(
-    ("center_mm", "is_free"),
-    [((0.0, -25.0, 3.5), True), ((0.0, -25.0, 2.5), False), ((0.0, 9.0, 0.0), True)],
-)
-def test_a_region_in_the_straight_way_blocks_it(
-    center_mm: tuple[float, float, float], is_free: bool
-) -> None:
-    assert bool(_gates(scene(sphere("C", "critical", center_mm, 3.0)))) is is_free
-
-
-def test_a_short_way_or_one_with_stops_is_not_straightened() -> None:
-    first = sphere("T0", "target", (0.0, -20.0, 0.0), 3.0)
-    near = sphere("T1", "target", (0.0, -15.0, 0.0), 8.0)
-    assert _gates(OPEN)
-    assert not _gates(scene(targets=[near]))
-    assert not _gates(scene(targets=[first, *OPEN.targets]))
 
 
 def test_that_there_is_no_plan_is_said_by_one_question() -> None:
