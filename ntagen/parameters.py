@@ -472,7 +472,7 @@ PARAMETERS: Final = (
         "at, and the tip is in the target.",
         is_above=True,
         most=1.0,
-        sample="0.95",
+        sample="0.98",
     ),
     Parameter(
         "timeout_s",

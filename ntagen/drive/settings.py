@@ -101,7 +101,7 @@ class Settings:
     compensated_lag_rad: float = 0.0
     pull_speed_ratio: float = 5.0
     roll_rad_per_s: float = math.pi
-    accept: float = 0.95
+    accept: float = 0.98
     guarantee: bool = True
     timeout_s: float = 120.0
     sensing_margin_mm: float = 3.0

@@ -71,7 +71,7 @@ def test_a_run_in_an_easy_task_is_won_on_the_way(tmp_path: Path, seed: int) -> N
     first, *later = diary.of(Promised)
     assert 0.0 < first.depth_mm < result.ended.depth_mm - 10.0
     assert first.branches >= 3
-    assert first.confidence == 0.95
+    assert first.confidence == 0.98
     assert 0.02 < first.curvature_ratio < 0.5
     assert 0.3 < first.tip_mm < 8.0
     # It is looked for anew at each review, and then says more.
@@ -83,7 +83,7 @@ def test_a_run_in_an_easy_task_is_won_on_the_way(tmp_path: Path, seed: int) -> N
     assert first.depth_mm < kept.until_mm <= result.ended.depth_mm
     said = tell(first) or ""
     assert f"{first.tip_mm:.2f} mm off for other reasons" in said
-    assert "confidence of 0.95" in said
+    assert "confidence of 0.98" in said
     check_decided_again(log, configured().settings)
 
 
@@ -134,7 +134,7 @@ def test_the_command_line_says_what_is_guaranteed(
     kept = json.loads(capsys.readouterr().out)["guarantee"]
     assert (kept["by"], kept["held"], kept["reason"]) == ("estimate", True, "")
     assert kept["from_mm"] < kept["until_mm"]
-    assert kept["confidence"] == 0.95
+    assert kept["confidence"] == 0.98
     assert kept["most_off_mm"] < kept["tip_mm"]
     assert main(["replay", str(log)]) == 0
     assert "a strategy with 3 branches is guaranteed" in capsys.readouterr().out

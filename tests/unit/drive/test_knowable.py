@@ -33,15 +33,15 @@ def test_what_would_do_does() -> None:
         configured(to_a_target(0.5), noise="2mm")
     found = re.search(
         r"'T' is too small .* 0\.5 mm deep.* known to ([\d.]+) mm at best.*confidence of ([\d.]+), "
-        r"and 0\.95 is asked for\nhint: a target that is ([\d.]+) mm deep .* --accept ([\d.]+)\n"
+        r"and 0\.98 is asked for\nhint: a target that is ([\d.]+) mm deep .* --accept ([\d.]+)\n"
         r"note: `noise`: noise$",
         str(caught.value),
         re.DOTALL,
     )
     assert found is not None
     std_mm, confidence, deep_mm, accept = map(float, found.groups())
-    assert deep_mm == pytest.approx(1.645 * std_mm, abs=0.02)
-    assert accept <= confidence < 0.95
+    assert deep_mm == pytest.approx(2.054 * std_mm, abs=0.02)
+    assert accept <= confidence < 0.98
     configured(to_a_target(deep_mm), noise="2mm")
     configured(to_a_target(0.5), noise="2mm", accept=f"{accept}")
     configured(to_a_target(0.5), noise="0.1mm")
@@ -77,7 +77,7 @@ def test_a_confidence_that_is_none_is_refused(
     path.write_text(Task(to_a_target(5.0)).to_nsl())
     assert main(["drive", str(path), "--needle", "phantom", "--accept", accept]) == 2
     said = capsys.readouterr().err
-    assert "greater than 0 and less than 1" in said or "write for example 0.95" in said
+    assert "greater than 0 and less than 1" in said or "write for example 0.98" in said
     path.write_text(path.read_text().rstrip().removesuffix("}") + f"drive {{ accept {accept} }} }}")
     assert main(["drive", str(path), "--needle", "phantom"]) == 2
     assert "accept" in capsys.readouterr().err
