@@ -95,10 +95,6 @@ lock: | .venv ## Update requirements-dev.lock to the newest versions that pyproj
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --upgrade --extra dev --generate-hashes \
 	  --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file $(LOCK) pyproject.toml
 
-.PHONY: templates
-templates: $(INSTALLED) ## Translate templates/ to Python, after a change of them
-	$(BIN)/python -m ntagen.render.translate
-
 .PHONY: picture
 picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10

@@ -3,8 +3,7 @@
 `render` writes the whole XML document, `render_queries` the same queries as a ``.q`` file. Both
 depend on the scene alone: the same scene gives the same text, byte for byte.
 
-The templates in ``templates/`` have the automata and the arithmetic in UPPAAL's language;
-`ntagen.render.generated` is a translation of them, so that Jinja is not needed here.
+The templates in ``templates/`` have the automata and the arithmetic in UPPAAL's language, and
 `ntagen.render.values` computes every number. templates/README.md lists where the model differs from
 the paper.
 """
@@ -14,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ntagen.errors import InputError
-from ntagen.render.queries import model_queries, plan_queries, render_queries
-from ntagen.render.values import model_values
-from ntagen.render.writing import escaped_text
+from ntagen.render.queries import Query, model_queries, plan_queries, render_queries
+from ntagen.render.values import ModelValues, model_values
 from ntagen.scene import Scene
 
 __all__ = ["render", "render_plan", "render_queries"]
@@ -38,13 +36,9 @@ def render(scene: Scene, source: str | None = None, *, only_plans: bool = False)
     Raises:
         InputError: A value of the scene does not fit the model's numbers.
     """
-    # Not at the top: what makes this module must run without it.
-    from ntagen.render import generated
-
     values = model_values(scene, only_plans=only_plans)
     name = None if source is None else " ".join(source.split())
-    declaration = generated.declaration(values, name)
-    return generated.document(values, escaped_text(declaration), model_queries(scene))
+    return _document("model.xml.jinja", values, name, model_queries(scene))
 
 
 def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
@@ -64,11 +58,19 @@ def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
     Raises:
         InputError: The tissue is another one, or a value does not fit the model's numbers.
     """
-    from ntagen.render import generated
-
     if not scene.tissue.is_stochastic:
         raise InputError("the tissue has no chance\nhint: write `tissue stochastic`")
     values = model_values(scene, plan=plan)
-    declaration = generated.declaration(values, None)
     queries = plan_queries(scene, sum(1 for action in plan if not action), runs)
-    return generated.plan_document(values, escaped_text(declaration), queries)
+    return _document("plan.xml.jinja", values, None, queries)
+
+
+def _document(
+    template: str, values: ModelValues, source: str | None, queries: Sequence[Query]
+) -> str:
+    """A document with the declaration of the model in it."""
+    # Jinja takes a third of the time in which a command starts, and few need it.
+    from ntagen.render.templates import escaped, filled
+
+    declaration = filled("uppaal/declarations.c.jinja", model=values, source=source)
+    return filled(template, model=values, declaration=escaped(declaration), queries=queries)

@@ -1,91 +1,86 @@
-"""The translated templates: they are current, and write what Jinja writes."""
+"""How templates are filled in: unknown names, escapes, and what is kept of them on disk."""
 
 from __future__ import annotations
 
-import html
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import jinja2
 import pytest
-from markupsafe import Markup
 
-from ntagen import nsl
-from ntagen.render import generated, queries, render, translate
-from ntagen.render.values import model_values
-from ntagen.render.writing import Safe, escaped, with_last
-from ntagen.scene import Scene
-
-ROOT = Path(__file__).parents[3]
-TASKS = [*ROOT.glob("examples/**/*.nsl"), *ROOT.glob("tests/corpus/nsl/ok/*.nsl")]
+from ntagen.render import render, templates
+from tests.steering import PAPER
 
 
-def environment() -> jinja2.Environment:
-    """Jinja as the templates are meant: unknown names are errors, XML is escaped."""
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(translate.TEMPLATES),
-        undefined=jinja2.StrictUndefined,
-        autoescape=lambda name: name is not None and name.endswith(".xml.jinja"),
-        keep_trailing_newline=True,
-    )
+@pytest.fixture
+def anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[], str]]:
+    """Renders a model as a new process does, with a cache folder of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
+    def rendered() -> str:
+        templates._environment.cache_clear()
+        return render(PAPER)
 
-TEMPLATES = environment()
-
-
-def by_jinja(scene: Scene, source: str | None, *, only_plans: bool) -> str:
-    """The model as Jinja renders it from the templates themselves."""
-    values = model_values(scene, only_plans=only_plans)
-    declaration = TEMPLATES.get_template("uppaal/declarations.c.jinja").render(
-        model=values, source=source
-    )
-    return TEMPLATES.get_template("model.xml.jinja").render(
-        model=values,
-        declaration=Markup(html.escape(declaration, quote=False)),
-        queries=queries.model_queries(scene),
-    )
-
-
-def test_the_translation_is_current() -> None:
-    assert Path(generated.__file__).read_text("utf-8") == translate.translated(), "make templates"
-
-
-@pytest.mark.parametrize("path", sorted(TASKS), ids=lambda path: path.stem)
-def test_models_are_those_of_jinja(path: Path) -> None:
-    try:
-        scene = nsl.load(path)
-    except nsl.SourceError:
-        pytest.skip("a file to be included, or one with files that a script makes")
-    for only_plans in (False, True):
-        source = f"{path.name} <'&\">"
-        expected = by_jinja(scene, source, only_plans=only_plans)
-        assert render(scene, source, only_plans=only_plans) == expected
-
-
-@pytest.mark.parametrize("value", ["a < b && c", "'\"", 3, "plain", "&amp;", Safe("<b>")])
-def test_values_are_escaped_as_jinja_does(value: object) -> None:
-    given = Markup(value) if isinstance(value, Safe) else value
-    assert escaped(value) == TEMPLATES.from_string("{{ x|e }}").render(x=given)
-
-
-def test_the_last_row_is_known() -> None:
-    assert list(with_last("ab")) == [(False, "a"), (True, "b")]
-    assert list(with_last([])) == []
+    yield rendered
+    templates._environment.cache_clear()
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "{{ nothing }}",
-        "{{ model | upper }}",
-        "{% raw %}x{% endraw %}{% call f() %}{% endcall %}",
-        "{% for x in model recursive %}{% endfor %}",
-    ],
+    "text", ["{{ nothing }}", "{{ model.nothing }}", "{% if nothing %}{% endif %}"]
 )
-def test_what_has_no_translation_is_an_error(
-    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_an_unknown_name_is_an_error(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, anew: Callable[[], str]
 ) -> None:
     (tmp_path / "one.jinja").write_text(text)
-    monkeypatch.setattr(translate, "TEMPLATES", tmp_path)
-    monkeypatch.setattr(translate, "DOCUMENTS", {"one": ("one.jinja", ("model",), "shown")})
-    with pytest.raises(ValueError, match="line 1"):
-        translate.translated()
+    monkeypatch.setattr(templates, "FOLDER", tmp_path)
+    templates._environment.cache_clear()
+    with pytest.raises(jinja2.UndefinedError, match="nothing"):
+        templates.filled("one.jinja", model=PAPER)
+
+
+def test_values_are_escaped_in_xml_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, anew: Callable[[], str]
+) -> None:
+    for name in ("one.xml.jinja", "one.c.jinja"):
+        (tmp_path / name).write_text("{{ given }}\n")
+    monkeypatch.setattr(templates, "FOLDER", tmp_path)
+    templates._environment.cache_clear()
+    assert templates.filled("one.c.jinja", given="a < b && c") == "a < b && c\n"
+    assert templates.filled("one.xml.jinja", given="a < b && c") == "a &lt; b &amp;&amp; c\n"
+    whole = templates.escaped('a < b && "c" > d')
+    assert templates.filled("one.xml.jinja", given=whole) == 'a &lt; b &amp;&amp; "c" &gt; d\n'
+
+
+def test_later_processes_find_the_compiled_templates(
+    anew: Callable[[], str], tmp_path: Path
+) -> None:
+    first = anew()
+    kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "ntagen").iterdir()}
+    assert kept
+    assert anew() == first
+    assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "ntagen").iterdir()} == kept
+
+
+@pytest.mark.parametrize("damage", [b"", b"j2", b"\0" * 100, None])
+def test_damaged_files_are_compiled_again(
+    anew: Callable[[], str], tmp_path: Path, damage: bytes | None
+) -> None:
+    expected = anew()
+    paths = list((tmp_path / "ntagen").iterdir())
+    for path in paths:
+        whole = path.read_bytes()
+        path.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
+    assert anew() == expected
+
+
+def test_without_a_folder_for_them_they_are_compiled_each_time(
+    anew: Callable[[], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = anew()
+    shutil.rmtree(tmp_path / "ntagen")
+    # A file stands where the folder should be; then the folder is gone after it was made.
+    (tmp_path / "ntagen").write_text("")
+    assert anew() == expected
+    monkeypatch.setattr(templates, "cache_folder", lambda: tmp_path / "gone")
+    assert anew() == expected
