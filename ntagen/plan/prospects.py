@@ -320,7 +320,7 @@ class Prospects:
         for first in range(0, int(numbers.max(initial=-1)) + 1, _ROWS):
             is_open = best_mm > self._inside_mm - 0.5 * SOFT_MM
             chosen = (numbers >= first) & (numbers < first + _ROWS)
-            chosen &= is_open.any(axis=1)[arcs.place[rows]]
+            chosen &= np.asarray(is_open.any(axis=1))[arcs.place[rows]]
             # An arc is at least as far from an end as from the middle, less what is between them.
             least_mm = away_mm[chosen].min(initial=math.inf)
             columns = is_open.any(axis=0) & (moved_mm > least_mm - self._counted_mm)
