@@ -14,8 +14,7 @@ single plan, several times, each time for more than the best plan so far has:
 
 If the ranking begins with the reserve, one plan with 2 mm of it is asked for: in a scene in which
 all regions to avoid are larger and the target is smaller. Where there is none, any plan is asked
-for. Questions for more, or for what is between, changed no drive.
-
+for. More questions took twice as long, and reached no more targets.
 
 Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
 equal scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
@@ -152,7 +151,7 @@ class _Known:
         """Asks for a plan of the scene, and for better ones if there is one.
 
         Args:
-            asked: A stricter scene, that is asked before the scene itself if reserve counts.
+            asked: A stricter scene, which is asked before the scene itself if the reserve counts.
         """
         if self._counts_reserve:
             self._look_for_reserve(asked)
