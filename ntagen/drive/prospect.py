@@ -46,12 +46,10 @@ def by_prospect(
         return synthesis
     judge = _Judge(scene, estimate, settings, left_s)
     candidates = list(synthesis.candidates)
-    # Nothing is better than a plan after which the target is reached whatever the error is.
-    if max(judge.prospects(candidates), default=0.0) <= 1.0 - 0.5 * _STEP:
-        for plan in judge.wholes(_firsts(scene, judge.look_mm)):
-            certificate = certify(plan, scene)
-            if settings.margins.allow(certificate):
-                candidates.append(Candidate(plan, certificate))
+    for plan in judge.wholes(_firsts(scene, judge.look_mm)):
+        certificate = certify(plan, scene)
+        if settings.margins.allow(certificate):
+            candidates.append(Candidate(plan, certificate))
     ranked = rank(candidates, synthesis.ranking)
     steps = [-round(prospect / _STEP) for prospect in judge.prospects(ranked)]
     order = sorted(range(len(ranked)), key=lambda index: (steps[index], index))
