@@ -2,12 +2,12 @@
 
 The steps:
 
-1. The text is cut into tokens (tokens.py). Other characters are reported and left out.
+1. lark's lexer cuts the text into tokens. Other characters are reported and left out.
 2. The tokens are cut into statements: at braces, and at the words that begin a statement. All of
    these words are reserved, so that the cut is right even after a statement with a mistake.
-3. Each statement is read alone, by recursive descent (statements.py). A mistake is reported at the
-   first token that cannot stand at its place. That statement becomes a `Broken`; it does not affect
-   the others.
+3. Each statement is parsed alone by the grammar (`grammar.lark`, LALR). A mistake is reported at
+   the first token that cannot stand at its place. That statement becomes a `Broken`; it does not
+   affect the others.
 
 A first word that is nearly a keyword is reported and then replaced by it. Otherwise a misspelt
 ``needle`` would make everything in its braces look wrong.
@@ -27,7 +27,7 @@ from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source
-from ntagen.nsl.statements import PlainRegion, UnexpectedTokenError, read_statement
+from ntagen.nsl.statements import UnexpectedTokenError, read_statement
 from ntagen.nsl.tokens import (
     ALLOWED,
     BLOCKS,
@@ -56,10 +56,6 @@ from ntagen.nsl.wording import (
 MAX_DEPTH: Final = 40
 """How deep parentheses may be nested in an expression, and braces in a file."""
 
-LONG_TEXT: Final = 5000
-"""In texts with so many characters, plain regions are read in a quicker way, which takes some
-milliseconds to get ready."""
-
 
 def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -> tree.File:
     """The tree of a source; syntax errors go to the reporter.
@@ -76,16 +72,8 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
         name, message, hint = foreign
         reporter.report_file(name, source.path, message, hint=hint)
         return tree.File(source, ())
-    tokens = [t for t in tokenise(source, _known(source)) if isinstance(t, Token)]
+    tokens = [t for t in tokenise(source) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
-
-
-def _known(source: Source) -> Iterator[tuple[int, int, Token]]:
-    """The plain regions of a long text, with their places. A short text does not need that."""
-    if len(source.text) >= LONG_TEXT:
-        from ntagen.nsl.plain import plain_regions
-
-        yield from ((one.start, one.end, one) for one in plain_regions(source))
 
 
 def _foreign(source: Source) -> tuple[str, str, str] | None:
@@ -341,8 +329,6 @@ class _Parser:
 
     def _parse_words(self, words: Sequence[Token]) -> tree.Statement:
         """The tree of one statement without its braces."""
-        if isinstance(words[0], PlainRegion):
-            return words[0].node
         span = words[0].span.to(words[-1].span)
         broken = tree.Broken(span, keyword_of(words[0]), _declared_name(words))
         if words[0].type == "QUERY":
@@ -479,8 +465,6 @@ _SEPARATORS: Final = frozenset({";", ","})
 
 def _declared_name(words: Sequence[Token]) -> str | None:
     """The name that a statement declares, if that part of it is right."""
-    if isinstance(words[0], PlainRegion):
-        return words[0].node.name.identifier.text
     if len(words) > 1 and words[0].text in NAMING and words[1].type == "NAME":
         return words[1].text
     return None

@@ -1,13 +1,12 @@
 """The words of the language: tokens, comments, and the keywords that begin a statement.
 
-A text is cut by one regular expression, with one group for each terminal. A word in quotes in the
-grammar (statements.py) is a terminal of its own, named by its capitals.
+The terminals are those of `grammar.lark`: a word in quotes there is a terminal of its own, named by
+its capitals. lark is imported when the first text is read, not before.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final, Literal, cast
 
 from ntagen.nsl.source import Source, Span
@@ -115,41 +114,6 @@ class Comment:
     line: int
 
 
-_TERMINALS: Final = {
-    "SPACE": r"\s+",
-    "LINE_COMMENT": r"//[^\n]*",
-    "BLOCK_COMMENT": r"/\*[\s\S]*?\*/",
-    "UNCLOSED_COMMENT": r"/\*[\s\S]*",
-    "NUMBER": r"\d+(?:\.\d+)?(?:[eE][+-]?\d+)?",
-    # The rest of the line is UPPAAL's language, up to a comment.
-    "QUERY": r"query\b[^\n]*?(?=[ \t\r]*(?://|\n|\Z))",
-    # The unit of a speed, of a rising force, or of a motor's steps. `min` before a parenthesis is
-    # the function.
-    "RATIO": r"(?:[^\W\d]\w*\s*/\s*(?:ms|s|min)|(?:steps|m?N)\s*/\s*(?:um|mm|cm|m|rad|mrad|deg))"
-    r"\b(?!\s*\()",
-    "NAME": r"[^\W\d]\w*",
-    "SIGN": r"[+-]",
-    "SCALE": r"[*/]",
-    "LPAR": r"\(",
-    "RPAR": r"\)",
-    "COMMA": ",",
-    "BRACE": r"[{}]",
-    "LSQB": r"\[",
-    "RSQB": r"\]",
-    "EQUAL": "=",
-    "PERCENT": "%",
-    "RANGE": r"\.\.",
-    "STRING": r'"[^"\n]*"',
-    # Characters that are not part of the language. They are tokens too, so that the parser can
-    # report them and go on.
-    "UNCLOSED_STRING": r'"[^"\n]*',
-    "HASH": r"#[^\n]*",
-    "STRAY": r'[^\w\s{}()\[\],=+\-*/."#%]+|.',
-}
-"""The first that matches at a place is the terminal there."""
-
-_LEXER: Final = re.compile("|".join(f"(?P<{name}>{form})" for name, form in _TERMINALS.items()))
-
 WORDS: Final = {
     word: "REGION_KIND" if word in REGIONS else word.upper()
     for word in KEYWORDS | _OTHER_WORDS | _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
@@ -157,54 +121,29 @@ WORDS: Final = {
 """The terminals of words that are no names everywhere."""
 
 
-def tokenise(source: Source, known: Iterable[tuple[int, int, Token]] = ()) -> list[Token | Comment]:
+def tokenise(source: Source) -> list[Token | Comment]:
     """All tokens and comments of a source; with the white space they are the whole text.
 
     After `MAX_STRAY` tokens that are not part of the language, the rest of the text is left out.
-
-    Args:
-        source: The text.
-        known: Parts of the text in their order, by start and end, and the token for each.
     """
+    # lark takes a third of the time in which a command starts, and few read a text.
+    from ntagen.nsl.grammar import grammar
+
     found: list[Token | Comment] = []
     stray_count = 0
-    begin = 0
-    for start, end, token in known:
-        stray_count += _lex(source, begin, start, found, MAX_STRAY - stray_count)
+    for token in grammar().lex(source.text, dont_ignore=True):
+        if token.type == "SPACE":
+            continue
+        start, line = cast(int, token.start_pos), cast(int, token.line)
+        span = Span(source, start, start + len(token))
+        if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
+            found.append(Comment(token.rstrip(), span, line))
+            continue
+        found.append(Token(token.type, str(token), span, line))
+        stray_count += token.type in STRAY
         if stray_count > MAX_STRAY:
             break
-        found.append(token)
-        begin = end
-    if stray_count <= MAX_STRAY:
-        _lex(source, begin, len(source.text), found, MAX_STRAY - stray_count)
     return list(_joined(_named(_bounded(found))))
-
-
-def _lex(
-    source: Source, begin: int, end: int, found: list[Token | Comment], most_stray: int
-) -> int:
-    """Adds the tokens and comments of a part of a text; returns how many of them are stray."""
-    text = source.text
-    line, counted = 0, 0
-    stray_count = 0
-    for match in _LEXER.finditer(text, begin, end):
-        terminal = cast(str, match.lastgroup)
-        if terminal == "SPACE":
-            continue
-        start = match.start()
-        line = line + text.count("\n", counted, start) if line else source.position(start)[0]
-        counted = start
-        word, span = match[0], Span(source, start, match.end())
-        if terminal == "NAME":
-            found.append(Token(WORDS.get(word, terminal), word, span, line))
-        elif terminal in ("LINE_COMMENT", "BLOCK_COMMENT"):
-            found.append(Comment(word.rstrip(), span, line))
-        else:
-            found.append(Token(terminal, word, span, line))
-            stray_count += terminal in STRAY
-            if stray_count > most_stray:
-                break
-    return stray_count
 
 
 def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
