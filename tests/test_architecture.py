@@ -175,6 +175,7 @@ ONLY_IN: dict[str, set[str]] = {
     "click": {"cli"},
     "pytest": {"pytest_plugin"},
     "rich": {"cli"},
+    "lark": {"nsl"},
     "jinja2": {"render"},
     "markupsafe": {"render"},
     "matplotlib": {"checker.picture", "experiment", "plot"},

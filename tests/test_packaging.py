@@ -93,7 +93,7 @@ def test_the_wheel_holds_the_templates_and_the_data_files(tmp_path: Path) -> Non
     assert templates == digests(TEMPLATES)
     others = {
         f"ntagen/{path.relative_to(ROOT / 'ntagen').as_posix()}"
-        for pattern in ("*.py", "*.pyi", "*.md", "*.html", "py.typed")
+        for pattern in ("*.py", "*.pyi", "*.lark", "*.md", "*.html", "py.typed")
         for path in (ROOT / "ntagen").rglob(pattern)
     }
     assert others <= set(held)

@@ -110,7 +110,7 @@ def test_an_unknown_command_is_refused(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_the_help_waits_for_no_library() -> None:
-    heavy = {"jinja2", "matplotlib", "numpy", "rich", "scipy", "ntagen.nsl"}
+    heavy = {"jinja2", "lark", "matplotlib", "numpy", "rich", "scipy", "ntagen.nsl"}
     script = f"import sys, ntagen.cli; print({heavy!r} & set(sys.modules))"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert run.stdout == "set()\n"

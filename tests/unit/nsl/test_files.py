@@ -105,6 +105,35 @@ def test_long_chain_of_includes_is_refused(tmp_path: Path) -> None:
     assert [d.code for d in caught.value.diagnostics] == ["N050", "N019"]
 
 
+def test_tables_of_the_grammar_are_not_needed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ntagen.nsl.grammar import grammar
+
+    (tmp_path / "ntagen").write_text("a file where the folder would be")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    grammar.cache_clear()
+    nsl.loads(SMALLEST)
+
+
+def test_broken_tables_of_the_grammar_are_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ntagen.nsl.grammar import grammar
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for _ in range(2):
+        grammar.cache_clear()
+        nsl.loads(SMALLEST)
+    (tables,) = (tmp_path / "ntagen").iterdir()
+    good = tables.read_bytes()
+    for bad in (b"", b"nothing like it", good[:1000], good[: len(good) // 2]):
+        tables.write_bytes(bad)
+        grammar.cache_clear()
+        nsl.loads(SMALLEST)
+        assert tables.stat().st_size > 0.9 * len(good)
+
+
 def test_countless_mistakes_are_cut_short() -> None:
     with pytest.raises(nsl.SourceError) as caught:
         nsl.loads("environment e {\n" + "tissue rubber;\n" * 2000)
