@@ -336,6 +336,10 @@ class _Parser:
         is_known = words[0].text in KEYWORDS or words[0].type in PHRASES.values()
         if not is_known or self._is_too_deep(words):
             return broken
+        if words[0].type == "NAME":
+            # A word that begins a statement in some braces, and is a name here.
+            self._report_misplaced(words[0], None)
+            return broken
         try:
             parsed = read_statement(self._source, words)
         except UnexpectedTokenError as error:
@@ -421,10 +425,11 @@ class _Parser:
                     hint=STRAY_HINTS.get(token.text[0]),
                 )
 
-    def _report_misplaced(self, word: Token, kind: BlockKind) -> None:
-        """Reports a statement that stands in the wrong braces."""
+    def _report_misplaced(self, word: Token, kind: BlockKind | None) -> None:
+        """Reports a statement that stands in the wrong braces; None is any."""
         homes = [home for home, allowed in ALLOWED.items() if word.text in allowed]
-        where = "at the top of the file" if kind == "file" else f"in `{kind}`"
+        where = "here" if kind is None else f"in `{kind}`"
+        where = "at the top of the file" if kind == "file" else where
         place = " or ".join(
             "at the top of the file" if home == "file" else f"in the braces of `{home}`"
             for home in homes
