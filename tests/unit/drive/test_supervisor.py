@@ -95,6 +95,8 @@ class Live:
         self.stands_mm: float | None = None
         self.times = 0
         self.most_times = 10**9
+        self.is_gone_behind = False
+        """Whether it shows nothing more as soon as the needle was pulled back."""
 
     def measure(self) -> Measurement:
         return self.needle.measure()
@@ -102,6 +104,8 @@ class Live:
     def newest(self) -> Measurement:
         found = self.needle.measure()
         depth_mm = self.needle.emulator.position[0]
+        if self.is_gone_behind and self.times and depth_mm < self.after_mm:
+            self.most_times = 0
         if depth_mm < self.after_mm or self.times >= self.most_times:
             return found
         self.times += 1
@@ -178,7 +182,7 @@ def test_a_violation_ends_the_push_at_once_and_the_driver_plans_from_there(
 
 def test_a_violation_that_stays_makes_the_driver_pull_back() -> None:
     stepped, live = bench()
-    live.after_mm, live.most_times = 12.1, 2
+    live.after_mm, live.is_gone_behind = 12.1, True
     live.change = lambda found: replace(found, force_n=9.0)
     _, diary = run(stepped, live)
     assert len(diary.of(CutShort)) == 2
