@@ -216,7 +216,7 @@ def _continuations(statement: Sequence[Token], tokens: Sequence[Token]) -> tuple
     if first.type == "PARAMETER" and len(statement) == 1:
         return False, [Word(one, "choice") for one in BY_WORDS[first.text].choices]
     try:
-        read_statement(first.span.source, statement)
+        read_statement(statement)
     except UnexpectedTokenError as error:
         if error.token is not None:
             # The mistake is before the place: anything may be meant.
@@ -249,7 +249,7 @@ def _follows(statement: Sequence[Token], word: str) -> bool:
     last = statement[-1]
     added = Token(WORDS[word], word, last.span, last.line)
     try:
-        read_statement(last.span.source, [*statement, added])
+        read_statement([*statement, added])
     except UnexpectedTokenError as error:
         return error.token is not added
     return True

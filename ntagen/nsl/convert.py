@@ -1,246 +1,247 @@
-"""Converts lark's trees to those of `ntagen.nsl.tree`."""
+"""Makes the nodes of `ntagen.nsl.tree` while lark parses a statement.
+
+lark calls the method that has the name of a rule of the grammar, or the name behind its arrow, with
+all tokens and nodes of that rule. `_placed` makes of the first and the last of them the place of
+the node, and passes on only those with a meaning: nodes, names, texts, numbers and operators.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, cast
+from collections.abc import Callable, Sequence
+from typing import Any, Final, Literal, NamedTuple
+
+from lark import Transformer, v_args
 
 from ntagen.nsl import tree
-from ntagen.nsl.source import Source, Span
+from ntagen.nsl.source import Span
+from ntagen.nsl.tokens import Token
 
-if TYPE_CHECKING:
-    import lark
+_Part = Any
+"""A node or a word: the grammar says which, and lark has no types for rules."""
 
-    from ntagen.scene import RegionKind
+_WORDS: Final = frozenset({"NUMBER", "SIGN", "SCALE", "REGION_KIND", "PARAMETER", "AXIS"})
+_NAMES: Final = frozenset({"NAME", "RATIO", "PERCENT", "TISSUE_PART", "STRING"})
 
 
-class TreeBuilder:
-    """Converts lark's trees to those of `ntagen.nsl.tree`."""
+class _Parenthesised(NamedTuple):
+    """An expression in parentheses, which belong to the place of what is around, not to its own."""
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
+    span: Span
+    operand: tree.Expression
 
-    def statement(self, node: lark.Tree[lark.Token], span: Span) -> tree.Statement:
-        """A statement of any kind."""
-        keyword = node.data
-        parts = node.children
-        match keyword:
-            case "environment":
-                return tree.Environment(span, self._identifier(parts[0]), ())
-            case "needle" | "motion" | "drive":
-                return tree.Section(span, keyword, ())
-            case "parameter" | "device" | "axis" | "tracker":
-                return self._driving(keyword, parts, span)
-            case "loop":
-                return tree.Loop(
-                    span,
-                    self._identifier(parts[0]),
-                    self.expression(parts[1]),
-                    self.expression(parts[3]),
-                    (),
-                )
-            case "let":
-                return tree.Let(span, self._identifier(parts[0]), self.expression(parts[1]))
-            case "include":
-                return tree.Include(span, self._text(parts[0]))
-            case "region":
-                return self._region(node, span)
-            case "roll" | "spin" | "wait" | "gate":
-                return self._moving(keyword, parts, span)
-            case "tissue" | "safety":
-                return self._behaviour(keyword, parts, span)
-            case "resolution" | "transform":
-                return self._measured(keyword, parts, span)
-            case "tip" | "heading" | "bevel" | "radius" | "speed" | "length" | "step":
-                return tree.Setting(span, keyword, self.expression(parts[0]))
-        raise AssertionError(f"the grammar has a statement that the tree has not: {keyword}")
 
-    def _measured(
-        self, keyword: str, parts: Sequence[object], span: Span
-    ) -> tree.Resolution | tree.Transform:
-        """The scale of the model, or a matrix in the file, or in another one."""
-        if keyword == "resolution":
-            return tree.Resolution(span, self.expression(parts[0]), self._identifier(parts[1]))
-        direction, space = self._identifier(parts[0]), self._identifier(parts[1])
-        if isinstance(parts[2], str):
-            return tree.Transform(span, direction, space, self._text(parts[2]), ())
-        return tree.Transform(span, direction, space, None, tuple(map(self.expression, parts[2:])))
+class _Clause(NamedTuple):
+    """A part of a statement that is no node of its own: ``at most 2 times``."""
 
-    def _behaviour(
-        self, keyword: str, parts: Sequence[object], span: Span
-    ) -> tree.Tissue | tree.Choice:
-        """What is safe, or how the tissue behaves, with the bounds of an adversarial one."""
-        if keyword == "safety":
-            return tree.Choice(span, "safety", self._identifier(parts[0]))
-        bounds = tuple(
-            tree.TissueBound(self._identifier(word), self.expression(value))
-            for word, value in zip(parts[1::2], parts[2::2], strict=True)
-        )
-        return tree.Tissue(span, self._identifier(parts[0]), bounds)
+    span: Span
+    keyword: str
+    values: tuple[tree.Expression, ...]
 
-    def _driving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
-        """A setting of the driver, a device, its axis, or a tracker."""
-        if keyword == "parameter":
-            words, *values = parts
-            return tree.Parameter(span, str(words), tuple(map(self.expression, values)))
-        if keyword == "axis":
-            word = cast("Literal['insert', 'roll']", str(parts[0]))
-            return tree.Axis(span, word, self._identifier(parts[1]), self.expression(parts[2]))
-        kind, text = self._identifier(parts[0]), self._text(parts[1])
-        if keyword == "device":
-            return tree.Device(span, kind, text, ())
-        return tree.Tracker(span, kind, text, self._text(parts[2]) if len(parts) > 2 else None)
 
-    def _region(self, node: lark.Tree[lark.Token], span: Span) -> tree.Region:
-        """A region with its shape."""
-        kind, name, shape, *rest = node.children
-        keyword = cast("RegionKind", str(kind))
-        shape = cast("lark.Tree[lark.Token]", shape)
-        moves = self._moves(cast("lark.Tree[lark.Token]", rest[0])) if rest else None
-        return tree.Region(span, keyword, self._region_name(name), self._shape(shape), moves)
+def _parts(children: Sequence[Any]) -> list[Any]:
+    """What a node consists of: nodes, names with their places, and other words."""
+    parts: list[Any] = []
+    for child in children:
+        if not isinstance(child, Token):
+            parts.append(child.operand if isinstance(child, _Parenthesised) else child)
+        elif child.type in _WORDS:
+            parts.append(child.text)
+        elif child.type in _NAMES:
+            text = child.text[1:-1] if child.type == "STRING" else child.text
+            parts.append(tree.Identifier(child.span, text))
+    return parts
 
-    def _moves(self, node: lark.Tree[lark.Token]) -> tree.Moves:
-        """How a region moves."""
-        span, parts = self._span(node), node.children
-        if node.data == "moves_as":
-            period = self.expression(parts[1])
-            return tree.Moves(span, period, path=self._text(parts[0]))
-        values = tuple(map(self.expression, parts))
-        if node.data == "moves_through":
-            places = tuple(zip(values[:-1:2], values[1:-1:2], strict=True))
-            return tree.Moves(span, values[-1], places=places)
-        way, towards, period, *phase = values
-        return tree.Moves(span, period, (way, towards), phase[0] if phase else None)
 
-    def _moving(self, keyword: str, parts: Sequence[object], span: Span) -> tree.Statement:
-        """How the needle rolls and waits, and when it may be pushed."""
-        if keyword == "roll":
-            return self._roll(parts, span)
-        if keyword == "spin":
-            return tree.Spin(span, tuple(map(self.expression, parts)))
-        if keyword == "gate":
-            return tree.Gate(span, self.expression(parts[0]), self.expression(parts[1]))
-        limits = [cast("lark.Tree[lark.Token]", part) for part in parts[1:]]
-        at_most = self.expression(limits[0].children[0]) if limits else None
-        return tree.Wait(span, self.expression(parts[0]), at_most)
+def _placed(make: Callable[..., object], _rule: str, children: list[Any], _meta: object) -> object:
+    """The node of a rule: it is made of its place and of what it consists of."""
+    return make(children[0].span.to(children[-1].span), *_parts(children))
 
-    def _shape(
-        self, node: lark.Tree[lark.Token]
-    ) -> tree.Sphere | tree.Solid | tree.Image | tree.Around:
-        """A shape of any kind."""
-        span = self._span(node)
-        if node.data in ("mesh", "segmentation", "markups"):
-            path, *clauses = node.children
-            of_file = cast(tree.ImageForm, node.data)
-            return tree.Image(span, of_file, self._text(path), tuple(map(self._clause, clauses)))
-        if node.data not in ("sphere", "around"):
-            nodes = [cast("lark.Tree[lark.Token]", child) for child in node.children]
-            turns = [one for one in nodes if one.data == "turned"]
-            measures = tuple(self.expression(one) for one in nodes if one not in turns)
-            form = cast(tree.SolidForm, node.data)
-            if not turns:
-                return tree.Solid(span, form, measures)
-            angle, axis = map(self.expression, turns[0].children)
-            return tree.Solid(span, form, measures, (angle, axis))
-        first, second = node.children
-        if node.data == "sphere":
-            return tree.Sphere(span, self.expression(first), self.expression(second))
-        return tree.Around(span, self._region_name(first), self.expression(second))
 
-    def _clause(self, node: object) -> tree.Clause:
-        """A clause of a shape from a file."""
-        node = cast("lark.Tree[lark.Token]", node)
-        span, parts = self._span(node), node.children
-        match node.data:
-            case "in_space":
-                return tree.Clause(span, "in", tuple(map(self._identifier, parts)))
-            case "segment":
-                return tree.Clause(span, "segment", (self._text(parts[0]),))
-            case "point":
-                return tree.Clause(span, "point", (self._text(parts[0]),))
-            case "label":
-                return tree.Clause(span, "label", (), self.expression(parts[0]))
-            case "thick":
-                return tree.Clause(span, "radius", (), self.expression(parts[0]))
-        return tree.Clause(span, "grid", (), self.expression(parts[0]))
+def _placed_word(
+    make: Callable[..., object], _rule: str, children: list[Any], _meta: object
+) -> object:
+    """The node of a rule whose first word tells what it is."""
+    span = children[0].span.to(children[-1].span)
+    return make(span, children[0].text, *_parts(children[1:]))
 
-    def _region_name(self, node: object) -> tree.RegionName:
-        """A name with its indices."""
-        node = cast("lark.Tree[lark.Token]", node)
-        name, *indices = node.children
-        return tree.RegionName(
-            self._span(node), self._identifier(name), tuple(map(self.expression, indices))
-        )
 
-    def _roll(self, parts: Sequence[object], span: Span) -> tree.Roll:
-        """A roll: the kind of a node tells whether it is an angle or a limit."""
-        nodes = [cast("lark.Tree[lark.Token]", part) for part in parts]
-        limits: dict[str, list[tree.Expression]] = {"at_most": [], "at_least": []}
-        angles: list[tree.Expression] = []
-        for node in nodes:
-            if node.data in limits:
-                limits[node.data].append(self.expression(node.children[0]))
-            else:
-                angles.append(self.expression(node))
-        return tree.Roll(span, tuple(angles), tuple(limits["at_most"]), tuple(limits["at_least"]))
+_with_word = v_args(wrapper=_placed_word)
 
-    def expression(self, node: object) -> tree.Expression:
-        """An expression; levels of the grammar with a single child are skipped."""
-        node = cast("lark.Tree[lark.Token]", node)
-        children = node.children
-        span = self._span(node)
-        match node.data:
-            case "sum" | "product":
-                return self._chain(children, span)
-            case "signed":
-                *signs, last = children
-                operand = self.expression(last)
-                return (
-                    tree.Signed(span, operand, sum(sign == "-" for sign in signs) % 2 == 1)
-                    if signs
-                    else operand
-                )
-            case "quantity":
-                operand = self.expression(children[0])
-                if len(children) == 1:
-                    return operand
-                unit = cast("lark.Tree[lark.Token]", children[1]).children[0]
-                return tree.Measured(span, operand, self._identifier(unit))
-            case "number":
-                return tree.Number(span, float(cast(str, children[0])))
-            case "name":
-                return tree.Name(span, str(children[0]))
-            case "call":
-                function, *arguments = children
-                return tree.Call(
-                    span, self._identifier(function), tuple(map(self.expression, arguments))
-                )
-            case "vector":
-                return tree.Vector(span, tuple(map(self.expression, children)))
-            case "parenthesised":
-                return self.expression(children[0])
-        raise AssertionError(f"the grammar has an expression that the tree has not: {node.data}")
 
-    def _chain(self, children: Sequence[object], span: Span) -> tree.Expression:
-        """Operands and the operators between them."""
-        first = self.expression(children[0])
-        rest = tuple(
-            (cast("Literal['+', '-', '*', '/']", str(operator)), self.expression(operand))
-            for operator, operand in zip(children[1::2], children[2::2], strict=True)
-        )
-        return tree.Chain(span, first, rest) if rest else first
+@v_args(wrapper=_placed)
+class TreeBuilder(Transformer[Any, tree.Statement]):
+    """Makes the node of each rule."""
 
-    def _identifier(self, token: object) -> tree.Identifier:
-        """A token as a name with its place."""
-        token = cast("lark.Token", token)
-        start = cast(int, token.start_pos)
-        return tree.Identifier(self._source.span(start, start + len(token)), str(token))
+    # -------------------------------------------------------------------------------- statements
 
-    def _text(self, token: object) -> tree.Identifier:
-        """A text in quotes without them, with its place."""
-        quoted = self._identifier(token)
-        return tree.Identifier(quoted.span, quoted.text[1:-1])
+    let = tree.Let
+    include = tree.Include
+    resolution = tree.Resolution
+    axis = tree.Axis
+    gate = tree.Gate
+    setting = _with_word(tree.Setting)
+    safety = _with_word(tree.Choice)
 
-    def _span(self, node: lark.Tree[lark.Token]) -> Span:
-        """The place of a node."""
-        return self._source.span(node.meta.start_pos, node.meta.end_pos)
+    def environment(self, span: Span, name: tree.Identifier) -> tree.Environment:
+        """``environment paper``."""
+        return tree.Environment(span, name, ())
+
+    @_with_word
+    def section(self, span: Span, word: Literal["needle", "motion", "drive"]) -> tree.Section:
+        """``needle``, ``motion`` or ``drive``."""
+        return tree.Section(span, word, ())
+
+    def loop(
+        self, span: Span, variable: tree.Identifier, first: tree.Expression, last: tree.Expression
+    ) -> tree.Loop:
+        """``for i in 0..7``."""
+        return tree.Loop(span, variable, first, last, ())
+
+    def parameter(self, span: Span, words: str, *values: tree.Expression) -> tree.Parameter:
+        """``pull 4 mm``, in `drive`."""
+        return tree.Parameter(span, words, values)
+
+    def device(self, span: Span, kind: tree.Identifier, port: tree.Identifier) -> tree.Device:
+        """``device grbl "/dev/ttyACM0"``."""
+        return tree.Device(span, kind, port, ())
+
+    def tracker(
+        self,
+        span: Span,
+        kind: tree.Identifier,
+        address: tree.Identifier,
+        name: tree.Identifier | None = None,
+    ) -> tree.Tracker:
+        """``tracker openigtlink "localhost:18944" "Needle"``."""
+        return tree.Tracker(span, kind, address, name)
+
+    def tissue(self, span: Span, word: tree.Identifier, *bounds: _Part) -> tree.Tissue:
+        """``tissue adversarial curvature 10 % roll 5 deg``."""
+        pairs = zip(bounds[::2], bounds[1::2], strict=True)
+        return tree.Tissue(span, word, tuple(tree.TissueBound(*pair) for pair in pairs))
+
+    def imaging(
+        self, span: Span, direction: tree.Identifier, space: tree.Identifier, *rows: _Part
+    ) -> tree.Transform:
+        """``transform from LPS "ct.tfm"``, or with rows in place of the file."""
+        if isinstance(rows[0], tree.Identifier):
+            return tree.Transform(span, direction, space, rows[0], ())
+        return tree.Transform(span, direction, space, None, rows)
+
+    def roll(self, span: Span, *parts: tree.Expression | _Clause) -> tree.Roll:
+        """``roll by 90, 180 deg at most 2 times at least 2 mm apart``."""
+        clauses = [part for part in parts if isinstance(part, _Clause)]
+        angles = tuple(part for part in parts if not isinstance(part, _Clause))
+        at_most = tuple(one.values[0] for one in clauses if one.keyword == "most")
+        at_least = tuple(one.values[0] for one in clauses if one.keyword == "least")
+        return tree.Roll(span, angles, at_most, at_least)
+
+    def at_most(self, span: Span, value: tree.Expression) -> _Clause:
+        """``at most 2 times``."""
+        return _Clause(span, "most", (value,))
+
+    def at_least(self, span: Span, value: tree.Expression) -> _Clause:
+        """``at least 2 mm apart``."""
+        return _Clause(span, "least", (value,))
+
+    def spin(self, span: Span, *fractions: tree.Expression) -> tree.Spin:
+        """``spin 20 %, 40 %``."""
+        return tree.Spin(span, fractions)
+
+    def wait(
+        self, span: Span, length: tree.Expression, at_most: _Clause | None = None
+    ) -> tree.Wait:
+        """``wait 0.5 s at most 2 times``."""
+        return tree.Wait(span, length, at_most.values[0] if at_most else None)
+
+    # ----------------------------------------------------------------------------------- regions
+
+    region = tree.Region
+    sphere = tree.Sphere
+    around = tree.Around
+
+    def region_name(
+        self, span: Span, identifier: tree.Identifier, *indices: tree.Expression
+    ) -> tree.RegionName:
+        """``Ring[i]``."""
+        return tree.RegionName(span, identifier, indices)
+
+    @_with_word
+    def solid(self, span: Span, form: tree.SolidForm, *parts: _Part) -> tree.Solid:
+        """``box (0, -20, 5) mm size (10, 4, 6) mm turned 30 deg about +z``."""
+        if isinstance(parts[-1], _Clause):
+            angle, axis = parts[-1].values
+            return tree.Solid(span, form, parts[:-1], (angle, axis))
+        return tree.Solid(span, form, parts)
+
+    def turned(self, span: Span, angle: tree.Expression, axis: tree.Expression) -> _Clause:
+        """``turned 30 deg about +z``."""
+        return _Clause(span, "turned", (angle, axis))
+
+    @_with_word
+    def image(
+        self, span: Span, form: tree.ImageForm, path: tree.Identifier, *clauses: tree.Clause
+    ) -> tree.Image:
+        """``mesh "liver.stl" in LPS mm``."""
+        return tree.Image(span, form, path, clauses)
+
+    @_with_word
+    def words(self, span: Span, keyword: _Part, *words: tree.Identifier) -> tree.Clause:
+        """``in LPS mm`` or ``segment "tumor"``."""
+        return tree.Clause(span, keyword, words)
+
+    @_with_word
+    def value(self, span: Span, keyword: _Part, value: tree.Expression) -> tree.Clause:
+        """``grid 1 mm``."""
+        return tree.Clause(span, keyword, (), value)
+
+    def moves_along(
+        self,
+        span: Span,
+        way: tree.Expression,
+        towards: tree.Expression,
+        period: tree.Expression,
+        phase: tree.Expression | None = None,
+    ) -> tree.Moves:
+        """``moves 12 mm along +z every 4 s phase 90 deg``."""
+        return tree.Moves(span, period, (way, towards), phase)
+
+    def moves_through(self, span: Span, *values: tree.Expression) -> tree.Moves:
+        """``moves through (0, 0, 0) mm after 0 s, (0, 0, 5) mm after 2 s every 4 s``."""
+        *places, period = values
+        pairs = zip(places[::2], places[1::2], strict=True)
+        return tree.Moves(span, period, places=tuple(pairs))
+
+    def moves_as(self, span: Span, path: tree.Identifier, period: tree.Expression) -> tree.Moves:
+        """``moves as "breath.csv" every 4 s``."""
+        return tree.Moves(span, period, path=path)
+
+    # ------------------------------------------------------------------------------- expressions
+
+    parenthesised = _Parenthesised
+    measured = tree.Measured
+
+    def number(self, span: Span, text: str) -> tree.Number:
+        """``1.5``."""
+        return tree.Number(span, float(text))
+
+    def name(self, span: Span, name: tree.Identifier) -> tree.Name:
+        """``depth``."""
+        return tree.Name(span, name.text)
+
+    def call(self, span: Span, function: tree.Identifier, *arguments: tree.Expression) -> tree.Call:
+        """``sin(30 deg)``."""
+        return tree.Call(span, function, arguments)
+
+    def vector(self, span: Span, *components: tree.Expression) -> tree.Vector:
+        """``(0, -50, 0)``."""
+        return tree.Vector(span, components)
+
+    def signed(self, span: Span, *parts: _Part) -> tree.Signed:
+        """``-x``."""
+        *signs, operand = parts
+        return tree.Signed(span, operand, signs.count("-") % 2 == 1)
+
+    def chain(self, span: Span, first: tree.Expression, *rest: _Part) -> tree.Chain:
+        """``a - b + c`` or ``a * b / c``."""
+        return tree.Chain(span, first, tuple(zip(rest[::2], rest[1::2], strict=True)))

@@ -17,6 +17,7 @@ from typing import Final
 from lark import Lark
 
 from ntagen.cache import cache_folder
+from ntagen.nsl.convert import TreeBuilder
 
 FILE: Final = Path(__file__).with_name("grammar.lark")
 
@@ -30,8 +31,9 @@ def grammar() -> Lark:
         parser="lalr",
         lexer="basic",
         start=["statement", "outside"],
-        propagate_positions=True,
+        keep_all_tokens=True,
         maybe_placeholders=False,
+        transformer=TreeBuilder(),
         cache=_tables(text) or False,
     )
 

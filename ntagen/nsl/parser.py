@@ -341,7 +341,7 @@ class _Parser:
             self._report_misplaced(words[0], None)
             return broken
         try:
-            parsed = read_statement(self._source, words)
+            parsed = read_statement(words)
         except UnexpectedTokenError as error:
             self._report_unexpected(words, error.token, error.expected)
             return broken

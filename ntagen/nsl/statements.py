@@ -7,11 +7,13 @@ a mistake in another.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 from ntagen.nsl import tree
-from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import Token
+
+if TYPE_CHECKING:
+    import lark
 
 
 class UnexpectedTokenError(Exception):
@@ -28,33 +30,27 @@ class UnexpectedTokenError(Exception):
         self.expected = expected
 
 
-def read_statement(source: Source, words: Sequence[Token]) -> tree.Statement:
+def read_statement(words: Sequence[Token]) -> tree.Statement:
     """The tree of a statement, without the statements in its braces.
 
     Args:
-        source: The text.
         words: The tokens of the statement; no parentheses are nested deeper than recursion can go.
 
     Raises:
         UnexpectedTokenError: A token cannot stand at its place.
     """
-    import lark
+    from lark import UnexpectedToken
 
-    from ntagen.nsl.convert import TreeBuilder
     from ntagen.nsl.grammar import grammar
 
     parser = grammar().parse_interactive("", start="statement")
-    last: lark.Token | None = None
     word: Token | None = None
     try:
         for word in words:
-            start, end = word.span.start, word.span.end
-            last = lark.Token(word.type, word.text, start_pos=start, end_pos=end)
-            parser.feed_token(last)
+            # lark looks at the type of a token alone, and gives the token to `TreeBuilder`.
+            parser.feed_token(cast("lark.Token", word))
         word = None
-        parsed = parser.feed_eof(last)  # type: ignore[no-untyped-call]
-    except lark.UnexpectedToken:
+        return cast(tree.Statement, parser.feed_eof())  # type: ignore[no-untyped-call]
+    except UnexpectedToken:
         accepted = cast("set[str]", parser.accepts())  # type: ignore[no-untyped-call]
         raise UnexpectedTokenError(word, sorted(accepted)) from None
-    span = words[0].span.to(words[-1].span)
-    return TreeBuilder(source).statement(cast("lark.Tree[lark.Token]", parsed), span)

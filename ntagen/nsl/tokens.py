@@ -131,9 +131,7 @@ def tokenise(source: Source) -> list[Token | Comment]:
 
     found: list[Token | Comment] = []
     stray_count = 0
-    for token in grammar().lex(source.text, dont_ignore=True):
-        if token.type == "SPACE":
-            continue
+    for token in grammar().lex(source.text):
         start, line = cast(int, token.start_pos), cast(int, token.line)
         span = Span(source, start, start + len(token))
         if token.type in ("LINE_COMMENT", "BLOCK_COMMENT"):
