@@ -18,8 +18,8 @@ from typing import Final, Literal
 from ntagen.nsl import Diagnostic, SourceError, loads_task
 from ntagen.nsl.diagnostics import CAPTIONS, KINDS, page_of
 from ntagen.nsl.driving import CHOICES
+from ntagen.nsl.grammar import UnexpectedTokenError, read_statement
 from ntagen.nsl.source import Source
-from ntagen.nsl.statements import UnexpectedTokenError, read_statement
 from ntagen.nsl.tokens import (
     ALLOWED,
     BLOCKS,

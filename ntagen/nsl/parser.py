@@ -25,9 +25,9 @@ from typing import Final
 
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
+from ntagen.nsl.grammar import UnexpectedTokenError, read_statement
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source
-from ntagen.nsl.statements import UnexpectedTokenError, read_statement
 from ntagen.nsl.tokens import (
     ALLOWED,
     BLOCKS,

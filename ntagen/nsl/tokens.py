@@ -141,7 +141,7 @@ def tokenise(source: Source) -> list[Token | Comment]:
         stray_count += token.type in STRAY
         if stray_count > MAX_STRAY:
             break
-    return list(_joined(_named(_bounded(found))))
+    return list(_joined(_named(found)))
 
 
 def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
@@ -150,7 +150,8 @@ def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
     The words of later shapes are words only in a region, from the shape's word on, which is the
     first thing behind the region's name; those of a motion from `moves` on; and those of waits,
     gates and spins only in the braces of `motion`. All of them not in parentheses, and not where a
-    value must begin.
+    value must begin. The words of bounds, which begin statements elsewhere or are names, are bounds
+    in the statement of the tissue.
     """
     named: list[Token | Comment] = []
     words = _Words()
@@ -170,6 +171,7 @@ class _Words:
         self._is_region = False
         self._is_solid = False
         self._is_moving = False
+        self._is_tissue = False
         self._motion = ""
         self._expects_value = False
 
@@ -185,7 +187,9 @@ class _Words:
             or (self._is_moving and item.text in _MOVES_WORDS)
             or (self._motion == "in" and item.text in _MOTION_WORDS)
         )
-        if item.text in _LATER_WORDS and not is_word:
+        if self._is_tissue and self._depth == 0 and item.text in TISSUE_BOUNDS:
+            item = Token("TISSUE_PART", item.text, item.span, item.line)
+        elif item.text in _LATER_WORDS and not is_word:
             item = Token("NAME", item.text, item.span, item.line)
         # In a gate, `phase` is followed by another word.
         is_gate = self._motion == "in" and item.type == "PHASE"
@@ -193,11 +197,15 @@ class _Words:
         return item
 
     def _enter(self, item: Token) -> None:
-        """Notes where regions, shapes and the braces of `motion` begin and end."""
+        """Notes where regions, shapes, the tissue and the braces of `motion` begin and end."""
+        if item.text == "tissue":
+            self._is_tissue, self._depth = True, 0
+        elif item.type in ("BRACE", "QUERY") or item.text in _NO_BOUNDS:
+            self._is_tissue = False
         if item.type == "REGION_KIND":
             self._awaited, self._depth = "name", 0
             self._is_region, self._is_solid, self._is_moving = True, False, False
-        elif item.type == "BRACE" or (item.text in RESERVED & KEYWORDS and item.text != "radius"):
+        elif item.type == "BRACE" or item.text in _BEGINNINGS:
             self._awaited = ""
             self._is_region = self._is_solid = self._is_moving = False
             if item.type == "BRACE":
@@ -211,31 +219,12 @@ class _Words:
             self._awaited, self._is_solid = "", item.text in SOLIDS
 
 
+_NO_BOUNDS: Final = KEYWORDS.difference(TISSUE_BOUNDS)
+_BEGINNINGS: Final = (RESERVED & KEYWORDS) - {"radius"}
 _LATER_WORDS: Final = _SOLID_WORDS | _MOVES_WORDS | _MOTION_WORDS
 _BEFORE_VALUE: Final = frozenset(
     word.upper() for word in (_SOLID_WORDS | _MOVES_WORDS) - {"moves"}
 ) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "SPIN", "BETWEEN", "AND"}
-
-
-def _bounded(items: Sequence[Token | Comment]) -> list[Token | Comment]:
-    """The items, with the words of bounds in the statement of the tissue as such.
-
-    They begin statements elsewhere, or are names.
-    """
-    found: list[Token | Comment] = []
-    depth, is_tissue = 0, False
-    for item in items:
-        if isinstance(item, Token):
-            depth += {"LPAR": 1, "LSQB": 1, "RPAR": -1, "RSQB": -1}.get(item.type, 0)
-            is_other = item.text in KEYWORDS and item.text not in TISSUE_BOUNDS
-            if item.text == "tissue":
-                depth, is_tissue = 0, True
-            elif is_other or item.type in ("BRACE", "QUERY"):
-                is_tissue = False
-            if is_tissue and depth == 0 and item.text in TISSUE_BOUNDS:
-                item = Token("TISSUE_PART", item.text, item.span, item.line)
-        found.append(item)
-    return found
 
 
 def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:
