@@ -8,7 +8,7 @@
 
 No phase stops at the first mistake, and a mistake in one statement does not hide one in another:
 `load` raises one `SourceError` with all mistakes. The README.md of this folder describes the
-language; its grammar is ``grammar.lark``.
+language; its grammar is ``environment.lark``.
 
 Invariants: only `ntagen.nsl.reading` touches the disk; nothing here prints; any text gives a scene
 or a `SourceError`, nothing else.

@@ -1,4 +1,4 @@
-"""The grammar of the language, `grammar.lark`, as lark's lexer of texts and parser of statements.
+"""The grammar of the language, `environment.lark`, as a lexer of texts and a parser of statements.
 
 Only what reads a text imports this module: lark takes a third of the time in which a command
 starts.
@@ -26,7 +26,7 @@ from ntagen.nsl import tree
 from ntagen.nsl.convert import TreeBuilder
 from ntagen.nsl.tokens import Token
 
-FILE: Final = Path(__file__).with_name("grammar.lark")
+FILE: Final = Path(__file__).with_name("environment.lark")
 
 
 class UnexpectedTokenError(Exception):

@@ -5,9 +5,9 @@ The steps:
 1. lark's lexer cuts the text into tokens. Other characters are reported and left out.
 2. The tokens are cut into statements: at braces, and at the words that begin a statement. All of
    these words are reserved, so that the cut is right even after a statement with a mistake.
-3. Each statement is parsed alone by the grammar (`grammar.lark`, LALR). A mistake is reported at
-   the first token that cannot stand at its place. That statement becomes a `Broken`; it does not
-   affect the others.
+3. Each statement is parsed alone by the grammar (`environment.lark`, LALR). A mistake is reported
+   at the first token that cannot stand at its place. That statement becomes a `Broken`; it does
+   not affect the others.
 
 A first word that is nearly a keyword is reported and then replaced by it. Otherwise a misspelt
 ``needle`` would make everything in its braces look wrong.

@@ -1,7 +1,7 @@
 """The words of the language: tokens, comments, and the keywords that begin a statement.
 
-The terminals are those of `grammar.lark`: a word in quotes there is a terminal of its own, named by
-its capitals. lark is imported when the first text is read, not before.
+The terminals are those of `environment.lark`: a word in quotes there is a terminal of its own,
+named by its capitals. lark is imported when the first text is read, not before.
 """
 
 from __future__ import annotations
