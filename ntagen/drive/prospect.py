@@ -9,7 +9,7 @@ they often begin alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import numpy as np
@@ -46,7 +46,7 @@ def by_prospect(
         return synthesis
     judge = _Judge(scene, estimate, settings, left_s)
     candidates = list(synthesis.candidates)
-    for plan in judge.wholes(_firsts(scene, judge.look_mm)):
+    for plan in judge.wholes(list(_firsts(scene, judge.look_mm))):
         certificate = certify(plan, scene)
         if settings.margins.allow(certificate):
             candidates.append(Candidate(plan, certificate))
@@ -91,17 +91,15 @@ class _Judge:
         firsts = [first_part(one.plan, self.look_mm) for one in candidates]
         return [one.prospect for one in self._judged(firsts)]
 
-    def wholes(self, firsts: Iterable[Plan]) -> list[Plan]:
+    def wholes(self, firsts: Sequence[Plan]) -> list[Plan]:
         """Plans that begin like these; none for those after which there is no way."""
-        firsts = list(firsts)
         return [
             Plan.of([*first.actions, *one.way.actions])
             for first, one in zip(firsts, self._judged(firsts), strict=True)
             if one.way is not None
         ]
 
-    def _judged(self, firsts: Iterable[Plan]) -> list[Judged]:
-        firsts = list(firsts)
+    def _judged(self, firsts: Sequence[Plan]) -> list[Judged]:
         # Each is judged once, in the order in which they come.
         new = [one for one in dict.fromkeys(firsts) if one not in self._known]
         if new:
