@@ -341,18 +341,7 @@ class Prospects:
         tip = Poses(*np.array(tips, dtype=np.float64).swapaxes(0, 1))
         straight_mm = lengths(self._middle - tip.position)
         left_mm = np.minimum(most_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
-        first = [
-            (number, spin)
-            for number, one in enumerate(places)
-            if left_mm[number] > 0.0
-            for spin in (self._spins if one.spin is None else (one.spin,))
-        ]
-        owner, spun = (
-            np.array([one[0] for one in first], np.intp),
-            np.array([one[1] for one in first]),
-        )
-        none, radii_mm = np.zeros(len(owner)), self._radius_mm / (1.0 - spun)
-        levels = [_Arcs(owner, tip.at(owner), left_mm[owner], radii_mm, owner, none, none, spun)]
+        levels = [self._straight(places, tip, left_mm)]
         apart_mm = limits.min_roll_distance_mm
         roll_places = ROLL_PLACES if len(self._spins) == 1 else SPUN_PLACES
         first_mm = np.array([max(0.0, apart_mm - one.since_roll_mm) for one in places])
@@ -393,6 +382,19 @@ class Prospects:
             )
             first_mm = np.full(len(places), max(apart_mm, _LEAST_APART_MM))
         return levels
+
+    def _straight(self, places: Sequence[Place], tip: Poses, left_mm: _Array) -> _Arcs:
+        """The arcs that go on from the places without a roll, one for each spin that may come."""
+        first = [
+            (number, spin)
+            for number, one in enumerate(places)
+            if left_mm[number] > 0.0
+            for spin in (self._spins if one.spin is None else (one.spin,))
+        ]
+        owner = np.array([number for number, _ in first], np.intp)
+        spun = np.array([spin for _, spin in first])
+        none, radii_mm = np.zeros(len(owner)), self._radius_mm / (1.0 - spun)
+        return _Arcs(owner, tip.at(owner), left_mm[owner], radii_mm, owner, none, none, spun)
 
     def _can_reach(self, start: Poses, rest_mm: _Array, useful_mm: float) -> _Flags:
         """Whether the greatest bend from places leads near the middle of the target.
