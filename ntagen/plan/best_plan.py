@@ -225,16 +225,15 @@ class _Known:
 
         A count of states is the same in replays.
         """
-        most_states = self._engine.max_states
+        keeps_strategy = self._engine.keeps_strategy and not self._plans
+        engine = replace(self._engine, keeps_strategy=keeps_strategy)
         if scene.breath is not None:
             # Waits make "no" dear to prove.
-            most_states = _MOST_STATES_IN_TIME
-        keeps_strategy = self._engine.keeps_strategy and not self._plans
-        engine = replace(self._engine, max_states=most_states, keeps_strategy=keeps_strategy)
+            engine = replace(engine, max_states=_MOST_STATES_IN_TIME)
         try:
             return self._note(engine.listed(self._strict(scene, worth_mm)))
         except LimitError:
-            if most_states == self._engine.max_states:
+            if scene.breath is None:
                 raise
             return None
 
