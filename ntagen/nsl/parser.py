@@ -152,16 +152,13 @@ class _Parser:
         words = self._cut(kind)
         keyword = words[0].text
         is_phrase = words[0].type in PHRASES.values()
-        is_misplaced = (
-            keyword in KEYWORDS
-            and not is_phrase
-            and kind is not None
-            and (keyword not in ALLOWED[kind] or kind in PHRASES)
-        )
-        if is_misplaced and kind is not None:
-            self._report_misplaced(words[0], kind)
-        if is_misplaced and words[0].type == "NAME":
-            # A word of other braces, which is a name here: it is reported already.
+        is_allowed = kind is None or (keyword in ALLOWED[kind] and kind not in PHRASES)
+        # A word of other braces can be a name here.
+        is_name = keyword in KEYWORDS and words[0].type == "NAME"
+        is_misplaced = keyword in KEYWORDS and not is_phrase and (is_name or not is_allowed)
+        if is_misplaced:
+            self._report_misplaced(words[0], None if is_allowed else kind)
+        if is_name:
             parsed: tree.Statement = tree.Broken(words[0].span.to(words[-1].span), keyword)
         else:
             parsed = self._parse_words(words)
@@ -335,10 +332,6 @@ class _Parser:
             return self._query(words) or tree.Broken(span, "query")
         is_known = words[0].text in KEYWORDS or words[0].type in PHRASES.values()
         if not is_known or self._is_too_deep(words):
-            return broken
-        if words[0].type == "NAME":
-            # A word that begins a statement in some braces, and is a name here.
-            self._report_misplaced(words[0], None)
             return broken
         try:
             parsed = read_statement(words)
