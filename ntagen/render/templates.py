@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import pickle
 from contextlib import suppress
+from html import escape
 from pathlib import Path
 from typing import Final
 
@@ -38,7 +39,7 @@ def filled(template: str, **values: object) -> str:
 
 def escaped(text: str) -> Markup:
     """A text as it stands between two tags of XML; quotes need no escape there."""
-    return Markup(text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;"))
+    return Markup(escape(text, quote=False))
 
 
 @functools.cache
