@@ -86,15 +86,16 @@ def chosen(scene: Scene) -> Precision:
 
     If none that fits into the model's integers is so fine, it is the one with the least error.
     """
-    best = None
     largest_mm = _largest_mm(scene)
-    for per_mm in _candidates(largest_mm):
+    candidates = list(_candidates(largest_mm))
+    for per_mm in candidates:
+        if _errs_at_once(scene, per_mm):
+            continue
         found = _at(scene, per_mm, largest_mm)
-        if best is None or found.path_error_mm < best.path_error_mm:
-            best = found
         if found.path_error_mm <= MOST_ERROR_MM:
-            break
-    return best or _at(scene, COARSEST_PER_MM, largest_mm)
+            return found
+    every = [_at(scene, per_mm, largest_mm) for per_mm in candidates or [COARSEST_PER_MM]]
+    return min(every, key=lambda one: one.path_error_mm)
 
 
 def least_margin(scene: Scene) -> tuple[float, str]:
@@ -186,9 +187,22 @@ def _at(scene: Scene, per_mm: int, largest_mm: float) -> Precision:
     if travel is None:
         return Precision(per_mm, math.inf, length_mm, math.inf)
     travel = replace(travel, pushes=_most_pushes(scene, travel))
-    straight = min(travel.pushes, math.ceil(_below_mm(scene) / travel.push_mm))
-    circle_mm = _bound_mm(replace(travel, folds=0, pushes=max(0, straight)))
+    circle_mm = _bound_mm(replace(travel, folds=0, pushes=_straight_pushes(scene, travel)))
     return Precision(per_mm, _bound_mm(travel), travel.pushes * travel.push_mm, circle_mm)
+
+
+def _errs_at_once(scene: Scene, per_mm: int) -> bool:
+    """Whether the straight way alone makes the error of a resolution too great: a quick look."""
+    travel = _travel(scene, per_mm)
+    if travel is None:
+        return True
+    straight = replace(travel, pushes=_straight_pushes(scene, travel))
+    return _bound_mm(straight) > MOST_ERROR_MM
+
+
+def _straight_pushes(scene: Scene, travel: _Travel) -> int:
+    """The pushes of a path straight down to the end of the targets; no path needs fewer."""
+    return max(0, min(travel.pushes, math.ceil(_below_mm(scene) / travel.push_mm)))
 
 
 def _travel(scene: Scene, per_mm: int) -> _Travel | None:

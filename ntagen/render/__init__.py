@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ntagen.errors import InputError
-from ntagen.render.queries import Query, model_queries, plan_queries, render_queries
-from ntagen.render.values import ModelValues, model_values
+from ntagen.render.queries import model_queries, plan_queries, render_queries
+from ntagen.render.values import model_values
 from ntagen.scene import Scene
 
 __all__ = ["render", "render_plan", "render_queries"]
@@ -36,9 +36,12 @@ def render(scene: Scene, source: str | None = None, *, only_plans: bool = False)
     Raises:
         InputError: A value of the scene does not fit the model's numbers.
     """
+    # Jinja takes a third of the time in which a command starts, and few need it.
+    from ntagen.render.documents import model_document
+
     values = model_values(scene, only_plans=only_plans)
     name = None if source is None else " ".join(source.split())
-    return _document("model.xml.jinja", values, name, model_queries(scene))
+    return model_document(values, name, model_queries(scene))
 
 
 def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
@@ -60,17 +63,7 @@ def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
     """
     if not scene.tissue.is_stochastic:
         raise InputError("the tissue has no chance\nhint: write `tissue stochastic`")
+    from ntagen.render.documents import plan_document
+
     values = model_values(scene, plan=plan)
-    queries = plan_queries(scene, sum(1 for action in plan if not action), runs)
-    return _document("plan.xml.jinja", values, None, queries)
-
-
-def _document(
-    template: str, values: ModelValues, source: str | None, queries: Sequence[Query]
-) -> str:
-    """A document with the declaration of the model in it."""
-    # Jinja takes a third of the time in which a command starts, and few need it.
-    from ntagen.render.templates import escaped, filled
-
-    declaration = filled("uppaal/declarations.c.jinja", model=values, source=source)
-    return filled(template, model=values, declaration=escaped(declaration), queries=queries)
+    return plan_document(values, plan_queries(scene, plan.count(0), runs))

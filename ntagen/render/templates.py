@@ -10,13 +10,11 @@ from __future__ import annotations
 import functools
 import pickle
 from contextlib import suppress
-from html import escape
 from pathlib import Path
 from typing import Final
 
 from jinja2 import Environment, FileSystemBytecodeCache, FileSystemLoader, StrictUndefined
 from jinja2.bccache import Bucket
-from markupsafe import Markup
 
 from ntagen.cache import cache_folder
 
@@ -35,11 +33,6 @@ def filled(template: str, **values: object) -> str:
         jinja2.UndefinedError: The template uses a name or an attribute that is not there.
     """
     return _environment().get_template(template).render(values)
-
-
-def escaped(text: str) -> Markup:
-    """A text as it stands between two tags of XML; quotes need no escape there."""
-    return Markup(escape(text, quote=False))
 
 
 @functools.cache

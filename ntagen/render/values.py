@@ -71,6 +71,17 @@ class Adversary:
 
 
 @dataclass(frozen=True, slots=True)
+class Features:
+    """What the automata of a model depend on; all else stands in its declaration."""
+
+    swept: bool
+    moving: bool
+    adversary: bool
+    spins: bool
+    chance: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ModelValues:
     """All values for the templates; lengths are texts in units of ``1 / scale`` mm.
 
@@ -105,6 +116,17 @@ class ModelValues:
     adversary: Adversary | None
     spins: tuple[str, ...] = ()
     chance: Chance | None = None
+
+    @property
+    def features(self) -> Features:
+        """What the automata of this model depend on."""
+        return Features(
+            self.swept,
+            self.moving is not None,
+            self.adversary is not None,
+            bool(self.spins),
+            self.chance is not None,
+        )
 
 
 @dataclass(frozen=True, slots=True)
