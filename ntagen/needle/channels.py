@@ -352,20 +352,12 @@ def positions(
     Returns:
         One row a place; one 3-row matrix a place, with one column for each unknown.
     """
-    starts = [part.start for part in parts]
-    begins = np.array([start.position_mm for start in starts])[part_of]
-    headings = np.array([start.heading for start in starts])[part_of]
-    bevels = np.array([start.bevel for start in starts])[part_of]
-    turned = np.array([part.bent_per_mm for part in parts])[part_of] * along_mm
-    half = 0.5 * turned
-    chord = along_mm * np.sinc(half / math.pi)
-    ahead, aside = chord * np.cos(half), chord * np.sin(half)
-    places = begins + ahead[:, None] * headings
-    places -= aside[:, None] * bevels
+    arcs = _Arcs.of(parts, part_of, along_mm)
+    places = arcs.places
     # Derivatives of both parts by the curvature's logarithm.
-    ahead_growth = along_mm * np.cos(turned) - ahead
-    aside_growth = along_mm * np.sin(turned) - aside
-    own = ahead_growth[:, None] * headings - aside_growth[:, None] * bevels
+    ahead_growth = along_mm * np.cos(arcs.turned) - arcs.ahead
+    aside_growth = along_mm * np.sin(arcs.turned) - arcs.aside
+    own = ahead_growth[:, None] * arcs.headings - aside_growth[:, None] * arcs.bevels
     slopes = np.stack([part.shift for part in parts])[part_of]
     growth = np.stack([part.growth for part in parts])[part_of]
     rotation = np.stack([part.rotation for part in parts], axis=1)[:, part_of]
@@ -376,6 +368,47 @@ def positions(
     slopes[:, 1] += rotation[2] * x - rotation[0] * z
     slopes[:, 2] += rotation[0] * y - rotation[1] * x
     return places, slopes
+
+
+def points(parts: Sequence[Placed], part_of: _Indices, along_mm: _Array) -> _Array:
+    """The positions alone; see `positions`."""
+    return _Arcs.of(parts, part_of, along_mm).places
+
+
+@dataclass(frozen=True, slots=True)
+class _Arcs:
+    """Arcs from the beginnings of stretches to places; one row for each place.
+
+    Attributes:
+        headings: Of the beginnings.
+        bevels: Of the beginnings.
+        turned: By how much the heading has turned, in rad.
+        ahead: The length of the chord along the heading, in mm.
+        aside: Its length against the bevel, in mm.
+        places: The ends.
+    """
+
+    headings: _Array
+    bevels: _Array
+    turned: _Array
+    ahead: _Array
+    aside: _Array
+    places: _Array
+
+    @staticmethod
+    def of(parts: Sequence[Placed], part_of: _Indices, along_mm: _Array) -> _Arcs:
+        """The arcs to places on stretches; see `positions`."""
+        starts = [part.start for part in parts]
+        begins = np.array([start.position_mm for start in starts])[part_of]
+        headings = np.array([start.heading for start in starts])[part_of]
+        bevels = np.array([start.bevel for start in starts])[part_of]
+        turned = np.array([part.bent_per_mm for part in parts])[part_of] * along_mm
+        half = 0.5 * turned
+        chord = along_mm * np.sinc(half / math.pi)
+        ahead, aside = chord * np.cos(half), chord * np.sin(half)
+        ends = begins + ahead[:, None] * headings
+        ends -= aside[:, None] * bevels
+        return _Arcs(headings, bevels, turned, ahead, aside, ends)
 
 
 def _turn_about(

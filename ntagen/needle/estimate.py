@@ -39,6 +39,7 @@ from ntagen.needle.channels import (
     Stretch,
     padded,
     place,
+    points,
 )
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
@@ -49,8 +50,7 @@ from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
 from ntagen.needle.priors import Priors as Priors
 from ntagen.needle.residuals import Problem, Reading
-from ntagen.needle.vectors import subtract
-from ntagen.scene import Pose, Vector
+from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
 
@@ -180,6 +180,8 @@ class Ahead:
         second order (M. Nørgaard, N. K. Poulsen, O. Ravn, "New developments in state estimation for
         nonlinear systems", Automatica 36, 2000): on 30 mm of a bend the first is not enough.
         """
+        if length_mm <= 0.0:
+            return self.covariance[:3, :3]
         expected_mm = np.array(pushed_to(tip, radius_mm, length_mm))
 
         def off_mm(errors: _Array) -> _Array:
@@ -229,15 +231,18 @@ class Ahead:
 def _ends(tip: Pose, radius_mm: float, length_mm: float, errors: _Array) -> _Array:
     """Where pushes end with these errors, as `Ahead` orders them; one row for each."""
     steps = (errors.shape[1] - 6) // 2
-    angles = np.linalg.norm(errors[:, 3:6], axis=1)[:, None]
+    rotations = errors[:, 3:6]
+    angles = np.linalg.norm(rotations, axis=1)[:, None]
     sine, versine = np.sinc(angles / math.pi), 0.5 * np.sinc(0.5 * angles / math.pi) ** 2
 
-    def rotated(direction: Vector) -> _Array:
-        once = np.cross(errors[:, 3:6], direction)
-        return np.asarray(direction + sine * once + versine * np.cross(errors[:, 3:6], once))
+    def rotated(direction: _Array) -> _Array:
+        # This is w x (w x d), for a rotation w.
+        twice = rotations * (rotations @ direction)[:, None] - angles**2 * direction
+        return np.asarray(direction + sine * np.cross(rotations, direction) + versine * twice)
 
     places = np.array(tip.position_mm) + errors[:, :3]
-    heading, bevel = rotated(tip.heading), rotated(tip.bevel)
+    heading, bevel = rotated(np.array(tip.heading)), rotated(np.array(tip.bevel))
+    side = np.cross(heading, bevel)
     turned = np.zeros((len(errors), 1))
     for step in range(steps):
         piece_mm = length_mm - step * _STEP_MM
@@ -245,7 +250,8 @@ def _ends(tip: Pose, radius_mm: float, length_mm: float, errors: _Array) -> _Arr
             piece_mm = min(piece_mm, _STEP_MM)
         turn = errors[:, 6 + steps + step, None] - turned
         turned = turned + turn
-        bevel = np.cos(turn) * bevel + np.sin(turn) * np.cross(heading, bevel)
+        cosine, sine = np.cos(turn), np.sin(turn)
+        bevel, side = cosine * bevel + sine * side, cosine * side - sine * bevel
         bend = piece_mm / radius_mm * np.exp(errors[:, 6 + step, None])
         half, chord_mm = 0.5 * bend, piece_mm * np.sinc(0.5 * bend / math.pi)
         places = places + chord_mm * (np.cos(half) * heading - np.sin(half) * bevel)
@@ -389,12 +395,14 @@ class Estimator:
 
     def _differences_mm(self, begin: Placed, placed: list[list[Placed]]) -> _Array:
         """By how much the measured positions differ from the estimated ones."""
-        differences = []
-        for reading in self._readings:
-            part = begin if reading.channel == ENTRY else placed[reading.channel][reading.stretch]
-            expected_mm = pushed_to(part.start, part.radius_mm, reading.along_mm)
-            differences.append(subtract(reading.measurement.position_mm, expected_mm))
-        return np.array(differences).reshape(-1, 3)
+        if not self._readings:
+            return np.zeros((0, 3))
+        index = {part: at for at, part in enumerate(dict.fromkeys(r.part for r in self._readings))}
+        parts = [begin if at == ENTRY else placed[at][number] for at, number in index]
+        part_of = np.array([index[one.part] for one in self._readings], dtype=np.intp)
+        along_mm = np.array([one.along_mm for one in self._readings])
+        measured_mm = np.array([one.measurement.position_mm for one in self._readings])
+        return measured_mm - points(parts, part_of, along_mm)
 
     def _ahead(
         self, tip: Placed, entry: Placed, unknowns_covariance: _Array

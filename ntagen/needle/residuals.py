@@ -92,7 +92,7 @@ class Problem:
         depths_mm, self._along_mm = (_sums(lengths_mm, begins) / counts[:, None]).T
         places = np.array([one.measurement.position_mm for one in ordered]).reshape(-1, 3)
         self._measured = _sums(places, begins) / counts[:, None]
-        self._whiten = _whitening(depths_mm, counts, priors)
+        self._whitening = _whitening(depths_mm, counts, priors)
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
         """Residuals and derivatives."""
@@ -109,8 +109,8 @@ class Problem:
         if self._parts:
             parts = [part(*one) for one in self._parts]
             expected, moved = positions(parts, self._part_of, self._along_mm)
-            moved = self._whiten @ moved.reshape(len(expected), -1)
-            residuals.append((self._whiten @ (self._measured - expected)).ravel())
+            moved = self._whitened(moved.reshape(len(expected), -1))
+            residuals.append(self._whitened(self._measured - expected).ravel())
             slopes.append(-moved.reshape(-1, len(unknowns)))
         for reading in self._directed:
             measurement = reading.measurement
@@ -135,6 +135,12 @@ class Problem:
         slopes.append(np.diag(1.0 / self._stds))
         return np.concatenate(residuals), np.vstack(slopes)
 
+    def _whitened(self, rows: _Array) -> _Array:
+        """Rows of positions, so that their errors are independent and of size 1."""
+        if self._whitening is None:
+            return rows / self._priors.noise_mm
+        return np.asarray(self._whitening @ rows)
+
     def _turn(self, reading: Reading, width: int) -> _Array:
         """The coefficients of the turn of the bend plane at a reading."""
         if reading.channel == ENTRY:
@@ -157,14 +163,16 @@ def _sums(rows: _Array, begins: _Indices) -> _Array:
     return np.add.reduceat(rows, begins) if len(begins) else rows
 
 
-def _whitening(depths_mm: _Array, counts: _Indices, priors: Priors) -> _Array:
+def _whitening(depths_mm: _Array, counts: _Indices, priors: Priors) -> _Array | None:
     """What positions are multiplied by, so that their errors are independent and of size 1.
+
+    None without distortion: each position then has the noise alone.
 
     The error of a mean has independent noise and the tracker's distortion, which the means at near
     depths share. The matrix is the inverse Cholesky factor of their covariance.
     """
     if priors.distortion_mm <= 0.0:
-        return np.eye(len(depths_mm)) / priors.noise_mm
+        return None
     apart_mm = depths_mm[:, None] - depths_mm[None, :]
     shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
     covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
