@@ -228,6 +228,29 @@ class Controller:
 
     def _look_back(self) -> Event:
         """Looks for the nearest place behind the tip from which there is a strategy."""
+        places = self._places_behind()
+        if not places:
+            with self._learner.supposing_least() as is_less:
+                # If not even these leave a way, no larger ones do.
+                has_hope = is_less and bool(self._places_behind())
+            while has_hope and not places and self._learner.doubt():
+                places = self._places_behind()
+        if not places:
+            event, self.reason = self._planner.lack.event()
+            return event
+        # The nearest place with enough reserve was found last; without one, the most reserve wins.
+        if not is_enough(places[-1][1].certificate, self._needle.known, _ENOUGH_BEHIND_MM):
+            places.sort(key=lambda place: reserve_of(place[1].certificate))
+        depth_mm, best = places[-1]
+        self._agree(f"pull back to a depth of {depth_mm:.1f} mm, for the plan {best.plan}")
+        self._retreat_mm = depth_mm
+        return Event.STRATEGY_BEHIND
+
+    def _places_behind(self) -> list[tuple[float, Candidate]]:
+        """Depths behind the tip, each with the best plan from there; the nearest come first.
+
+        The list ends with the first plan that has enough reserve.
+        """
         stride_mm = self._settings.pull_mm - self._settings.push_mm
         path = self._needle.path
         depth_mm = path.depth_mm
@@ -241,18 +264,7 @@ class Controller:
                 places.append((depth_mm, best))
                 if is_enough(best.certificate, self._needle.known, _ENOUGH_BEHIND_MM):
                     break
-        if not places and self._learner.doubt():
-            return self._look_back()
-        if not places:
-            event, self.reason = self._planner.lack.event()
-            return event
-        # The nearest place with enough reserve was found last; without one, the most reserve wins.
-        if not is_enough(places[-1][1].certificate, self._needle.known, _ENOUGH_BEHIND_MM):
-            places.sort(key=lambda place: reserve_of(place[1].certificate))
-        depth_mm, best = places[-1]
-        self._agree(f"pull back to a depth of {depth_mm:.1f} mm, for the plan {best.plan}")
-        self._retreat_mm = depth_mm
-        return Event.STRATEGY_BEHIND
+        return places
 
     def _initial_push(self) -> Event:
         """Makes the first moves of the plan, or the free push if there is none."""

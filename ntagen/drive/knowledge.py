@@ -208,10 +208,14 @@ class Knowledge:
         known = self._with_ball(_Felt(ball, (contact,)), assumed, channels)
         return replace(known, contacts=contacts)
 
-    def doubted(self, assumed: Assumed) -> Knowledge | None:
+    def doubted(self, assumed: Assumed, ratio: float = 0.5) -> Knowledge | None:
         """The knowledge with smaller learned regions; None if they are as small as can be.
 
         How large a region is, is a guess; only its contacts are facts.
+
+        Args:
+            assumed: What is assumed of regions that are felt.
+            ratio: How large the radii become, relative to now; not less than the least guess.
         """
         contacts = dict(self.felt)
         balls = [region for region in self.learned if region.kind == "critical"]
@@ -220,7 +224,7 @@ class Knowledge:
         smaller = []
         for ball in balls:
             felt = contacts.get(ball.name, ())
-            radius_mm = min(ball.radius_mm, max(_LEAST_GUESS_MM, 0.5 * ball.radius_mm))
+            radius_mm = min(ball.radius_mm, max(_LEAST_GUESS_MM, ratio * ball.radius_mm))
             center = ball.center_mm
             if len(felt) == 1:
                 ahead_mm = felt[0].away_mm + radius_mm

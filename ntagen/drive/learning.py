@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from ntagen.drive.force import ForceMonitor, Rise, stop_force_n
 from ntagen.drive.knowledge import Knowledge, assumed_of, position_unsure_mm
 from ntagen.drive.records import Breathed, Forgotten, Journal, Learned, Visited
@@ -115,6 +118,17 @@ class Learner:
             return False
         self._know(known)
         return True
+
+    @contextmanager
+    def supposing_least(self) -> Iterator[bool]:
+        """Supposes that the felt regions are as small as can be; whether that makes any smaller."""
+        before = self.knowledge
+        least = before.doubted(assumed_of(self._settings), 0.0)
+        self.knowledge = least or before
+        try:
+            yield least is not None
+        finally:
+            self.knowledge = before
 
     def _know(self, known: Knowledge) -> None:
         """Records what is learned, and what is not assumed any more."""
