@@ -75,8 +75,8 @@ _STEPS = 20
 """What lies ahead is divided into so many steps; the last one has no end."""
 
 
-_PAIRED = 6
-"""Of so many principal axes of what is not known ahead, two count together."""
+_PAIRS = np.triu_indices(6, 1)
+"""Of six principal axes of what is not known ahead, two count together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,14 +212,16 @@ class Ahead:
     def _moments_mm2(self, length_mm: float, off_mm: Callable[[_Array], _Array]) -> _Array:
         """The second moments of what errors of a push do; one row of errors for each case."""
         steps, used = len(self.differences) // 2, self._used(length_mm)
-        chosen = np.r_[0:6, 6 : 6 + used, 6 + steps : 6 + steps + used]
-        variances, axes = np.linalg.eigh(self.covariance[np.ix_(chosen, chosen)])
+        parts = [slice(6 + used), slice(6 + steps, 6 + steps + used)]
+        near = np.concatenate([self.covariance[:, part] for part in parts], axis=1)
+        variances, axes = np.linalg.eigh(np.concatenate([near[part] for part in parts]))
         moved = (axes * np.sqrt(np.maximum(0.0, variances))).T
         # The greatest come last.
-        one, other = np.triu_indices(_PAIRED, 1)
+        one, other = _PAIRS
         pairs = moved[-1 - one] + moved[-1 - other]
         errors = np.concatenate([np.zeros_like(moved[:1]), moved, -moved, pairs])
-        errors[:, 6:] += np.r_[self.differences[:used], self.differences[steps : steps + used]]
+        errors[:, 6 : 6 + used] += self.differences[:used]
+        errors[:, 6 + used :] += self.differences[steps : steps + used]
         middle, more, less, both = np.split(off_mm(errors), [1, 1 + len(moved), 1 + 2 * len(moved)])
         first, second = 0.5 * (more - less), 0.5 * (more + less) - middle
         mixed = both - more[-1 - one] - more[-1 - other] + middle
