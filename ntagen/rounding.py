@@ -10,9 +10,9 @@ needle's length, or less if every path has gone past the targets before.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Final
 
 from ntagen import rules
@@ -155,6 +155,24 @@ def _extent_mm(region: Region) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class _Rolls:
+    """The greatest chord, sine and versine of the angles that a roll may have."""
+
+    chord: float
+    sine: float
+    versine: float
+
+
+@functools.lru_cache(maxsize=16)
+def _rolls(angles_rad: tuple[float, ...]) -> _Rolls:
+    return _Rolls(
+        max((2.0 * abs(math.sin(0.5 * a)) for a in angles_rad), default=0.0),
+        max((abs(math.sin(a)) for a in angles_rad), default=0.0),
+        max((1.0 - math.cos(a) for a in angles_rad), default=0.0),
+    )
+
+
+@dataclass(frozen=True, slots=True)
 class _Travel:
     """What the bound depends on.
 
@@ -166,7 +184,7 @@ class _Travel:
         lost_rad: By how much the model's turn of a push differs from the exact one, at most.
         pushes: The greatest number of pushes.
         folds: How many rolls there may be, those of the tissue included.
-        rolls_rad: The angles that a roll may have.
+        rolls: What rolls may do.
     """
 
     unit: float
@@ -176,7 +194,7 @@ class _Travel:
     lost_rad: float
     pushes: int
     folds: int
-    rolls_rad: tuple[float, ...]
+    rolls: _Rolls
 
 
 def _at(scene: Scene, per_mm: int, largest_mm: float) -> Precision:
@@ -186,9 +204,10 @@ def _at(scene: Scene, per_mm: int, largest_mm: float) -> Precision:
     length_mm = scene.needle.length_mm
     if travel is None:
         return Precision(per_mm, math.inf, length_mm, math.inf)
-    travel = replace(travel, pushes=_most_pushes(scene, travel))
-    circle_mm = _bound_mm(replace(travel, folds=0, pushes=_straight_pushes(scene, travel)))
-    return Precision(per_mm, _bound_mm(travel), travel.pushes * travel.push_mm, circle_mm)
+    pushes = _most_pushes(scene, travel)
+    circle_mm = _bound_mm(travel, _straight_pushes(scene, travel), 0)
+    path_mm = _bound_mm(travel, pushes, travel.folds)
+    return Precision(per_mm, path_mm, pushes * travel.push_mm, circle_mm)
 
 
 def _errs_at_once(scene: Scene, per_mm: int) -> bool:
@@ -196,8 +215,8 @@ def _errs_at_once(scene: Scene, per_mm: int) -> bool:
     travel = _travel(scene, per_mm)
     if travel is None:
         return True
-    straight = replace(travel, pushes=_straight_pushes(scene, travel))
-    return _bound_mm(straight) > MOST_ERROR_MM
+    straight = _straight_pushes(scene, travel)
+    return _bound_mm(travel, straight, travel.folds) > MOST_ERROR_MM
 
 
 def _straight_pushes(scene: Scene, travel: _Travel) -> int:
@@ -233,7 +252,7 @@ def _travel(scene: Scene, per_mm: int) -> _Travel | None:
         lost_rad=max(abs(a - b) for a, b in turns),
         pushes=rules.units_of(needle.length_mm, per_mm) // insertion,
         folds=limits.max_rolls + limits.free_bevel + picks,
-        rolls_rad=limits.roll_angles_rad + tissue.roll_errors_rad,
+        rolls=_rolls(limits.roll_angles_rad + tissue.roll_errors_rad),
     )
 
 
@@ -253,7 +272,7 @@ def _most_pushes(scene: Scene, travel: _Travel) -> int:
 
     def is_past(pushes: int) -> bool:
         descent = math.sin(lean_rad + pushes * travel.turn_rad) - math.sin(lean_rad)
-        return least_radius_mm * descent > below_mm + _bound_mm(replace(travel, pushes=pushes))
+        return least_radius_mm * descent > below_mm + _bound_mm(travel, pushes, travel.folds)
 
     low, high = 0, min(travel.pushes, int((0.5 * math.pi - lean_rad) / travel.turn_rad))
     if high < 1 or not is_past(high):
@@ -276,18 +295,15 @@ def _below_mm(scene: Scene) -> float:
     )
 
 
-def _bound_mm(travel: _Travel) -> float:
+def _bound_mm(travel: _Travel, pushes: int, folds: int) -> float:
     """The bound of the error after so many pushes; infinite if the derivation does not hold."""
-    unit, radius_mm, folds = travel.unit, travel.radius_mm, travel.folds
-    turned = travel.pushes * travel.turn_rad
+    unit, radius_mm = travel.unit, travel.radius_mm
+    turned = pushes * travel.turn_rad
     if unit > _LARGEST_UNIT:
         return math.inf
     chord = min(turned, 2.0)
     sine, versine = math.sin(min(turned, 0.5 * math.pi)), 1.0 - math.cos(min(turned, math.pi))
-    rolls = travel.rolls_rad if folds else ()
-    roll_chord = max((2.0 * abs(math.sin(0.5 * a)) for a in rolls), default=0.0)
-    roll_sine = max((abs(math.sin(a)) for a in rolls), default=0.0)
-    roll_versine = max((1.0 - math.cos(a) for a in rolls), default=0.0)
+    rolls = travel.rolls
 
     across = along = 0.5 * _ROOT_3 * unit  # β of the columns y and z, and of x.
     frame = 0.0  # θ without what the axis of the bend adds.
@@ -314,9 +330,9 @@ def _bound_mm(travel: _Travel) -> float:
         if max(heading_sine, across) > _LARGEST_SINE:
             return math.inf
         heading = math.asin(heading_sine)
-        frame += roll_chord * heading + unit
-        across = _after_product(across, unit, roll_sine) + 8.0 * unit * (across + heading)
-        along = _after_product(along, unit, 2.1 * roll_versine)
+        frame += rolls.chord * heading + unit
+        across = _after_product(across, unit, rolls.sine) + 8.0 * unit * (across + heading)
+        along = _after_product(along, unit, 2.1 * rolls.versine)
 
     mixed = min(0.5 * turned * turned * folds / (folds + 1), 2.0 * folds * turned)
     sideways = mixed * tilts[folds - 1] if folds else 0.0
@@ -325,7 +341,7 @@ def _bound_mm(travel: _Travel) -> float:
         part = min(left, chord)
         sideways += part * weight
         left -= part
-    lost = travel.lost_rad * (travel.pushes + mixed / travel.turn_rad)
+    lost = travel.lost_rad * (pushes + mixed / travel.turn_rad)
     positions_mm = unit * (0.5 * _ROOT_3 + 2.0 * _ROOT_3 * (folds + 1) + 0.5 * turned)
     return radius_mm * (fixed + sideways + lost) + positions_mm
 
