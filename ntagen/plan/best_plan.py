@@ -92,13 +92,12 @@ class BestPlanSynthesiser:
         known = _Known(self.engine, scene)
         known.look(asked)
         if known.found and known.asks_for_list and scene.breath is None:
+            # Every plan that was found fails its certificate, or comes near a region: the list
+            # tells whether all do.
             if sequences(scene) <= MOST_WHEN_NARROW:
-                # Every plan that was found fails its certificate, or comes near a region: the list
-                # tells whether all do.
                 return self.engine(scene, asked)
             if not known.candidates:
-                few = min(_MOST_TRIED, self.engine.max_plans)
-                return replace(self.engine, max_plans=few)(scene)
+                return replace(self.engine, max_plans=_most_listed(self.engine, scene))(scene)
         return Synthesis(
             scene=scene,
             model_xml=known.origin.model_xml,
@@ -109,7 +108,7 @@ class BestPlanSynthesiser:
             ranking=self.engine.ranking,
             strategy_json=known.origin.strategy_json,
             # Without any plan nothing is left out.
-            is_complete=not known.found,
+            is_complete=known.is_complete or not known.found,
         )
 
 
@@ -118,6 +117,7 @@ class _Known:
 
     Attributes:
         candidates: The plans that hold.
+        is_complete: Whether all plans of the scene are known.
         seconds: The time that the engine took.
         origin: The first answer with a plan; without any, the last answer.
     """
@@ -127,6 +127,8 @@ class _Known:
     def __init__(self, engine: EngineSynthesiser, scene: Scene) -> None:
         self._engine = replace(engine, max_plans=1)
         self._scene = scene
+        self._most_listed = _most_listed(engine, scene)
+        self.is_complete = False
         self._plans: dict[Plan, None] = {}
         self.candidates: list[Candidate] = []
         self.seconds = 0.0
@@ -140,11 +142,13 @@ class _Known:
     def asks_for_list(self) -> bool:
         """Whether no plan holds, or a better one than the best is worth waiting for.
 
-        Where the reserve counts, the list of all plans changed no drive.
+        Where the reserve counts, they are listed if none holds.
         """
+        if self._counts_reserve:
+            return False
         best = self._best()
-        if best is None or self._counts_reserve:
-            return best is None
+        if best is None:
+            return True
         return best.certificate.critical_clearance_mm < _NARROW_MM
 
     def look(self, asked: Scene | None) -> None:
@@ -164,11 +168,15 @@ class _Known:
 
     def _look_for_reserve(self, asked: Scene | None) -> None:
         found = self._ask(self._scene, _RESERVE_MM)
-        for scene in (self._scene,) if asked is None else (asked, self._scene):
-            if found is None:
-                found = self._note(self._engine.listed(scene))
+        if found is None and asked is not None:
+            found = self._note(self._engine.listed(asked))
+        if found is None:
+            # Nothing is asked after this. So many plans are listed: if the first fails, one of the
+            # others may hold.
+            listing = replace(self._engine, max_plans=self._most_listed).listed(self._scene)
+            found = self._note(listing)
+            self.is_complete = found is None and listing.is_complete
         if self._scene.breath is not None and self.found:
-            # A list of all plans would take too long.
             for less_mm in _SMALL_RESERVES_MM:
                 if not self.candidates:
                     self._ask(self._scene, less_mm)
@@ -253,10 +261,14 @@ class _Known:
         if not self._plans:
             self.origin = listing
         engine = self._engine
-        holding = select(listing.plans, self._scene, engine.margins, engine.ranking)
-        self.candidates += [one for one in holding if one.plan not in self._plans]
-        self._plans.update(dict.fromkeys(listing.plans))
-        return holding[0] if holding else None
+        for plans in (listing.plans[:1], listing.plans[1:]):
+            # The others count only if the first one fails.
+            holding = select(plans, self._scene, engine.margins, engine.ranking)
+            self.candidates += [one for one in holding if one.plan not in self._plans]
+            self._plans.update(dict.fromkeys(plans))
+            if holding:
+                return holding[0]
+        return None
 
     def _best(self) -> Candidate | None:
         ranked = rank(self.candidates, self._engine.ranking)
@@ -270,6 +282,15 @@ class _Known:
         if self._counts_reserve:
             return reserve_of(best.certificate)
         return best.certificate.critical_clearance_mm
+
+
+def _most_listed(engine: EngineSynthesiser, scene: Scene) -> int:
+    """How many plans are listed of a scene whose first ones fail."""
+    if scene.breath is not None:
+        # A list would take too long.
+        return 1
+    is_narrow = sequences(scene) <= MOST_WHEN_NARROW
+    return engine.max_plans if is_narrow else min(_MOST_TRIED, engine.max_plans)
 
 
 def _prefers_few_rolls(ranking: tuple[str, ...]) -> bool:
