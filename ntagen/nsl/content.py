@@ -88,7 +88,7 @@ class ContentResolver:
             case tree.Choice() | tree.Tissue():
                 self._behaviour(statement, scope, draft)
             case tree.Parameter():
-                self._driver.parameter(statement, scope, draft)
+                draft.given += self._driver.parameter(statement, scope)
             case tree.Axis():
                 self._driver.axis(statement, scope, draft)
             case tree.Tracker():

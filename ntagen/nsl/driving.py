@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from ntagen.nsl import tree
-from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.diagnostics import Reporter, SourceError, did_you_mean
 from ntagen.nsl.draft import Draft, DraftDevice, Placed
-from ntagen.nsl.evaluate import Evaluator, Scope
+from ntagen.nsl.evaluate import CONSTANTS, Evaluator, Scope
+from ntagen.nsl.parser import parse
 from ntagen.nsl.quantity import (
     ANGLE,
     DATA,
@@ -21,7 +23,8 @@ from ntagen.nsl.quantity import (
     TURNING,
     Dimension,
 )
-from ntagen.parameters import BY_WORDS, Given, Kind, Parameter, Value
+from ntagen.nsl.source import Source
+from ntagen.parameters import BY_WORDS, MEASURES, Given, Kind, Parameter, Value
 from ntagen.units import RAD_PER
 
 _DIMENSIONS: Final[dict[Kind, Dimension]] = {
@@ -59,15 +62,64 @@ def is_choice(word: tree.Identifier, keyword: str, reporter: Reporter) -> bool:
     return False
 
 
-class DriverResolver:
-    """Resolves the statements about the driver; mistakes go to the reporter."""
+def read_settings(texts: Sequence[str], path: str, origin: str) -> list[Given]:
+    """The settings in texts that could each stand in the braces of ``drive { … }``.
 
-    def __init__(self, reporter: Reporter, evaluator: Evaluator) -> None:
+    Other than in a file, a plain number is in the usual unit of its setting.
+
+    Args:
+        texts: The texts; no setting may be in them twice.
+        path: How a message names the texts.
+        origin: Where their values come from, for `Given`.
+
+    Raises:
+        SourceError: The texts have mistakes; the error has all of them.
+    """
+    reporter = Reporter()
+    resolver = DriverResolver(reporter, Evaluator(reporter), takes_plain_numbers=True)
+    firsts: dict[str, tree.Parameter] = {}
+    given: list[Given] = []
+    for text in texts:
+        file = parse(Source(path, text), reporter, "drive")
+        if not file.statements and not reporter.has_errors:
+            hint = f"write for example `{BY_WORDS['pull'].example}`"
+            reporter.report("file-empty", file.source.span(0, 0), "no setting is here", hint=hint)
+        for statement in file.statements:
+            if not isinstance(statement, tree.Parameter):
+                continue
+            first = firsts.setdefault(statement.keyword, statement)
+            if first is not statement:
+                reporter.report(
+                    "statement-repeated",
+                    statement.span,
+                    f"`{statement.keyword}` is written a second time",
+                    hint="remove one of the two",
+                    notes=(f"the first is `{first.span.text}`",),
+                )
+            given += resolver.parameter(statement, Scope())
+    if reporter.has_errors:
+        raise SourceError(reporter.diagnostics)
+    return [Given(one.parameter, one.value, origin) for one in given]
+
+
+class DriverResolver:
+    """Resolves the statements about the driver; mistakes go to the reporter.
+
+    Args:
+        reporter: Collects the mistakes.
+        evaluator: Evaluates the values.
+        takes_plain_numbers: Whether a plain number is in the usual unit of its setting.
+    """
+
+    def __init__(
+        self, reporter: Reporter, evaluator: Evaluator, *, takes_plain_numbers: bool = False
+    ) -> None:
         self._reporter = reporter
         self._evaluator = evaluator
+        self._takes_plain_numbers = takes_plain_numbers
 
-    def parameter(self, statement: tree.Parameter, scope: Scope, draft: Draft) -> None:
-        """A setting of the driver."""
+    def parameter(self, statement: tree.Parameter, scope: Scope) -> list[Given]:
+        """A setting of the driver; none after a mistake."""
         parameter = BY_WORDS[statement.keyword]
         if parameter.kind != "words" and len(statement.values) > 1:
             self._reporter.report(
@@ -76,20 +128,41 @@ class DriverResolver:
                 f"`{parameter.words}` has one value",
                 hint=f"write for example `{parameter.example}`",
             )
-            return
-        value = self._value(parameter, statement, scope)
+            return []
+        value = None
+        if not self._is_word(parameter, statement, scope):
+            value = self._value(parameter, statement, scope)
         if value is None:
-            return
-        breach = parameter.breach(value)
+            return []
         span = statement.values[0].span
-        if breach is not None:
-            self._reporter.report(breach.rule, span, breach.message, hint=breach.hint)
-        else:
-            draft.given.append(Given(parameter, value, span.place))
+        if not self._reporter.obeys(parameter.breach(value), span):
+            return []
+        return [Given(parameter, value, span.place)]
+
+    def _is_word(self, parameter: Parameter, statement: tree.Parameter, scope: Scope) -> bool:
+        """Whether a word that means nothing stands in place of a quantity; if so, reports it.
+
+        It may be a misspelt part of a longer setting: `force` is one, and so is `force sensing`.
+        """
+        value = statement.values[0]
+        name = value.operand if isinstance(value, tree.Measured) else value
+        if not parameter.is_quantity or not isinstance(name, tree.Name):
+            return False
+        longer = [words for words in BY_WORDS if words.startswith(f"{parameter.words} ")]
+        hint = did_you_mean(f"{parameter.words} {name.text}", longer)
+        if hint is None and self._takes_plain_numbers:
+            hint = f"write for example `{parameter.example}`"
+        if hint is None or name.text in CONSTANTS or scope.find(name.text) is not None:
+            return False
+        message = f"`{name.text}` is no value of `{parameter.words}`"
+        self._reporter.report("unknown-name", name.span, message, hint=hint)
+        return True
 
     def _value(self, parameter: Parameter, statement: tree.Parameter, scope: Scope) -> Value | None:
         """The value of a setting; None after a mistake."""
         first, role = statement.values[0], f"`{parameter.words}`"
+        if self._takes_plain_numbers:
+            first = _measured(first, MEASURES[parameter.kind].unit)
         if parameter.kind == "count":
             return self._evaluator.whole(first, scope, role)
         if parameter.kind in _DIMENSIONS:
@@ -143,3 +216,12 @@ class DriverResolver:
             address = Placed(statement.address.text, statement.address.span)
             name = "" if statement.name is None else statement.name.text
             draft.devices["tracker"] = DraftDevice(statement.kind.text, address, name)
+
+
+def _measured(expression: tree.Expression, unit: str) -> tree.Expression:
+    """An expression with a unit, if it is a plain number and the unit is not empty."""
+    is_signed = isinstance(expression, tree.Signed)
+    number = expression.operand if is_signed else expression
+    if not unit or not isinstance(number, tree.Number):
+        return expression
+    return tree.Measured(expression.span, expression, tree.Identifier(expression.span, unit))

@@ -63,7 +63,7 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
     Args:
         source: The text.
         reporter: Collects the mistakes.
-        kind: The braces in which the text stands: those of an include. None allows all statements.
+        kind: The braces in which the text stands. None allows all statements, as in an include.
 
     Returns:
         The tree of all that could be read.
@@ -72,7 +72,7 @@ def parse(source: Source, reporter: Reporter, kind: BlockKind | None = "file") -
         name, message, hint = foreign
         reporter.report_file(name, source.path, message, hint=hint)
         return tree.File(source, ())
-    tokens = [t for t in tokenise(source) if isinstance(t, Token)]
+    tokens = [t for t in tokenise(source, kind) if isinstance(t, Token)]
     return _Parser(source, tokens, reporter).file(kind)
 
 
@@ -273,15 +273,18 @@ class _Parser:
         begun = [words for words in allowed if words.startswith(f"{token.text} ")]
         meant = (
             (begun[0] if len(begun) == 1 else None)
-            or suggest(token.text, allowed)
+            or suggest(self._phrase() if kind == "drive" else token.text, allowed)
             or suggest(token.text, KEYWORDS)
         )
-        words = ", ".join(f"`{word}`" for word in sorted(allowed))
+        others = ", ".join(f"`{word}`" for word in sorted(allowed))
+        others = f"possible words here: {others}"
+        if kind == "drive":
+            others = "`ntagen drive --help-settings` prints all settings"
         self._reporter.report(
             "unknown-keyword",
             token.span,
             f"no statement begins with {quoted(token)}",
-            hint=f"did you mean `{meant}`?" if meant else f"possible words here: {words}",
+            hint=f"did you mean `{meant}`?" if meant else others,
         )
         if meant is None or meant == "query" or " " in meant:
             return token
@@ -289,6 +292,13 @@ class _Parser:
         if kind is not None and kind in PHRASES and meant in allowed:
             terminal = PHRASES[kind]
         return Token(terminal, meant, token.span, token.line)
+
+    def _phrase(self) -> str:
+        """The words from here on, up to a value: settings have several words."""
+        words = []
+        while (token := self._peek(len(words))) is not None and token.text[0].isalpha():
+            words.append(token.text)
+        return " ".join(words)
 
     def _begins_unknown_statement(self, previous: Token, token: Token) -> bool:
         """Whether a name that begins a line can only be a misspelt keyword.

@@ -121,8 +121,12 @@ WORDS: Final = {
 """The terminals of words that are no names everywhere."""
 
 
-def tokenise(source: Source) -> list[Token | Comment]:
+def tokenise(source: Source, kind: BlockKind | None = None) -> list[Token | Comment]:
     """All tokens and comments of a source; with the white space they are the whole text.
+
+    Args:
+        source: The text.
+        kind: The braces in which the text stands, if they are some of `PHRASES`.
 
     After `MAX_STRAY` tokens that are not part of the language, the rest of the text is left out.
     """
@@ -141,7 +145,7 @@ def tokenise(source: Source) -> list[Token | Comment]:
         stray_count += token.type in STRAY
         if stray_count > MAX_STRAY:
             break
-    return list(_joined(_named(found)))
+    return list(_joined(_named(found), kind if kind in PHRASES else None))
 
 
 def _named(items: Sequence[Token | Comment]) -> list[Token | Comment]:
@@ -227,10 +231,11 @@ _BEFORE_VALUE: Final = frozenset(
 ) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "SPIN", "BETWEEN", "AND"}
 
 
-def _joined(items: Sequence[Token | Comment]) -> Iterator[Token | Comment]:
+def _joined(
+    items: Sequence[Token | Comment], block: BlockKind | None
+) -> Iterator[Token | Comment]:
     """The items, with the words that begin a statement in `PHRASES` joined to one token."""
-    block: BlockKind | None = None
-    depth = 0
+    depth = 0 if block is None else 1
     phrase: Token | None = None
     expects_value = False
     skipped = 0
