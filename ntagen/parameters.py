@@ -1,8 +1,8 @@
-"""The table of all that steers: its words in ``drive { … }``, its option, its unit, its help.
+"""The table of all that steers: its words, its unit, its help.
 
 A new setting is one row of `PARAMETERS`, and a field in `ntagen.drive.settings` (or, for the
 virtual needle, in `ntagen.drive.simulate`). From the row follow the language (`ntagen.nsl`: words,
-dimension, diagnostics, layout), the option of ``ntagen drive``, and the list of ``ntagen info``.
+dimension, diagnostics, layout), what ``--set`` takes, and the lists of settings.
 
 Values are in mm, rad, s, N and bytes, wherever they come from.
 """
@@ -91,7 +91,7 @@ class Parameter:
         least: The least value, in the unit of the field.
         is_above: Whether a value must be greater than `least`.
         most: A value must be less than this, if it is given.
-        option: Its option of ``ntagen drive``; by default made of its words.
+        option: Its own option of ``ntagen drive``, if it has one besides ``--set``.
         choices: The words that it can have.
         sample: A value as an example; by default that of its kind.
     """
@@ -108,9 +108,20 @@ class Parameter:
     sample: str = ""
 
     @property
-    def flag(self) -> str:
-        """The option on the command line."""
-        return self.option or "--" + self.words.replace(" ", "-")
+    def part(self) -> str:
+        """The part of the settings in which it is, one of `PARTS`."""
+        return self.field.rpartition(".")[0]
+
+    @property
+    def spelling(self) -> str:
+        """What gives it on the command line, for messages."""
+        return self.option or f"--set '{self.words} …'"
+
+    @property
+    def form(self) -> str:
+        """How it is written, without its value."""
+        value = "…, …" if self.kind == "words" else "|".join(self.choices) or "…"
+        return f"{self.words} {value} {MEASURES[self.kind].unit}".rstrip()
 
     @property
     def is_quantity(self) -> bool:
@@ -149,7 +160,7 @@ class Parameter:
         )
 
     def parse(self, text: str) -> Value:
-        """The value of a text on the command line; a number without a unit is in the usual one.
+        """The value of a text without its words; a number without a unit is in the usual one.
 
         Raises:
             ValueError: The text is not such a value; the message says what is wrong.
@@ -220,6 +231,17 @@ class Given:
 
 NEEDLE: Final = "needle"
 """The part of the settings that only the simulated needle knows."""
+
+SEED: Final = "seed"
+"""The words of the setting that a campaign does not take: it makes runs with many seeds."""
+
+PARTS: Final = {
+    "": "How the driver steers",
+    "margins": "What plans keep clear of",
+    "priors": "What is assumed before anything is measured",
+    NEEDLE: "What is true of a simulated needle",
+}
+"""The parts of the settings, with their headings in a list."""
 
 PARAMETERS: Final = (
     Parameter("pull_mm", "pull", "length", "How far the needle is pulled back to readjust."),
@@ -424,7 +446,6 @@ PARAMETERS: Final = (
         "words",
         "How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
         "length, target.",
-        option="--rank",
         choices=("clearance", "reserve", "rolls", "length", "target"),
     ),
     Parameter(
@@ -471,6 +492,7 @@ PARAMETERS: Final = (
         "The least confidence with which a push stays clear of critical regions until it is looked "
         "at, and the tip is in the target.",
         is_above=True,
+        option="--accept",
         most=1.0,
         sample="0.98",
     ),
@@ -488,6 +510,7 @@ PARAMETERS: Final = (
         "noise",
         "length",
         "Simulated needle: standard deviation of each measured coordinate.",
+        option="--noise",
     ),
     Parameter(
         "needle.roll_rad",
@@ -536,6 +559,7 @@ PARAMETERS: Final = (
         "seed",
         "count",
         "Simulated needle: for all that is random in it; the same seed gives the same errors.",
+        option="--seed",
     ),
 )
 """All settings, in the order in which they are listed."""

@@ -20,11 +20,18 @@ from ntagen.cli.course import (
     say_idle_options,
 )
 from ntagen.cli.effects import say_idle
+from ntagen.cli.former_options import SteeringCommand
 from ntagen.cli.models import include_option
 from ntagen.cli.operator import SignalledOperator, signalled_operator
 from ntagen.cli.report import lines, report, summary
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.steering import known_option, say_idle_errors, show_settings, steering_options
+from ntagen.cli.steering import (
+    known_option,
+    say_idle_errors,
+    say_idle_settings,
+    settings_options,
+    show_settings,
+)
 from ntagen.cli.terminal import echo
 from ntagen.cli.tracker import Sense, Tracking, opened, opened_live, tracker_options, tracking_of
 from ntagen.drive.states import State
@@ -32,7 +39,7 @@ from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
     from ntagen.drive.configure import Configuration
     from ntagen.drive.device import LiveSensor, WatchedActuator
@@ -51,7 +58,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 130 interrupted, 143 ended by SIGTERM."""
 
 
-@click.command("drive", epilog=_EPILOG)
+@click.command("drive", cls=SteeringCommand, epilog=_EPILOG)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--needle",
@@ -102,7 +109,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Print all settings and where each comes from, and do not drive.",
 )
 @include_option()
-@steering_options
+@settings_options("seed", "noise", "time limit", "accept")
 def command(
     environment: Path,
     needle: str,
@@ -128,7 +135,7 @@ def command(
 
     In a tissue that answers (tissue adversarial), the driver follows a strategy that wins whatever
     the tissue picks, and says up to which depth its guarantee held. A phantom or real needle is led
-    by such a strategy as soon as one wins against all that the estimate leaves open (--guarantee).
+    by such a strategy as soon as one wins against all that the estimate leaves open.
 
     Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
     once. Two runs cannot write the same log at the same time.
@@ -138,7 +145,7 @@ def command(
       ntagen drive examples/paper.nsl --log run.mcap
       ntagen drive examples/paper.nsl --seed 1 --noise 0.1mm --known none
       ntagen drive examples/paper.nsl --needle phantom --seed 1
-      ntagen drive examples/paper.nsl --pull 8mm --true-radius 33mm --force-sensing off
+      ntagen drive examples/paper.nsl --set "pull 8 mm" --set "force sensing off"
       ntagen drive examples/paper.nsl --tracker openigtlink+sim
       ntagen drive task.nsl --needle grbl:/dev/ttyACM0 --confirm --log run.mcap \\
         --tracker openigtlink:localhost:18944:Needle --registration registration.json
@@ -146,9 +153,7 @@ def command(
       ntagen drive examples/paper.nsl --settings
 
     \b
-    Values have a unit, as in 4mm, 2deg, 60s, 0.1N or 1GiB; a plain number is in the unit that the
-    option names. The braces drive { … } of ENV.nsl give the same settings by their words, for
-    example `initial push 4 mm` for --initial-push 4mm; the command line wins.
+    --set takes what can stand in the braces drive { … } of ENV.nsl, and wins over them.
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.knowledge import told
@@ -168,7 +173,7 @@ def command(
     task = _breathing(task, breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
-    _say_idle(configuration, picks=picks_at_random(wanted, task.scene))
+    _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
     say_idle_options(task.scene, configuration)
     if only_settings:
         show_settings(configuration)
@@ -211,17 +216,16 @@ def _breathing(task: Task, phase_deg: float | None) -> Task:
     return replace(task, scene=task.scene.at_clock(clock_s))
 
 
-def _say_idle(configuration: Configuration, *, picks: bool) -> None:
-    """Tells which options have no effect on this needle, in a tissue that may pick at random."""
+def _say_idle(configuration: Configuration, given: Sequence[Given], *, picks: bool) -> None:
+    """Tells what has no effect on this needle, in a tissue that may pick at random."""
     needle, errors = configuration.needle, configuration.errors
+    say_idle_errors(needle, given)
     if needle.is_real:
-        say_idle({"given_needle_seed": "--seed"}, "with a real needle")
-        say_idle_errors(needle)
+        say_idle_settings(given, {"seed"}, "with a real needle")
         return
     say_idle({"baud_rate": "--baud"}, "with a simulated needle")
-    say_idle_errors(needle)
     if needle.parameters is None and not (errors.noise_mm or errors.roll_rad or picks):
-        say_idle({"given_needle_seed": "--seed"}, "without --noise or --roll-error")
+        say_idle_settings(given, {"seed"}, "without --noise or --set 'roll error …'")
 
 
 @dataclass(frozen=True, slots=True)

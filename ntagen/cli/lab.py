@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.former_options import SteeringCommand
 from ntagen.cli.models import include_option
 from ntagen.cli.signals import handled
-from ntagen.cli.steering import needle_options, say_idle_errors
+from ntagen.cli.steering import say_idle_errors, settings_options
 from ntagen.cli.terminal import echo
 from ntagen.drive.steppers import axes_for, described
 from ntagen.lab.speeds import FASTEST, SLOWEST
@@ -36,7 +37,11 @@ _LOOK_S: Final = 0.1
 _RATE_HZ: Final = 40.0
 
 
-@click.command("simulate", epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.")
+@click.command(
+    "simulate",
+    cls=SteeringCommand,
+    epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.",
+)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--needle",
@@ -80,7 +85,7 @@ _RATE_HZ: Final = 40.0
 )
 @click.option("--json", "as_json", is_flag=True, help="Print two JSON objects, nothing else.")
 @include_option()
-@needle_options
+@settings_options("seed")
 def command(
     environment: Path,
     needle: str,
@@ -110,7 +115,7 @@ def command(
     Examples:
       ntagen device simulate examples/stepper.nsl
       ntagen device simulate examples/stepper.nsl --seed 3 --speed 5 --until-idle 20
-      ntagen device simulate examples/stepper.nsl --needle virtual --roll-error 2deg
+      ntagen device simulate examples/stepper.nsl --needle virtual --set 'roll error 2 deg'
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.lab.lab import Lab
@@ -121,10 +126,10 @@ def command(
     for warning in task.warnings:
         echo(warning.render(), err=True)
     fitted = configure((*task.given, *given), task.scene, "all", needle)
-    say_idle_errors(fitted.needle)
+    say_idle_errors(fitted.needle, given)
     margin_mm = fitted.settings.sensing_margin_mm
     placed = place(needle, task.scene, fitted.seed, margin_mm, fitted.errors)
-    axes = _axes(described(task, environment), task)
+    axes = _axes(described(task, environment), task, given)
     closing = _Closing(until_idle_s)
     with (
         handled({signal.SIGINT: closing.close, signal.SIGTERM: closing.close}),
@@ -160,13 +165,13 @@ class _Closing:
         return self._is_told or (idle_s is not None and idle_s >= self._until_idle_s)
 
 
-def _axes(device: GrblDevice, task: Task) -> Axes:
+def _axes(device: GrblDevice, task: Task, given: tuple[Given, ...]) -> Axes:
     """The axes that a task describes, as fast as any driver of it wants them."""
     from ntagen.drive.configure import configure
     from ntagen.drive.plant import simulated_axes
 
     needle = task.scene.needle
-    wanted = axes_for(device, needle, configure(task.given, task.scene).settings)
+    wanted = axes_for(device, needle, configure((*task.given, *given), task.scene).settings)
     ours = simulated_axes(needle.speed_mm_per_s)
     return replace(
         wanted,
@@ -189,15 +194,15 @@ def _fitting(fitted: Configuration, task: Task) -> list[str]:
 
     of_driver = [one for one in task.given if not one.parameter.field.startswith(f"{NEEDLE}.")]
     plain = configure(of_driver, task.scene)
-    options = []
+    settings = []
     for parameter in STEERING:
         value = fitted.value(parameter)
         if value != plain.value(parameter):
-            options += [parameter.flag, parameter.shown(value).replace(" ", "")]
+            settings.append(f"{parameter.words} {parameter.shown(value)}")
     if fitted.needle.parameters is None:
         # A force without noise would be taken for that of a dead sensor.
-        options += ["--force-noise", "0N"]
-    return options
+        settings.append("force noise 0 N")
+    return ["--set", "  ".join(settings)] if settings else []
 
 
 def _open(lab: Lab, driving: str, *, as_json: bool) -> None:

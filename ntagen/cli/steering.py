@@ -1,73 +1,119 @@
-"""The options of all settings that steer: one for each row of `ntagen.parameters`."""
+"""The settings of steering on the command line: ``--set``, and options of the most used ones."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import click
 
-from ntagen.cli.effects import say_idle
+from ntagen.cli.effects import say
+from ntagen.cli.gathered import gathered
+from ntagen.cli.rules import Decorator
 from ntagen.cli.terminal import echo
-from ntagen.parameters import MEASURES, NEEDLE, PARAMETERS, Given, Parameter
+from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, PARTS, Given, Parameter
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from ntagen.drive.configure import Configuration
     from ntagen.drive.needles import Chosen
 
 
-class _Value(click.ParamType[Given]):
-    """The value of a setting, with or without its unit."""
+class Words(click.ParamType[str]):
+    """What can stand in the braces of ``drive { … }``; a shell completes the words of settings."""
 
-    def __init__(self, parameter: Parameter) -> None:
-        self._parameter = parameter
-        self.name = parameter.words
+    name = "settings"
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Given:
-        from ntagen.drive.configure import COMMAND_LINE
-        from ntagen.plan.rank import parse_ranking
+    def __init__(self, settings: Sequence[Parameter]) -> None:
+        self.settings = settings
 
-        if isinstance(value, Given):
-            return value
-        if self._parameter.field == "ranking":
-            return Given(self._parameter, parse_ranking(str(value)), COMMAND_LINE)
-        try:
-            return Given(self._parameter, self._parameter.parse(str(value)), COMMAND_LINE)
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """The settings that begin so, and those of few values with each of them."""
+        from click.shell_completion import CompletionItem
 
-
-class _Option(click.Option):
-    """An option whose help shows the default of the setting, which is looked up late."""
-
-    parameter: Parameter
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        from ntagen.drive.configure import Configuration
-
-        record = super().get_help_record(ctx)
-        if record is None:
-            return None
-        default = self.parameter.shown(Configuration().value(self.parameter))
-        return record[0], f"{record[1]}  [default: {default}]"
+        return [
+            CompletionItem(words, help=one.help)
+            for one in self.settings
+            for words in (one.words, *(f"{one.words} {choice}" for choice in one.choices))
+            if words.startswith(incomplete)
+        ]
 
 
-def steering_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options; the command gets the values on the command line as `given`."""
-    return _with_options(command, PARAMETERS)
+def settings_options(*own: str, without: Collection[str] = ()) -> Decorator:
+    """Adds ``--set`` and ``--help-settings``; the command gets the values as `given`.
+
+    Args:
+        own: The settings, by their words, that also have an option of their own.
+        without: The settings, by their words, that mean nothing to the command.
+    """
+    settings = [one for one in PARAMETERS if one.words not in without]
+    options: dict[str, Decorator] = {
+        "texts": click.option(
+            "--set",
+            "texts",
+            metavar="'WORDS VALUE'",
+            type=Words(settings),
+            multiple=True,
+            help="Change a setting, in the words of drive { … } in ENV.nsl, for example "
+            "--set 'initial push 4 mm'. You can give this option several times.",
+        ),
+        "help_settings": click.option(
+            "--help-settings",
+            is_flag=True,
+            is_eager=True,
+            callback=functools.partial(_list, settings),
+            help="Print all settings that --set takes, with units and defaults, and exit.",
+        ),
+    }
+    for one in map(BY_WORDS.__getitem__, own):
+        name, unit = one.option.removeprefix("--"), MEASURES[one.kind].unit
+        options[name] = click.option(one.option, name, metavar=unit.upper() or "N", help=one.help)
+    return gathered("given", options, functools.partial(_read, own))
 
 
-def needle_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options of a simulated needle only, in the same way."""
-    return _with_options(command, [p for p in PARAMETERS if p.field.startswith(f"{NEEDLE}.")])
+def _read(
+    own: Sequence[str], *, texts: Sequence[str], help_settings: object, **values: str | None
+) -> tuple[Given, ...]:
+    """The settings on the command line; the values of own options are in the order of `own`."""
+    del help_settings  # It has ended the command.
+    pairs = zip(own, values.values(), strict=True)
+    said = [*texts, *(f"{words} {value}" for words, value in pairs if value is not None)]
+    if not said:
+        return ()
+    from ntagen.drive.configure import COMMAND_LINE
+    from ntagen.nsl.driving import read_settings
+
+    return read_settings(said, COMMAND_LINE)
 
 
-def sweeping_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds all options but the seed, in the same way: a sweep has many seeds."""
-    return _with_options(command, [p for p in PARAMETERS if p.field != f"{NEEDLE}.seed"])
+def _list(
+    settings: Sequence[Parameter], ctx: click.Context, _option: click.Parameter, wanted: bool
+) -> None:
+    """Prints the settings, part by part, and ends the command."""
+    if not wanted or ctx.resilient_parsing:
+        return
+    from ntagen.drive.configure import Configuration
+
+    formatter, usual = ctx.make_formatter(), Configuration()
+    formatter.write_text(
+        "Write a setting as --set 'pull 4 mm', or in the braces drive { … } of a task. The command "
+        "line also takes a number without its unit."
+    )
+    for part, heading in PARTS.items():
+        with formatter.section(heading):
+            formatter.write_dl(
+                [
+                    (one.form, f"{one.help}  [default: {one.shown(usual.value(one))}]")
+                    for one in settings
+                    if one.part == part
+                ]
+            )
+    echo(formatter.getvalue().rstrip())
+    ctx.exit()
 
 
 known_option = click.option(
@@ -80,50 +126,19 @@ known_option = click.option(
 """What the driver is told at the start."""
 
 
-def _with_options(
-    command: Callable[..., int | None], parameters: Sequence[Parameter]
-) -> Callable[..., int | None]:
-    @functools.wraps(command)
-    def with_given(**values: object) -> int | None:
-        found = [values.pop(_name(parameter)) for parameter in parameters]
-        return command(given=tuple(one for one in found if isinstance(one, Given)), **values)
+def say_idle_settings(given: Sequence[Given], words: Collection[str], why: str) -> None:
+    """Prints a note for each of the settings with these words that the command line gives.
 
-    decorated: Callable[..., int | None] = with_given
-    for parameter in reversed(parameters):
-        decorated = _option(parameter)(decorated)
-    return decorated
+    The reason follows the words "has no effect".
+    """
+    idle = [one.parameter.spelling for one in given if one.parameter.words in words]
+    say([f"{option} has no effect {why}" for option in idle])
 
 
-def _option(
-    parameter: Parameter,
-) -> Callable[[Callable[..., int | None]], Callable[..., int | None]]:
-    unit = MEASURES[parameter.kind].unit
-    metavar = {"words": "CRITERION,…", "switch": "on|off"}.get(parameter.kind, unit.upper() or "N")
-
-    class Its(_Option):
-        pass
-
-    Its.parameter = parameter
-    return click.option(
-        parameter.flag,
-        _name(parameter),
-        cls=Its,
-        metavar=metavar,
-        type=_Value(parameter),
-        default=None,
-        help=parameter.help,
-    )
-
-
-def _name(parameter: Parameter) -> str:
-    """The name of the command's parameter."""
-    return f"given_{parameter.field.replace('.', '_')}"
-
-
-def say_idle_errors(needle: Chosen) -> None:
-    """Tells which options about errors of a needle mean nothing to this one."""
-    flags = {_name(one): one.flag for one in PARAMETERS if needle.ignores(one.field)}
-    say_idle(flags, f"with {needle.kind}")
+def say_idle_errors(needle: Chosen, given: Sequence[Given]) -> None:
+    """Tells which errors of a needle on the command line mean nothing to this one."""
+    idle = {one.words for one in PARAMETERS if needle.ignores(one.field)}
+    say_idle_settings(given, idle, f"with {needle.kind}")
 
 
 def show_settings(configuration: Configuration) -> None:

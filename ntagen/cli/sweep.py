@@ -8,22 +8,24 @@ from typing import TYPE_CHECKING
 import click
 
 from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
-from ntagen.cli.steering import known_option, sweeping_options
+from ntagen.cli.former_options import SteeringCommand
+from ntagen.cli.steering import known_option, settings_options
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
+from ntagen.parameters import SEED
 
 if TYPE_CHECKING:
     from ntagen.parameters import Given
 
 
-@click.command("sweep", epilog=EPILOG)
+@click.command("sweep", cls=SteeringCommand, epilog=EPILOG)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--over",
     metavar="SETTING",
     required=True,
     help="What is swept: noise, radius-error, roll-lag, delay, or any other setting that is a "
-    "quantity, as one of the options below is called.",
+    "quantity.",
 )
 @click.option(
     "--values",
@@ -62,7 +64,7 @@ if TYPE_CHECKING:
     help="The file of the picture.  [default: sweep.png in the folder]",
 )
 @campaign_options
-@sweeping_options
+@settings_options(without=(SEED,))
 def command(
     environment: Path,
     over: str,
@@ -80,20 +82,21 @@ def command(
     Drives a simulated needle many times with each value of one setting, and draws over it how often
     the target is reached and a critical region hit, with 95 % intervals, and how near the needle
     comes to what is critical. All values have the same seeds. The folder gets what `ntagen
-    experiment` writes; the other settings are those of the task and of the options below.
+    experiment` writes; the other settings are those of the task and of --set.
 
     \b
       noise         of each measured coordinate; the driver is calibrated to it
       radius-error  by how much the true motion circle is greater than that of the task
-      roll-lag      of the phantom's tip, 100 mm deep; rolls make up for --lag-compensation only,
-                    which is 45deg by itself
+      roll-lag      of the phantom's tip, 100 mm deep; rolls make up for `lag compensation`
+                    only, which is 45 deg by itself
       delay         of position and force, as a phantom needle's tracker measures them
 
     \b
     Examples:
       ntagen sweep examples/paper.nsl --over noise --values 0,0.5,1,2,4mm
       ntagen sweep examples/paper.nsl --over radius-error --values -20,-10,0,10,20% --runs 50
-      ntagen sweep examples/paper.nsl --over roll-lag --values 0,30,60,90deg --lag-compensation 0
+      ntagen sweep examples/paper.nsl --over roll-lag --values 0,30,60,90deg \\
+        --set 'lag compensation 0'
       ntagen sweep examples/paper.nsl --over delay --values 0,100,200,400ms --known none
 
     docs/experiments.md says how to read the picture, and how to sweep several tasks at once.

@@ -36,7 +36,7 @@ def require_overrun(settings: Settings, needs_mm: float) -> None:
         raise InputError(
             f"the needle goes on for {needs_mm:.2f} mm after a stop, and the settings count on "
             f"{settings.overrun_mm:g} mm\n"
-            f"hint: give --overrun {needs_mm + 0.005:.2f}mm, push more slowly, or let the "
+            f"hint: give --set 'overrun {needs_mm + 0.005:.2f} mm', push more slowly, or let the "
             "controller brake harder"
         )
 

@@ -139,7 +139,7 @@ def _setting(words: str) -> str:
     measure = f"{MEASURES[parameter.kind].noun}, such as `{parameter.example}`"
     choices = f"\n\none of: {', '.join(parameter.choices)}" if parameter.choices else ""
     usual = f" (usually in {unit})" if unit else ""
-    return f"{parameter.help}\n\n{measure}{usual}; option `{parameter.flag}`{choices}"
+    return f"{parameter.help}\n\n{measure}{usual}{choices}"
 
 
 @cache

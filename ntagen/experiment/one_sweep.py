@@ -14,7 +14,7 @@ from ntagen.experiment.description import Experiment, Row
 from ntagen.experiment.reading import ERRORS, experiment_of
 from ntagen.nsl import load_task
 from ntagen.nsl.diagnostics import suggest
-from ntagen.parameters import BY_WORDS, MEASURES, NEEDLE, Parameter
+from ntagen.parameters import BY_WORDS, MEASURES, SEED, Parameter
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _USUAL: Final = ("noise", "radius error", "roll lag", "delay")
@@ -46,7 +46,12 @@ def sweep_of_task(
     """
     if over.words in settings:
         raise InputError(
-            f"{over.flag} fixes what is swept\nhint: leave it out, or sweep something else"
+            f"`{over.words}` is swept, and --set fixes it\n"
+            "hint: leave it out, or sweep something else"
+        )
+    if SEED in settings:
+        raise InputError(
+            "all values have the same seeds: 1, 2, …\nhint: --runs says how many there are"
         )
     if needle == LAB:
         raise InputError(
@@ -88,14 +93,14 @@ def quantity_of(text: str) -> Parameter:
         InputError: There is none.
     """
     words = re.sub(r"[\s_-]+", " ", text.strip().removeprefix("--"))
-    options = {one.flag.removeprefix("--").replace("-", " "): one for one in BY_WORDS.values()}
+    options = {one.option.removeprefix("--"): one for one in BY_WORDS.values()}
     found = BY_WORDS.get(words) or options.get(words)
     if found is None:
         near = suggest(words, BY_WORDS)
-        others = f"choose from {_usual()}, and the settings of `ntagen sweep --help`"
+        others = f"choose from {_usual()}, and what `ntagen sweep --help-settings` prints"
         hint = f"did you mean {_as_option(near)}?" if near else others
         raise InputError(f"there is no setting '{text}'\nhint: {hint}")
-    if not found.is_quantity or found.field == f"{NEEDLE}.seed":
+    if not found.is_quantity or found.words == SEED:
         kind = "the seeds are the same for all values" if found.is_quantity else "it is no quantity"
         raise InputError(f"`{found.words}` cannot be swept: {kind}\nhint: choose from {_usual()}")
     return found

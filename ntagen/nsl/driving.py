@@ -62,15 +62,14 @@ def is_choice(word: tree.Identifier, keyword: str, reporter: Reporter) -> bool:
     return False
 
 
-def read_settings(texts: Sequence[str], path: str, origin: str) -> list[Given]:
+def read_settings(texts: Sequence[str], origin: str) -> tuple[Given, ...]:
     """The settings in texts that could each stand in the braces of ``drive { … }``.
 
     Other than in a file, a plain number is in the usual unit of its setting.
 
     Args:
-        texts: The texts; no setting may be in them twice.
-        path: How a message names the texts.
-        origin: Where their values come from, for `Given`.
+        texts: The texts; no setting may be in them twice. A message counts them as lines.
+        origin: Where the texts come from.
 
     Raises:
         SourceError: The texts have mistakes; the error has all of them.
@@ -79,27 +78,23 @@ def read_settings(texts: Sequence[str], path: str, origin: str) -> list[Given]:
     resolver = DriverResolver(reporter, Evaluator(reporter), takes_plain_numbers=True)
     firsts: dict[str, tree.Parameter] = {}
     given: list[Given] = []
-    for text in texts:
-        file = parse(Source(path, text), reporter, "drive")
-        if not file.statements and not reporter.has_errors:
-            hint = f"write for example `{BY_WORDS['pull'].example}`"
-            reporter.report("file-empty", file.source.span(0, 0), "no setting is here", hint=hint)
-        for statement in file.statements:
-            if not isinstance(statement, tree.Parameter):
-                continue
-            first = firsts.setdefault(statement.keyword, statement)
-            if first is not statement:
-                reporter.report(
-                    "statement-repeated",
-                    statement.span,
-                    f"`{statement.keyword}` is written a second time",
-                    hint="remove one of the two",
-                    notes=(f"the first is `{first.span.text}`",),
-                )
-            given += resolver.parameter(statement, Scope())
+    file = parse(Source(origin, "\n".join(texts)), reporter, "drive")
+    for statement in file.statements:
+        if not isinstance(statement, tree.Parameter):
+            continue
+        first = firsts.setdefault(statement.keyword, statement)
+        if first is not statement:
+            reporter.report(
+                "statement-repeated",
+                statement.span,
+                f"`{statement.keyword}` is written a second time",
+                hint="remove one of the two",
+                notes=(f"the first is `{first.span.text}`",),
+            )
+        given += resolver.parameter(statement, Scope())
     if reporter.has_errors:
         raise SourceError(reporter.diagnostics)
-    return [Given(one.parameter, one.value, origin) for one in given]
+    return tuple(Given(one.parameter, one.value, origin) for one in given)
 
 
 class DriverResolver:
@@ -220,8 +215,7 @@ class DriverResolver:
 
 def _measured(expression: tree.Expression, unit: str) -> tree.Expression:
     """An expression with a unit, if it is a plain number and the unit is not empty."""
-    is_signed = isinstance(expression, tree.Signed)
-    number = expression.operand if is_signed else expression
+    number = expression.operand if isinstance(expression, tree.Signed) else expression
     if not unit or not isinstance(number, tree.Number):
         return expression
     return tree.Measured(expression.span, expression, tree.Identifier(expression.span, unit))

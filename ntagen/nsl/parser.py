@@ -294,9 +294,12 @@ class _Parser:
         return Token(terminal, meant, token.span, token.line)
 
     def _phrase(self) -> str:
-        """The words from here on, up to a value: settings have several words."""
-        words = []
-        while (token := self._peek(len(words))) is not None and token.text[0].isalpha():
+        """The words from here on, up to a value or the end of the line: settings have several."""
+        line = self._tokens[self._index].line
+        words: list[str] = []
+        while (token := self._peek(len(words))) is not None:
+            if token.line != line or not token.text[0].isalpha():
+                break
             words.append(token.text)
         return " ".join(words)
 

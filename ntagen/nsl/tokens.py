@@ -231,9 +231,7 @@ _BEFORE_VALUE: Final = frozenset(
 ) | {"SIGN", "SCALE", "RADIUS", "STEP", "BY", "MOST", "LEAST", "WAIT", "SPIN", "BETWEEN", "AND"}
 
 
-def _joined(
-    items: Sequence[Token | Comment], block: BlockKind | None
-) -> Iterator[Token | Comment]:
+def _joined(items: Sequence[Token | Comment], block: BlockKind | None) -> Iterator[Token | Comment]:
     """The items, with the words that begin a statement in `PHRASES` joined to one token."""
     depth = 0 if block is None else 1
     phrase: Token | None = None

@@ -56,5 +56,5 @@ def require_force(text: str, measures_force: bool, watches_force: bool) -> None:
     if watches_force and not measures_force:
         raise InputError(
             f"the tracker {text} measures no force, and the driver watches the force\n"
-            "hint: name a sensor with force=DEVICE, or add --force-sensing off"
+            "hint: name a sensor with force=DEVICE, or add --set 'force sensing off'"
         )

@@ -84,8 +84,8 @@ class Plausible:
         if self._same >= self._most_same:
             raise DeviceError(
                 f"the force was exactly {force_n:g} N in {self._same} readings in a row\n"
-                "hint: check the force sensor, its cable and its range; add --force-noise 0 if it "
-                "really has no noise"
+                "hint: check the force sensor, its cable and its range; add --set 'force noise 0' "
+                "if it really has no noise"
             )
 
     def _require(self, found: Measurement) -> Measurement:

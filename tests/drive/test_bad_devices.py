@@ -36,7 +36,7 @@ class Desk:
     more: list[str] = field(default_factory=list)
 
     def words(self) -> list[str]:
-        words = ["drive", str(TASK), "--quiet", "--force-noise", "0N", *self.more]
+        words = ["drive", str(TASK), "--quiet", "--set", "force noise 0 N", *self.more]
         words += ["--needle", f"grbl:{self.port or self.lab.port}"]
         words += ["--tracker", self.tracker or self.lab.tracker_address]
         return words + (["--registration", self.registration] if self.registration else [])

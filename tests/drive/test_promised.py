@@ -139,7 +139,7 @@ def test_the_command_line_says_what_is_guaranteed(
     assert main(["replay", str(log)]) == 0
     assert "a strategy with 3 branches is guaranteed" in capsys.readouterr().out
     assert main(["plot", str(log), "-o", str(tmp_path / "run.png")]) == 0
-    assert main([*arguments, "--json", "--guarantee", "off"]) == 0
+    assert main([*arguments, "--json", "--set", "guarantee off"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["guarantee"] is None
-    assert main([*arguments, "--guarantee", "maybe"]) == 2
-    assert "on or off" in capsys.readouterr().err
+    assert main([*arguments, "--set", "guarantee maybe"]) == 2
+    assert "write `on` or `off`" in capsys.readouterr().err

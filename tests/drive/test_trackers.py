@@ -177,7 +177,7 @@ def test_a_tracker_without_force_must_be_accepted(
     options = ["--tracker", f"csv:{path}", "--registration", registration(tmp_path)]
     refused(capsys, run, 2, "measures no force, and the driver watches the force", *options)
     assert not run.exists()
-    assert main([*RUN, *options, "--force-sensing", "off", "--quiet"]) in (0, 1, 4, 5, 6)
+    assert main([*RUN, *options, "--set", "force sensing off", "--quiet"]) in (0, 1, 4, 5, 6)
     assert "measures no force" not in capsys.readouterr().err
 
 
@@ -230,7 +230,7 @@ def test_a_server_that_sends_something_else_moves_nothing(
 
         sender = threading.Thread(target=send)
         sender.start()
-        options = ["--tracker", text, "--registration", "none", "--force-sensing", "off"]
+        options = ["--tracker", text, "--registration", "none", "--set", "force sensing off"]
         refused(capsys, tmp_path / "new.mcap", 5, match, *options)
         sender.join()
 

@@ -137,7 +137,7 @@ class Bench:
     def _settings(self) -> list[str]:
         """The settings that fit the needle, as after a calibration."""
         if self._needle == "virtual":
-            return ["--force-noise", "0N"]
+            return ["--set", "force noise 0 N"]
         from ntagen.cli.lab import _fitting
         from ntagen.drive.configure import configure
         from ntagen.nsl import load_task

@@ -17,7 +17,8 @@ from ntagen.drive.reliance import clearance_without_force_mm, relies_on
 from ntagen.drive.settings import Settings, value_of
 from ntagen.errors import InputError
 from ntagen.needle.virtual import Errors
-from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, Given, Parameter, Value
+from ntagen.nsl.driving import read_settings
+from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, PARTS, Given, Parameter, Value
 from ntagen.shapes import Sphere
 from tests.scenes import PAPER, paper
 
@@ -35,7 +36,8 @@ def in_file(text: str) -> tuple[Given, ...]:
 
 def on_line(words: str, text: str) -> Given:
     """A setting on the command line."""
-    return Given(BY_WORDS[words], BY_WORDS[words].parse(text), COMMAND_LINE)
+    (given,) = read_settings([f"{words} {text}"], COMMAND_LINE)
+    return given
 
 
 def test_every_setting_is_a_row_of_the_table() -> None:
@@ -52,9 +54,8 @@ def test_every_setting_is_a_row_of_the_table() -> None:
         }
     fields |= {f"needle.{one.name}": None for one in dataclasses.fields(Errors)}
     assert {p.field for p in PARAMETERS} == {*fields, "needle.seed"}
-    assert (
-        len({p.words for p in PARAMETERS}) == len({p.flag for p in PARAMETERS}) == len(PARAMETERS)
-    )
+    assert len({p.words for p in PARAMETERS}) == len(PARAMETERS)
+    assert {p.part for p in PARAMETERS} == set(PARTS)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda parameter: parameter.words)
@@ -88,6 +89,7 @@ def test_file_and_command_line_read_the_same_value(
     (read,) = in_file(f"{parameter.words} {text}")
     assert parameter.parse(text) == read.value
     assert parameter.parse(text.replace(" ", "")) == read.value
+    assert on_line(parameter.words, text).value == read.value
     assert re.fullmatch(r"e\.nsl:1:\d+", read.origin)
 
 
@@ -96,9 +98,12 @@ def test_file_and_command_line_read_the_same_value(
     [
         ("pull", "4mm", 4.0),
         ("pull", "4", 4.0),
-        ("pull", ".4cm", 4.0),
+        ("pull", "0.4cm", 4.0),
         ("roll error", "2deg", math.radians(2.0)),
         ("roll error", "2", math.radians(2.0)),
+        ("true bevel", "-2", math.radians(-2.0)),
+        ("radius error", "-10", -0.1),
+        ("radius error", "10 %", 0.1),
         ("time limit", "0.05 min", 3.0),
         ("force", "100mN", 0.1),
         ("force rise", "500N/m", 0.5),
@@ -110,6 +115,7 @@ def test_file_and_command_line_read_the_same_value(
 )
 def test_values_on_the_command_line(words: str, text: str, value: Value) -> None:
     assert BY_WORDS[words].parse(text) == pytest.approx(value)
+    assert on_line(words, text).value == pytest.approx(value)
 
 
 def test_the_command_line_wins_over_the_file_and_the_file_over_the_default() -> None:

@@ -80,7 +80,7 @@ def test_a_run_may_be_ended_with_its_guarantee(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     task, tree = str(folder / "task.nsl"), str(folder / "tree.json")
-    arguments = ["drive", task, "--strategy", tree, "--true-radius", "24mm", "--quiet"]
+    arguments = ["drive", task, "--strategy", tree, "--set", "true radius 24 mm", "--quiet"]
     assert main([*arguments, "--only-guaranteed"]) == 4
     assert capsys.readouterr().out.startswith("no longer guaranteed: the tip is")
 

@@ -12,6 +12,7 @@ import ntagen
 from ntagen.cli import main
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Estimated, Relied
+from ntagen.parameters import PARAMETERS
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 PAPER = str(EXAMPLES / "paper.nsl")
@@ -57,7 +58,7 @@ def test_drive_takes_settings_from_file_and_command_line(
     block = "drive { noise 0.01 mm  pull 8 mm  push 3 mm  force sensing off }"
     path.write_text(f"{Path(PAPER).read_text().rstrip().removesuffix('}')} {block} }}")
     log_path = tmp_path / "run.mcap"
-    arguments = [str(path), "--pull", "6mm", "--true-radius", "33mm", "--true-bevel", "5deg"]
+    arguments = [str(path), "--set", "pull 6", "--set", "true radius 33 mm  true bevel 5deg"]
     assert main(["drive", *arguments, "--settings"]) == 0
     rows = {
         line[2:22].strip(): line.split("  ")[-1] for line in capsys.readouterr().out.splitlines()
@@ -125,17 +126,11 @@ def test_drive_prints_one_object_with_json(capsys: pytest.CaptureFixture[str]) -
         ("nowhere.nsl", ["nowhere.nsl"]),
         ("no needle 'rubber'", [PAPER, "--needle", "rubber"]),
         ("unknown critical region 'C9'", [PAPER, "--known", "C9"]),
-        ("unknown ranking criterion 'beauty'", [PAPER, "--rank", "beauty"]),
-        ("is not a time", [PAPER, "--timeout", "soon"]),
-        ("is not a time", [PAPER, "--timeout", "0"]),
-        ("noise must be at least 0 mm", [PAPER, "--noise", "-1"]),
-        ("'nan' is not an angle; write for example 2deg", [PAPER, "--roll-error", "nan"]),
-        ("'2mm' is not an angle", [PAPER, "--true-bevel", "2mm"]),
-        ("learned radius must be at least 0.01 mm", [PAPER, "--learned-radius", "0mm"]),
-        ("'2.5' is not a whole number", [PAPER, "--deviation-count", "2.5"]),
-        ("'maybe' is not on or off", [PAPER, "--force-sensing", "maybe"]),
-        ("`push`: command line", [PAPER, "--push", "12mm"]),
-        ("--seed", [PAPER, "--seed", "-1"]),
+        ("write for example `time limit 60 s`", [PAPER, "--timeout", "soon"]),
+        ("`time limit` must be greater than 0 s", [PAPER, "--timeout", "0"]),
+        ("`noise` must be at least 0 mm", [PAPER, "--noise", "-1"]),
+        ("`push`: command line", [PAPER, "--set", "push 12mm"]),
+        ("`seed` must be at least 0", [PAPER, "--seed", "-1"]),
         ("it is a folder", [PAPER, "--log", "."]),
         ("would replace", [PAPER, "--log", PAPER]),
     ],
@@ -144,6 +139,72 @@ def test_drive_refuses_bad_input(
     capsys: pytest.CaptureFixture[str], says: str, arguments: list[str]
 ) -> None:
     check_refused(capsys, says, "drive", *arguments)
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (["ranking beauty"], ["`ranking` cannot be `beauty`", "write `clearance` or"]),
+        (["roll error nan"], [":1:12: ", "`nan` is no value", "for example `roll error 2 deg`"]),
+        (["true bevel 2mm"], [":1:12: ", "is an angle, but this is a length"]),
+        (["learned radius 0 mm"], ["`learned radius` must be at least 0.01 mm"]),
+        (["deviation count 2.5"], ["must be a whole number"]),
+        (["force sensing maybe"], ["cannot be `maybe`", "write `on` or `off`"]),
+        (["pull 4 mn"], [":1:8: ", "there is no unit `mn`", "did you mean"]),
+        (["pull"], ["expected a value", "write for example `pull 2 mm`"]),
+        (["prior nosie 2"], ["no statement begins with `prior`", "did you mean `prior noise`?"]),
+        (["force sesning off"], ["command line:1:7: ", "did you mean `force sensing`?"]),
+        (["xyzzy 3"], ["`ntagen drive --help-settings` prints all settings"]),
+        (["push 1", "pull 8  push 2"], ["`push` is written a second time", "first is `push 1`"]),
+        (["pull 8 mn", "psuh 2"], ["no unit `mn`", "did you mean `push`?"]),
+        (["pull 8 mn", "push 2 mn"], ["command line:1:8: ", "command line:2:8: "]),
+        (["noise 1 mm"], ["`noise` is written a second time", "the first is `noise 1 mm`"]),
+    ],
+)
+def test_mistakes_in_settings_are_shown_at_their_place(
+    capsys: pytest.CaptureFixture[str], settings: list[str], says: list[str]
+) -> None:
+    words = [word for text in settings for word in ("--set", text)]
+    assert main(["drive", PAPER, "--noise", "2mm", *words]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    for part in says:
+        assert part in err
+
+
+@pytest.mark.parametrize(
+    ("words", "now"),
+    [
+        (["--initial-push", "4mm"], "initial push 4mm"),
+        (["--initial-push=4mm"], "initial push 4mm"),
+        (["--rank", "rolls,length"], "ranking rolls,length"),
+        (["--prior-noise"], "prior noise …"),
+    ],
+)
+def test_options_that_are_gone_say_what_replaces_them(
+    capsys: pytest.CaptureFixture[str], words: list[str], now: str
+) -> None:
+    assert main(["drive", PAPER, *words]) == 2
+    option = words[0].partition("=")[0]
+    assert capsys.readouterr().err == f"error: no such option: {option}; write --set '{now}'\n"
+
+
+def test_all_settings_are_listed_and_completed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["drive", "--help-settings"]) == 0
+    listed = capsys.readouterr().out
+    for parameter in PARAMETERS:
+        assert f"\n  {parameter.words} " in listed
+    assert "[default: 5 mm]" in listed
+    assert main(["sweep", "--help-settings"]) == 0
+    assert "\n  seed " not in capsys.readouterr().out
+    monkeypatch.setenv("_NTAGEN_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", 'ntagen drive --set "force s')
+    monkeypatch.setenv("COMP_CWORD", "3")
+    assert main([]) == 0
+    said = capsys.readouterr().out
+    assert said == "plain,force sensing\nplain,force sensing on\nplain,force sensing off\n"
 
 
 def test_replay_reaches_the_same_decisions(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

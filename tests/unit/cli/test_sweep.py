@@ -19,7 +19,7 @@ def test_a_sweep_is_driven_and_drawn_and_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main([*QUICK, *NOISE, "--deviation", "2mm"]) == 0
+    assert main([*QUICK, *NOISE, "--set", "deviation 2 mm"]) == 0
     said = capsys.readouterr()
     assert "noise: all runs reached the target at 0.1 mm, 0.5 mm: " in said.out
     assert "report.html, no_cr-noise/sweep.png" in said.out
@@ -27,7 +27,17 @@ def test_a_sweep_is_driven_and_drawn_and_goes_on(
     table = json.loads(Path("no_cr-noise/table.json").read_bytes())
     assert table["rows"][1]["settings"] == {"noise": "0.5 mm", "deviation": "2 mm"}
     # More runs are added to those that are finished; the picture goes where it is wanted.
-    more = [*QUICK, *NOISE, "--deviation", "2mm", "--runs", "2", "--resume", "--figure", "x.svg"]
+    more = [
+        *QUICK,
+        *NOISE,
+        "--set",
+        "deviation 2 mm",
+        "--runs",
+        "2",
+        "--resume",
+        "--figure",
+        "x.svg",
+    ]
     assert main(more) == 0
     assert Path("x.svg").read_text("utf-8").startswith("<?xml")
     table = json.loads(Path("no_cr-noise/table.json").read_bytes())
@@ -43,11 +53,13 @@ def test_a_sweep_is_driven_and_drawn_and_goes_on(
         (["--over", "noise", "--values", "1mm"], "one value is no sweep"),
         (["--over", "noise", "--values", "-1,2mm"], "must be at least 0 mm"),
         (["--over", "delay", "--values", "0,1s"], "means nothing to the virtual needle"),
-        ([*NOISE, "--noise", "1mm"], "--noise fixes what is swept"),
+        ([*NOISE, "--set", "noise 1 mm"], "`noise` is swept, and --set fixes it"),
         ([*NOISE, "--figure", "x.gif"], "unknown kind of picture"),
         ([*NOISE, "--figure", "nowhere/x.png"], "there is no folder nowhere"),
         ([*NOISE, "--runs", "0"], "0 is not in the range"),
         ([*NOISE, "--seed", "3"], "No such option"),
+        ([*NOISE, "--set", "seed 3"], "--runs says how many there are"),
+        ([*NOISE, "--timeout", "9s"], "write --set 'time limit 9s'"),
     ],
 )
 @pytest.mark.usefixtures("here")

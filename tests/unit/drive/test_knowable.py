@@ -77,7 +77,7 @@ def test_a_confidence_that_is_none_is_refused(
     path.write_text(Task(to_a_target(5.0)).to_nsl())
     assert main(["drive", str(path), "--needle", "phantom", "--accept", accept]) == 2
     said = capsys.readouterr().err
-    assert "greater than 0 and less than 1" in said or "write for example 0.98" in said
+    assert "greater than 0 and less than 1" in said or "write for example `accept 0.98`" in said
     path.write_text(path.read_text().rstrip().removesuffix("}") + f"drive {{ accept {accept} }} }}")
     assert main(["drive", str(path), "--needle", "phantom"]) == 2
     assert "accept" in capsys.readouterr().err

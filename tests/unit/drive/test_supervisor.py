@@ -79,7 +79,7 @@ def test_without_a_sensor_only_the_operator_is_listened_to() -> None:
 def test_an_overrun_that_nobody_counts_on_is_refused() -> None:
     assert overrun_mm(5.0, 50.0) == pytest.approx(0.6)
     require_overrun(replace(SETTINGS, overrun_mm=0.6), overrun_mm(5.0, 50.0))
-    with pytest.raises(InputError, match=r"0\.60 mm after a stop.*\n.*--overrun"):
+    with pytest.raises(InputError, match=r"0\.60 mm after a stop.*\n.*--set 'overrun 0\.61 mm'"):
         require_overrun(replace(SETTINGS, overrun_mm=0.5), overrun_mm(5.0, 50.0))
 
 

@@ -41,7 +41,7 @@ def test_words_are_explained() -> None:
     assert meaning("environment e { drive { initial push 3 mm } }", "push") == meaning(
         "environment e { drive { initial push 3 mm } }", "initial"
     )
-    assert "option `--initial-push`" in (
+    assert "such as `initial push 2 mm`" in (
         meaning("environment e { drive { initial push 3", "ini") or ""
     )
     assert "target on line 16" in (meaning(PAPER, "T1") or "")

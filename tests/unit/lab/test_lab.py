@@ -195,9 +195,9 @@ def test_the_command_says_how_to_drive_and_then_the_truth() -> None:
         port.close()
     assert process.returncode == 0
     assert facts["device"] == f"grbl:{facts['port']}"
-    settings = "--prior-noise"
-    for word in (facts["device"], facts["tracker"], "--registration none", str(EXAMPLE), settings):
+    for word in (facts["device"], facts["tracker"], "--registration none", str(EXAMPLE)):
         assert word in facts["command"]
+    assert "  prior noise " in facts["command"].partition("--set '")[2]
     assert truth["has_moved"]
     assert distance(tuple(truth["tip_mm"]), ENTRY_MM) == pytest.approx(3.0, abs=0.01)
 

@@ -120,7 +120,7 @@ def test_a_plugin_needs_a_tracker_to_drive(capsys: pytest.CaptureFixture[str]) -
     assert main(words) == 2
     assert "nothing measures the needle" in capsys.readouterr().err
     tracker = ["--tracker", "mytracker:simulated", "--registration", "none"]
-    assert main([*words, *tracker, "--overrun", "0.05mm"]) == 2
+    assert main([*words, *tracker, "--set", "overrun 0.05 mm"]) == 2
     assert "goes on for 0.08 mm after a stop" in capsys.readouterr().err
     assert main([*words, *tracker, "--timeout", "20s"]) == 6
     assert json.loads(capsys.readouterr().out)["outcome"] == "no strategy in the time left"
@@ -185,7 +185,8 @@ def test_a_needle_of_plugins_is_steered_to_the_target(
     task = tmp_path / "fast.nsl"
     text = TASK.read_text()
     task.write_text(text.replace("speed 1 mm/s", "speed 10 mm/s").replace("step 2 s", "step 0.2 s"))
-    options = ["--overrun", "0.8mm", "--roll-speed", "720deg/s", "--force-noise", "0", "--json"]
+    settings = "overrun 0.8 mm  roll speed 720 deg/s  force noise 0"
+    options = ["--set", settings, "--json"]
     tracker = ["--tracker", "thelab", "--registration", "none"]
     assert main(["drive", str(task), "--needle", "thelab:x", *tracker, *options]) == 0
     assert json.loads(capsys.readouterr().out)["outcome"] == "target reached"
