@@ -39,7 +39,6 @@ from ntagen.needle.channels import (
     Stretch,
     padded,
     place,
-    points,
 )
 from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
@@ -49,7 +48,7 @@ from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
 from ntagen.needle.priors import Priors as Priors
-from ntagen.needle.residuals import Problem, Reading
+from ntagen.needle.residuals import Problem, Reading, differences_mm
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
@@ -381,7 +380,7 @@ class Estimator:
         path, present = self._path(self._solution, begin, placed)
         tip, to_expected, ahead = self._ahead(present, begin, unknowns_covariance)
         covariance = to_expected @ ahead.covariance @ to_expected.T
-        off_mm = self._differences_mm(begin, placed)
+        off_mm = differences_mm(self._readings, begin, placed)
         misfit_mm = 0.0
         if len(off_mm) >= RECENT:
             misfit_mm = float(np.linalg.norm(np.mean(off_mm[-RECENT:], axis=0)))
@@ -394,17 +393,6 @@ class Estimator:
             ahead=ahead,
             misfit_mm=misfit_mm,
         )
-
-    def _differences_mm(self, begin: Placed, placed: list[list[Placed]]) -> _Array:
-        """By how much the measured positions differ from the estimated ones."""
-        if not self._readings:
-            return np.zeros((0, 3))
-        index = {part: at for at, part in enumerate(dict.fromkeys(r.part for r in self._readings))}
-        parts = [begin if at == ENTRY else placed[at][number] for at, number in index]
-        part_of = np.array([index[one.part] for one in self._readings], dtype=np.intp)
-        along_mm = np.array([one.along_mm for one in self._readings])
-        measured_mm = np.array([one.measurement.position_mm for one in self._readings])
-        return measured_mm - points(parts, part_of, along_mm)
 
     def _ahead(
         self, tip: Placed, entry: Placed, unknowns_covariance: _Array

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.needle.channels import ENTRY, Channel, Placed, padded, place, positions
+from ntagen.needle.channels import ENTRY, Channel, Placed, padded, place, points, positions
 from ntagen.needle.fluctuations import oscillation
 from ntagen.needle.kinematics import roll
 from ntagen.needle.measurement import Measurement
@@ -82,9 +83,7 @@ class Problem:
         self._directed = [one for one in readings if one.measurement.heading is not None]
         # Rows are in the order of the stretches.
         ordered = sorted(readings, key=lambda one: one.part)
-        self._parts = list(dict.fromkeys(one.part for one in ordered))
-        index = {part: place for place, part in enumerate(self._parts)}
-        part_of = np.array([index[one.part] for one in ordered], dtype=np.intp)
+        self._parts, part_of = _by_part(ordered)
         lengths_mm = np.array([(one.depth_mm, one.along_mm) for one in ordered]).reshape(-1, 2)
         begins = _begins(part_of, lengths_mm[:, 0], priors)
         counts = np.diff([*begins, len(ordered)])
@@ -102,19 +101,17 @@ class Problem:
     def _evaluated(
         self, unknowns: _Array, begin: Placed, placed: list[list[Placed]]
     ) -> tuple[_Array, _Array]:
-        def part(channel: int, number: int) -> Placed:
-            return begin if channel == ENTRY else placed[channel][number]
-
         residuals, slopes = [], []
         if self._parts:
-            parts = [part(*one) for one in self._parts]
+            parts = [_placed_at(one, begin, placed) for one in self._parts]
             expected, moved = positions(parts, self._part_of, self._along_mm)
             moved = self._whitened(moved.reshape(len(expected), -1))
             residuals.append(self._whitened(self._measured - expected).ravel())
             slopes.append(-moved.reshape(-1, len(unknowns)))
         for reading in self._directed:
             measurement = reading.measurement
-            pose, rotation = part(*reading.part).directions(reading.along_mm)
+            here = _placed_at(reading.part, begin, placed)
+            pose, rotation = here.directions(reading.along_mm)
             # A tracker sees how the tip was turned, and not how the tissue turns the bend plane.
             turn = self._turn(reading, len(unknowns))
             seen_and_expected = (
@@ -146,6 +143,38 @@ class Problem:
         if reading.channel == ENTRY:
             return np.zeros(width)
         return padded(self._channels[reading.channel].stretches[reading.stretch].turn, width)
+
+
+def differences_mm(
+    readings: Sequence[Reading], begin: Placed, placed: Sequence[Sequence[Placed]]
+) -> _Array:
+    """By how much measured positions differ from those on placed channels; one row for each.
+
+    Args:
+        readings: The measurements with their places.
+        begin: The entry.
+        placed: The stretches of the channels.
+    """
+    if not readings:
+        return np.zeros((0, 3))
+    numbers, part_of = _by_part(readings)
+    parts = [_placed_at(one, begin, placed) for one in numbers]
+    along_mm = np.array([one.along_mm for one in readings])
+    measured_mm = np.array([one.measurement.position_mm for one in readings])
+    return measured_mm - points(parts, part_of, along_mm)
+
+
+def _by_part(readings: Sequence[Reading]) -> tuple[list[tuple[int, int]], _Indices]:
+    """The stretches on which measurements lie, and the index of its stretch for each of them."""
+    parts = list(dict.fromkeys(one.part for one in readings))
+    index = {part: place for place, part in enumerate(parts)}
+    return parts, np.array([index[one.part] for one in readings], dtype=np.intp)
+
+
+def _placed_at(part: tuple[int, int], begin: Placed, placed: Sequence[Sequence[Placed]]) -> Placed:
+    """The stretch with a channel and an index there, as `Reading.part` gives them."""
+    channel, number = part
+    return begin if channel == ENTRY else placed[channel][number]
 
 
 def _begins(part_of: _Indices, depths_mm: _Array, priors: Priors) -> _Indices:
