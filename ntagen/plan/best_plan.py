@@ -13,8 +13,8 @@ single plan, several times, each time for more than the best plan so far has:
    answer changed no drive.
 
 If the ranking begins with the reserve, one plan with 2 mm of it is asked for: in a scene in which
-all regions to avoid are larger and the target is smaller. Where there is none, any plan is asked
-for. More questions took twice as long, and reached no more targets.
+all regions to avoid are larger and the target is smaller. Where there is none, the plans are listed
+until one holds. More questions took twice as long, and reached no more targets.
 
 Every plan that is found is certified in the scene itself. The number of questions is fixed, so that
 equal scenes have equal answers. Where few plans can exist, all are listed, which is sooner done.
@@ -125,9 +125,8 @@ class _Known:
     origin: Listing
 
     def __init__(self, engine: EngineSynthesiser, scene: Scene) -> None:
-        self._engine = replace(engine, max_plans=1)
+        self._whole, self._engine = engine, replace(engine, max_plans=1)
         self._scene = scene
-        self._most_listed = _most_listed(engine, scene)
         self.is_complete = False
         self._plans: dict[Plan, None] = {}
         self.candidates: list[Candidate] = []
@@ -173,9 +172,9 @@ class _Known:
         if found is None:
             # Nothing is asked after this. So many plans are listed: if the first fails, one of the
             # others may hold.
-            listing = replace(self._engine, max_plans=self._most_listed).listed(self._scene)
-            found = self._note(listing)
-            self.is_complete = found is None and listing.is_complete
+            most = _most_listed(self._whole, self._scene)
+            listing = replace(self._whole, max_plans=most).listed(self._scene)
+            self.is_complete = self._note(listing) is None and listing.is_complete
         if self._scene.breath is not None and self.found:
             for less_mm in _SMALL_RESERVES_MM:
                 if not self.candidates:
