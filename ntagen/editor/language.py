@@ -19,6 +19,7 @@ from ntagen.nsl import Diagnostic, SourceError, loads_task
 from ntagen.nsl.diagnostics import CAPTIONS, KINDS, page_of
 from ntagen.nsl.driving import CHOICES
 from ntagen.nsl.grammar import UnexpectedTokenError, read_statement
+from ntagen.nsl.lexer import tokenise
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import (
     ALLOWED,
@@ -30,7 +31,6 @@ from ntagen.nsl.tokens import (
     BlockKind,
     Comment,
     Token,
-    tokenise,
 )
 from ntagen.nsl.wording import FORMS
 from ntagen.parameters import BY_WORDS, MEASURES

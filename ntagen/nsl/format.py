@@ -17,6 +17,7 @@ from itertools import zip_longest
 from typing import Final
 
 from ntagen.nsl.diagnostics import Reporter, SourceError
+from ntagen.nsl.lexer import tokenise
 from ntagen.nsl.parser import parse
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import (
@@ -27,7 +28,6 @@ from ntagen.nsl.tokens import (
     Token,
     begins_statement,
     keyword_of,
-    tokenise,
 )
 
 _INDENT: Final = "  "

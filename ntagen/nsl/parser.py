@@ -26,6 +26,7 @@ from typing import Final
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean, suggest
 from ntagen.nsl.grammar import UnexpectedTokenError, read_statement
+from ntagen.nsl.lexer import tokenise
 from ntagen.nsl.quantity import is_unit
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import (
@@ -41,7 +42,6 @@ from ntagen.nsl.tokens import (
     Token,
     begins_statement,
     keyword_of,
-    tokenise,
 )
 from ntagen.nsl.wording import (
     STRAY_HINTS,

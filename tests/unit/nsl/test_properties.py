@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ntagen import nsl
+from ntagen.nsl.lexer import tokenise
 from ntagen.nsl.source import Source
-from ntagen.nsl.tokens import RESERVED, tokenise
+from ntagen.nsl.tokens import RESERVED
 from ntagen.parameters import BY_WORDS
 from ntagen.scene import Scene
 from tests.examples import examples
