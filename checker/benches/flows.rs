@@ -183,8 +183,8 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
 fn run(case: &Case, runs: u64) -> Result<(Measured, f64), Box<dyn Error>> {
     let (network, query) = load(case.model, case.query)?;
     let jit = Jit::new(&network.functions, &network.constants)?;
-    let Statistical::Probability(bound, path) = &query.kind else {
-        panic!("{} asks for a probability", query.text);
+    let Statistical::Probability(bound, path) = &query else {
+        panic!("{query:?} asks for a probability");
     };
     let mut runner = Runner::new(&network, &jit);
     let (mut satisfied, mut moves, mut squares) = (0, 0, 0.0);

@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use checker::exec::{Executor, Jit};
-use checker::ir::{Network, Statistical, StatisticalQuery};
+use checker::ir::{Network, Statistical};
 use checker::stochastic::{Precision, Runner, estimate};
 
 use statistical::{DEVIATIONS, Measured, load};
@@ -206,7 +206,7 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
 fn run(
     network: &Network,
     executor: &dyn Executor,
-    query: &StatisticalQuery,
+    query: &Statistical,
     (runs, threads): (u64, usize),
 ) -> Measured {
     let precision = Precision {
@@ -215,7 +215,7 @@ fn run(
         ..Precision::default()
     };
     let begin = Instant::now();
-    let estimate = estimate(network, executor, &query.kind, &precision, |_| false);
+    let estimate = estimate(network, executor, query, &precision, |_| false);
     Measured {
         seconds: begin.elapsed().as_secs_f64(),
         satisfied: estimate
@@ -227,13 +227,9 @@ fn run(
 }
 
 /// How many moves a run has: the mean, and its standard deviation.
-fn counted_moves(
-    network: &Network,
-    executor: &dyn Executor,
-    query: &StatisticalQuery,
-) -> (f64, f64) {
-    let Statistical::Probability(bound, path) = &query.kind else {
-        panic!("{} asks for a probability", query.text);
+fn counted_moves(network: &Network, executor: &dyn Executor, query: &Statistical) -> (f64, f64) {
+    let Statistical::Probability(bound, path) = query else {
+        panic!("{query:?} asks for a probability");
     };
     let mut runner = Runner::new(network, executor);
     let (mut sum, mut squares) = (0.0, 0.0);

@@ -5,8 +5,9 @@ use std::path::Path;
 use std::process::Command;
 
 use checker::diagnostics::{Diagnostic, SourceMap};
-use checker::ir::{Network, StatisticalQuery};
-use checker::semantics::{self, Reading};
+use checker::exec::Libraries;
+use checker::ir::{Network, QueryKind, Statistical};
+use checker::semantics::{self, FIRST_POOL, Reading};
 use checker::syntax;
 
 /// How many standard deviations two estimates may differ by.
@@ -67,15 +68,18 @@ impl Measured {
 }
 
 /// A model in the stochastic reading, with a compiled query.
-pub(crate) fn load(
-    model: &str,
-    query: &str,
-) -> Result<(Network, StatisticalQuery), Box<dyn Error>> {
+pub(crate) fn load(model: &str, query: &str) -> Result<(Network, Statistical), Box<dyn Error>> {
     let mut sources = SourceMap::default();
     let prelude = syntax::prelude(&mut sources);
     let parsed = syntax::read_model("model.xta", model.as_bytes(), &mut sources);
-    let (model, more) =
-        semantics::analyse(&parsed.document, &prelude, &sources, Reading::Stochastic);
+    let (model, more) = semantics::analyse(
+        &parsed.document,
+        &prelude,
+        &sources,
+        Reading::Stochastic,
+        &Libraries::default(),
+        FIRST_POOL,
+    );
     let mut found = parsed.diagnostics;
     found.extend(more);
     let span = syntax::add_query_text(query, &mut sources);
@@ -84,9 +88,12 @@ pub(crate) fn load(
     let mut compiled = None;
     let mut model = model.filter(|_| !found.iter().any(Diagnostic::is_error));
     if let (Some(model), Some(parsed)) = (&mut model, parsed) {
-        let (query, more) = model.compile_statistical(&parsed, &sources, &[]);
+        let (query, more) = model.compile_query(&parsed, &sources, &[]);
         found.extend(more);
-        compiled = query;
+        compiled = query.and_then(|query| match query.kind {
+            QueryKind::Statistical(asked) => Some(*asked),
+            _ => None,
+        });
     }
     let (Some(model), Some(query)) = (model, compiled) else {
         let texts: Vec<String> = found.iter().map(|one| one.render(&sources)).collect();

@@ -1,151 +1,157 @@
-//! From the text of a query to its answer, with everything around the search itself: compilation,
-//! names of strategies, remarks on results that wrapped round.
+//! From the text of a query to its answer: what is done for every kind of query, around the search
+//! or the random runs themselves.
 
 use std::sync::Arc;
 use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
-use super::codes;
-use super::evidence::named_strategies::StrategyFile;
 use super::limits::LimitWatch;
-use super::loaded_model::{LoadedModel, NamedStrategy, Recipe};
+use super::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
 use super::options::Options;
 use super::query_form::unnamed;
 use super::rejection::Rejection;
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::Span;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
-use crate::ir::{FunctionId, Measure, Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
+use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
 use crate::network::Failure;
+use crate::semantics::Reading;
 use crate::syntax::ast::QueryText;
 
 impl LoadedModel {
     /// Answers a query.
     pub fn check(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
-        let before = std::mem::replace(&mut self.model.network.overflow, options.overflow);
-        let answer = self.check_it(text, options);
-        self.model.network.overflow = before;
-        answer
+        self.with_room(|model| model.check_once(text.span, options))
     }
 
-    fn check_it(&mut self, text: &QueryText, options: &Options) -> Result<Answer, Rejection> {
-        if let Some(query) = self.statistical_query(text.span) {
-            return self.check_statistical(&query, options);
+    /// Does something; again with more slots of dynamic templates if a random run needs more than
+    /// there are. No run depends on their number.
+    pub(super) fn with_room<T>(
+        &mut self,
+        mut ask: impl FnMut(&mut LoadedModel) -> Result<T, Rejection>,
+    ) -> Result<T, Rejection> {
+        loop {
+            let pool = self.pool;
+            let result = ask(self);
+            if self.pool == pool {
+                return result;
+            }
+            self.stochastic = None;
         }
+    }
+
+    fn check_once(&mut self, span: Span, options: &Options) -> Result<Answer, Rejection> {
         let start = Instant::now();
-        let (mut query, warnings) = self.compile(text.span)?;
-        query.guide = self.compile_guide(options)?;
-        self.load_seconds += start.elapsed().as_secs_f64();
-        let rest;
-        let mut options = options;
-        if let Some(name) = &query.under {
-            let start = Instant::now();
-            // What is supported depends on it.
-            self.permitted_by(name, query.span, options)?;
-            rest = options.left_since(start);
-            options = &rest;
-        }
-        let start = Instant::now();
-        self.refuse_unsupported(&query, options.priorities)?;
-        let mut watch = LimitWatch::new(options.limits.clone());
-        let prepared = watch.bound(|_| self.prepare_code(options.code, options.tuning, query.span));
-        match prepared {
-            Ok(prepared) => prepared?,
-            Err((reason, counters)) => {
-                // What is half made is made anew when it is needed.
-                self.forget_code();
-                return Ok(Answer::new(Verdict::Unknown(reason), counters));
-            }
-        }
-        self.executor().wraps().clear();
-        self.load_seconds += start.elapsed().as_secs_f64();
-        let mut answer = match (&query.kind, self.constant_failure()) {
-            (_, Some(failure)) => Answer::failed(failure),
-            (QueryKind::SaveStrategy { file, strategy }, None) => {
-                let (name, span) = (strategy, query.span);
-                self.save_strategy(StrategyFile { file, name, span }, options)?
-            }
-            (QueryKind::LoadStrategy { file }, None) => {
-                let (name, span) = (query.strategy.as_deref().unwrap_or_default(), query.span);
-                self.load_strategy(StrategyFile { file, name, span }, options)?
-            }
-            _ => self.answer(&query, options)?,
+        let (reading, names) = (self.reading_of(span), self.strategy_names());
+        let (query, warnings) = self.compile_in(reading, span, &names)?;
+        let guide = match reading {
+            Reading::Symbolic => self.compile_guide(options.guide.as_deref())?,
+            Reading::Stochastic => None,
         };
-        answer.wrapped = self.first_wrap();
-        self.complete_failure(&query, options, &mut answer);
+        let level = self.level(&query, options)?;
+        self.load_seconds += start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let under = self.followed(&query, options)?;
+        let prepared = PreparedQuery {
+            query,
+            options: options.left_since(start),
+            guide,
+            level,
+            under,
+        };
+        self.refuse_unsupported(&prepared)?;
+        let mut answer = match self.prepare_in_time(reading, span, &prepared.options)? {
+            Some(cut) => return Ok(cut),
+            None => self.answer(&prepared)?,
+        };
         answer.warnings = warnings;
         answer.load_seconds = self.load_seconds;
         Ok(answer)
     }
 
-    /// The function that computes the guide, if there is one.
-    fn compile_guide(&mut self, options: &Options) -> Result<Option<FunctionId>, Rejection> {
-        let Some(guide) = &options.guide else {
+    /// What a query under a strategy follows.
+    fn followed(
+        &mut self,
+        query: &Query,
+        options: &Options,
+    ) -> Result<Option<Arc<Under>>, Rejection> {
+        let Some(name) = &query.under else {
             return Ok(None);
         };
-        // Whatever `sup` can measure on the words is a guide.
-        let text = self.add_query(&format!("sup: {guide}"));
-        let (query, _) = self.compile(text.span)?;
-        let function = match query.kind {
-            QueryKind::Extremum { items, .. } => match items.as_slice() {
-                [(Measure::Integer(function), _)] => Some(*function),
-                _ => None,
-            },
-            _ => None,
-        };
-        function.map(Some).ok_or_else(|| {
-            let message = format!("`{guide}` is no guide");
-            let help = "write one integer expression without clocks";
-            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
-            Rejection::new(vec![error], &self.sources)
-        })
+        let strategy = self.permitted_by(name, query.span, options)?.strategy;
+        let query = self.strategy(name).map(|one| one.query.clone());
+        let query = query.unwrap_or_default();
+        Ok(Some(Arc::new(Under { query, strategy })))
     }
 
-    /// Answers a query that is no file operation; keeps the strategy that it defines.
-    fn answer(&mut self, query: &Query, options: &Options) -> Result<Answer, Rejection> {
-        let within = match &query.under {
-            None => None,
-            Some(name) => {
-                let strategy = self.permitted_by(name, query.span, options)?.strategy;
-                let query = self.strategy(name).map(|one| one.query.clone());
-                Some(Arc::new(Under {
-                    query: query.unwrap_or_default(),
-                    strategy,
-                }))
+    /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer
+    /// if a limit comes before.
+    pub(super) fn prepare_in_time(
+        &mut self,
+        reading: Reading,
+        span: Span,
+        options: &Options,
+    ) -> Result<Option<Answer>, Rejection> {
+        let start = Instant::now();
+        let mut watch = LimitWatch::new(options.limits.clone());
+        match watch.bound(|_| self.prepare_code(reading, options.code, options.tuning, span)) {
+            Ok(prepared) => prepared?,
+            Err((reason, counters)) => {
+                return Ok(Some(Answer::new(Verdict::Unknown(reason), counters)));
             }
-        };
-        let mut answer = self.answer_within(query, options, within.as_ref());
-        if let Some(name) = query.strategy.clone() {
-            self.keep_answer(name, query, &answer, (options, within));
         }
+        self.load_seconds += start.elapsed().as_secs_f64();
+        Ok(None)
+    }
+
+    /// Answers a query whose code is ready.
+    fn answer(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+        let query = &prepared.query;
+        let mut answer = match &query.kind {
+            QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
+            _ => self.answer_symbolically(prepared)?,
+        };
         if let Some(name) = &query.under {
             self.note_freedom(name, &mut answer);
         }
         Ok(answer)
     }
 
-    /// Keeps the strategy that a query defines.
-    fn keep_answer(
-        &mut self,
-        name: String,
-        query: &Query,
-        answer: &Answer,
-        (options, within): (&Options, Option<Arc<Under>>),
-    ) {
-        let text = unnamed(&query.text).to_owned();
+    /// Answers a query that is no statistical one; keeps the strategy that it defines.
+    fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+        let PreparedQuery { query, options, .. } = prepared;
+        self.executor().wraps().clear();
+        let mut answer = match (&query.kind, self.constant_failure()) {
+            (_, Some(failure)) => Answer::failed(failure),
+            (QueryKind::SaveStrategy { file, strategy }, None) => {
+                self.save_strategy(file, strategy, query.span, options)?
+            }
+            (QueryKind::LoadStrategy { file }, None) => {
+                let name = query.strategy.as_deref().unwrap_or_default();
+                self.load_strategy(file, name, query.span, options)?
+            }
+            _ => {
+                let answer = self.answer_in_zones(prepared, None);
+                if let Some(name) = &query.strategy {
+                    self.keep_answer(name, prepared, &answer);
+                }
+                answer
+            }
+        };
+        answer.wrapped = self.first_wrap();
+        self.complete_failure(query, options, &mut answer);
+        Ok(answer)
+    }
+
+    /// Keeps the strategy with this name that a query defines.
+    fn keep_answer(&mut self, name: &str, prepared: &PreparedQuery, answer: &Answer) {
+        let text = unnamed(&prepared.query.text).to_owned();
         // Where the query is not satisfied, the strategy is the environment's.
         let is_won = answer.verdict == Verdict::Satisfied;
         let known = is_won.then(|| answer.evidence.strategy.clone()).flatten();
-        let recipe = is_won.then(|| {
-            Arc::new(Recipe {
-                query: query.clone(),
-                options: options.clone(),
-                within,
-            })
-        });
         self.keep_strategy(NamedStrategy {
-            recipe,
-            ..NamedStrategy::new(name, text, known)
+            definition: is_won.then(|| Arc::new(prepared.clone())),
+            ..NamedStrategy::new(name.to_owned(), text, known)
         });
     }
 

@@ -5,26 +5,32 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::code::PreparedCode;
+use super::code::CompiledModel;
 use super::codes;
 use super::constants;
 use super::options::{CodeEngine, Options};
 use super::rejection::Rejection;
-use crate::diagnostics::{Diagnostic, SourceMap, Span, Text};
+use crate::diagnostics::{Code, Diagnostic, SourceMap, Span, Text};
 use crate::exec::{Executor, Libraries};
 use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Strategy, Under};
-use crate::ir::{Network, Overflow, Query};
-use crate::semantics::{self, FIRST_POOL, Model, Reading};
+use crate::ir::{FunctionId, Measure, Network, Overflow, Query};
+use crate::semantics::{self, FIRST_POOL, Reading};
 use crate::syntax::{
     self,
-    ast::{QueryText, Template},
+    ast::{QueryKind, QueryText, Template},
 };
 use crate::tuning::Tuning;
 
+/// What holds once something was compiled in the stochastic reading.
+pub(super) const ANALYSED: &str = "the stochastic reading was analysed";
+
 /// A model that was loaded and accepted.
 pub struct LoadedModel {
-    pub(super) model: Model,
+    /// The model in the symbolic reading, or in the stochastic one if it has no other.
+    pub(super) symbolic: CompiledModel,
+    /// The model in the stochastic reading, once a statistical query was asked.
+    pub(super) stochastic: Option<CompiledModel>,
     pub(super) sources: SourceMap,
     pub(super) templates: Vec<Template>,
     /// The file as the user named it.
@@ -43,16 +49,12 @@ pub struct LoadedModel {
     pub warnings: Vec<String>,
     /// Seconds that loading took, compilation of code included once a query was checked.
     pub load_seconds: f64,
-    code: Option<PreparedCode>,
-    /// Why only statistical queries can be asked, if that is so; `model` is then in the stochastic
-    /// reading too.
+    /// Why only statistical queries can be asked, if that is so.
     symbolic_refusal: Option<Rejection>,
     /// The libraries that the model may import.
     pub(super) libraries: Libraries,
     /// How many slots dynamic templates have in the stochastic reading.
     pub(super) pool: u32,
-    /// The model in the stochastic reading, once a statistical query was asked.
-    pub(super) stochastic: Option<StochasticModel>,
 }
 
 impl LoadedModel {
@@ -76,7 +78,7 @@ impl LoadedModel {
             return Err(Rejection::new(diagnostics, &sources));
         }
         let analysed = |reading| {
-            semantics::analyse_with(
+            semantics::analyse(
                 &parsed.document,
                 &prelude,
                 &sources,
@@ -113,7 +115,8 @@ impl LoadedModel {
         let queries = parsed.document.queries;
         let load_seconds = start.elapsed().as_secs_f64();
         Ok(LoadedModel {
-            model,
+            symbolic: CompiledModel::new(model),
+            stochastic: None,
             sources,
             templates: parsed.document.templates,
             path: path.to_owned(),
@@ -127,11 +130,9 @@ impl LoadedModel {
             listed: Vec::new(),
             warnings,
             load_seconds,
-            code: None,
             symbolic_refusal,
             libraries: libraries.clone(),
             pool: FIRST_POOL,
-            stochastic: None,
         })
     }
 
@@ -139,7 +140,7 @@ impl LoadedModel {
     pub fn with_constants(&self, values: &[(String, String)]) -> Result<LoadedModel, Rejection> {
         let text = constants::replaced(&self.path, &self.text, values)?;
         let mut model = LoadedModel::load_with(&self.path, text, &self.libraries)?;
-        model.set_overflow(self.model.network.overflow);
+        model.set_overflow(self.network().overflow);
         Ok(model)
     }
 
@@ -150,7 +151,7 @@ impl LoadedModel {
 
     /// The network.
     pub fn network(&self) -> &Network {
-        &self.model.network
+        self.symbolic.network()
     }
 
     /// Where a span lies, as `file:line:column`, with the text it covers.
@@ -196,44 +197,75 @@ impl LoadedModel {
         }
     }
 
-    /// What runs the code of the model.
-    ///
-    /// # Panics
-    ///
-    /// If no query was checked and no simulation prepared before.
+    /// What runs the code of the model in the symbolic reading, once it was made.
     pub(super) fn executor(&self) -> &dyn Executor {
-        let code = self.code.as_ref();
-        code.expect("code is prepared before it is run").executor()
+        self.symbolic.executor()
     }
 
-    /// Makes the code of the model, or adds what queries brought since.
+    /// The model in a reading; in the stochastic one once something was compiled in it.
+    pub(super) fn compiled(&mut self, reading: Reading) -> &mut CompiledModel {
+        match reading {
+            Reading::Symbolic => &mut self.symbolic,
+            Reading::Stochastic => self.stochastic.as_mut().expect(ANALYSED),
+        }
+    }
+
+    /// Makes the code of the model in a reading, or adds what queries brought since. `span` is the
+    /// query that needs it.
     pub(super) fn prepare_code(
         &mut self,
+        reading: Reading,
         wanted: CodeEngine,
         tuning: Tuning,
         span: Span,
     ) -> Result<(), Rejection> {
-        let network = &self.model.network;
-        PreparedCode::prepare(&mut self.code, network, wanted, tuning).map_err(|message| {
-            let diagnostic = Diagnostic::new(codes::NO_COMPILED_CODE, span, message)
-                .help("use the interpreter: --engine interpreter");
-            Rejection::new(vec![diagnostic], &self.sources)
+        let prepared = self.compiled(reading).prepare(wanted, tuning);
+        prepared.map_err(|message| {
+            let help = "use the interpreter: --engine interpreter";
+            self.refusal(codes::NO_COMPILED_CODE, span, message, help)
         })
     }
 
-    /// Forgets the code of the model, which may be half made.
-    pub(super) fn forget_code(&mut self) {
-        self.code = None;
+    /// The refusal of something at one place, with what to do.
+    pub(super) fn refusal(
+        &self,
+        code: Code,
+        span: Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Rejection {
+        let diagnostic = Diagnostic::new(code, span, message).help(help);
+        Rejection::new(vec![diagnostic], &self.sources)
     }
 
-    /// Compiles a query, whose code becomes part of the network: the query, and its warnings as
-    /// text.
+    /// Compiles a symbolic or game query, whose code becomes part of the network: the query, and
+    /// its warnings as text.
     pub fn compile(&mut self, span: Span) -> Result<(Query, Vec<String>), Rejection> {
+        let names = self.strategy_names();
+        self.compile_in(Reading::Symbolic, span, &names)
+    }
+
+    /// The same in a reading; the query may name these strategies.
+    pub(super) fn compile_in(
+        &mut self,
+        reading: Reading,
+        span: Span,
+        strategies: &[String],
+    ) -> Result<(Query, Vec<String>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
-        if let Some(parsed) = parsed.filter(|_| !diagnostics.iter().any(Diagnostic::is_error)) {
-            self.expect_symbolic()?;
-            let names = self.strategy_names();
-            let (query, more) = self.model.compile_query(&parsed, &self.sources, &names);
+        if let Some(parsed) = parsed {
+            let compiled = match reading {
+                Reading::Symbolic => {
+                    self.expect_symbolic()?;
+                    &mut self.symbolic
+                }
+                Reading::Stochastic => {
+                    self.expect_stochastic()?;
+                    self.stochastic.as_mut().expect(ANALYSED)
+                }
+            };
+            let model = &mut compiled.model;
+            let (query, more) = model.compile_query(&parsed, &self.sources, strategies);
             diagnostics.extend(more);
             if let Some(query) = query {
                 return Ok((query, Rejection::new(diagnostics, &self.sources).rendered));
@@ -242,39 +274,86 @@ impl LoadedModel {
         Err(Rejection::new(diagnostics, &self.sources))
     }
 
+    /// The guide of games, if there is one.
+    pub(super) fn compile_guide(
+        &mut self,
+        guide: Option<&str>,
+    ) -> Result<Option<FunctionId>, Rejection> {
+        let Some(guide) = guide else {
+            return Ok(None);
+        };
+        let span = syntax::add_query_text(guide, &mut self.sources);
+        let (expr, mut diagnostics) = syntax::parse_expression(span, &self.sources);
+        let measure = expr.and_then(|expr| {
+            let model = &mut self.symbolic.model;
+            let (measure, more) = model.compile_measure(&expr, &self.sources);
+            diagnostics.extend(more);
+            measure
+        });
+        match measure {
+            Some(Measure::Integer(function)) => Ok(Some(function)),
+            Some(Measure::Clock(_)) => Err(self.refusal(
+                codes::UNSUPPORTED_QUERY,
+                span,
+                format!("`{guide}` is no guide"),
+                "write one integer expression without clocks",
+            )),
+            None => Err(Rejection::new(diagnostics, &self.sources)),
+        }
+    }
+
+    /// What says how near a state is to a rare event, if this is an expression that can.
+    pub(super) fn compile_level(&mut self, level: &str) -> Option<FunctionId> {
+        let span = syntax::add_query_text(level, &mut self.sources);
+        let (expr, _) = syntax::parse_expression(span, &self.sources);
+        let model = &mut self.stochastic.as_mut().expect(ANALYSED).model;
+        model.compile_number(&expr?, &self.sources).0
+    }
+
+    /// The reading that a query needs.
+    pub(super) fn reading_of(&self, span: Span) -> Reading {
+        let (parsed, _) = syntax::parse_query(span, &self.sources);
+        match parsed.map(|query| query.kind) {
+            Some(QueryKind::Statistical(_)) => Reading::Stochastic,
+            _ => Reading::Symbolic,
+        }
+    }
+
     /// Refuses what needs zones if the model has a meaning in the stochastic reading only.
     pub fn expect_symbolic(&self) -> Result<(), Rejection> {
         self.symbolic_refusal.clone().map_or(Ok(()), Err)
     }
 
-    /// The model in the stochastic reading: the text is analysed again when the first statistical
-    /// query comes.
-    pub(super) fn stochastic(&mut self) -> Result<&mut StochasticModel, Rejection> {
-        if self.stochastic.is_none() {
-            let prelude = syntax::prelude(&mut self.sources);
-            let text = self.text.as_bytes().to_vec();
-            let parsed = syntax::read_model(&self.path, text, &mut self.sources);
-            let (model, found) = semantics::analyse_with(
-                &parsed.document,
-                &prelude,
-                &self.sources,
-                Reading::Stochastic,
-                &self.libraries,
-                self.pool,
-            );
-            let Some(model) = model else {
-                let errors = found.into_iter().filter(Diagnostic::is_error).collect();
-                return Err(Rejection::new(errors, &self.sources));
-            };
-            self.stochastic = Some(StochasticModel { model, code: None });
+    /// Analyses the text again, when the first statistical query comes.
+    fn expect_stochastic(&mut self) -> Result<(), Rejection> {
+        if self.stochastic.is_some() {
+            return Ok(());
         }
-        Ok(self.stochastic.as_mut().expect("it was just made"))
+        let prelude = syntax::prelude(&mut self.sources);
+        let text = self.text.as_bytes().to_vec();
+        let parsed = syntax::read_model(&self.path, text, &mut self.sources);
+        let (model, found) = semantics::analyse(
+            &parsed.document,
+            &prelude,
+            &self.sources,
+            Reading::Stochastic,
+            &self.libraries,
+            self.pool,
+        );
+        let Some(mut model) = model else {
+            let errors = found.into_iter().filter(Diagnostic::is_error).collect();
+            return Err(Rejection::new(errors, &self.sources));
+        };
+        model.network.overflow = self.network().overflow;
+        self.stochastic = Some(CompiledModel::new(model));
+        Ok(())
     }
 
-    /// Says what happens where results of integer arithmetic do not fit into 32 bits; a query has
-    /// an option of its own.
+    /// Says what happens where results of integer arithmetic do not fit into 32 bits.
     pub fn set_overflow(&mut self, overflow: Overflow) {
-        self.model.network.overflow = overflow;
+        for compiled in self.stochastic.iter_mut().chain([&mut self.symbolic]) {
+            compiled.model.network.overflow = overflow;
+        }
     }
 
     /// The names of the strategies that exist until now.
@@ -307,12 +386,6 @@ fn statistical_only(error: &Diagnostic, sources: &SourceMap) -> Diagnostic {
     .help("ask Pr, E or simulate; or change this, to ask symbolic and game queries too")
 }
 
-/// A model in the stochastic reading.
-pub(super) struct StochasticModel {
-    pub(super) model: Model,
-    pub(super) code: Option<PreparedCode>,
-}
-
 /// A strategy with the query that it answers.
 #[derive(Clone, Debug)]
 pub struct NamedStrategy {
@@ -322,19 +395,23 @@ pub struct NamedStrategy {
     pub query: String,
     /// `None` if the query was not satisfied, or the strategy was not made.
     pub strategy: Option<Arc<Strategy>>,
-    /// How it is made when it is first used, and what it leaves to choose.
-    pub(crate) recipe: Option<Arc<Recipe>>,
+    /// The query that defines it, if the strategy is made when it is first used.
+    pub(crate) definition: Option<Arc<PreparedQuery>>,
     /// What a query under it follows, once one was asked.
     pub(crate) permitted: Option<Permitted>,
 }
 
-/// How a strategy is made.
+/// A compiled query with all that it is answered by.
 #[derive(Clone, Debug)]
-pub(crate) struct Recipe {
+pub(crate) struct PreparedQuery {
     pub(crate) query: Query,
     pub(crate) options: Options,
+    /// Where a game is explored first: where the value of this function is least.
+    pub(crate) guide: Option<FunctionId>,
+    /// How near a state is to a rare event, as a double.
+    pub(crate) level: Option<FunctionId>,
     /// What the query is asked under.
-    pub(crate) within: Option<Arc<Under>>,
+    pub(crate) under: Option<Arc<Under>>,
 }
 
 /// What a query under a strategy follows.
@@ -352,7 +429,7 @@ impl NamedStrategy {
             name,
             query,
             strategy,
-            recipe: None,
+            definition: None,
             permitted: None,
         }
     }

@@ -24,5 +24,6 @@ pub use answer::{Answer, Evidence, Stopped, Verdict, Verification, Wanted};
 pub use limits::Limits;
 pub use loaded_model::{LoadedModel, NamedStrategy};
 pub use options::{CodeEngine, Options, RareEvent, Reductions, Rules, StrategyWanted, TraceWanted};
+pub use query::joint::JointQuery;
 pub use query_form::QueryForm;
 pub use rejection::Rejection;

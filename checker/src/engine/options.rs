@@ -7,7 +7,6 @@ use std::time::Instant;
 
 use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
-use crate::ir::Overflow;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
 use crate::stochastic::statistics::Interval;
 use crate::stochastic::{Precision, RunSource, UnderChoice};
@@ -177,8 +176,6 @@ pub struct Options {
     pub trace: TraceWanted,
     /// Whether a certificate is wanted for the verdict that no reachable state is such.
     pub certificate: bool,
-    /// What happens where results of integer arithmetic do not fit into 32 bits.
-    pub overflow: Overflow,
     /// Which reductions searches may make.
     pub reductions: Reductions,
     /// Which heuristics are used.

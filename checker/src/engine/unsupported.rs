@@ -1,84 +1,57 @@
 //! What the engine refuses to answer, since there is no algorithm for it.
 
 use super::codes;
-use super::loaded_model::LoadedModel;
+use super::loaded_model::{LoadedModel, PreparedQuery};
 use super::query;
+use super::query::statistical::contradiction;
 use super::rejection::Rejection;
 use crate::diagnostics::Diagnostic;
-use crate::game::{Player, Priorities};
-use crate::ir::{Query, QueryKind};
+use crate::game::Player;
+use crate::game::strategy::Strategy;
+use crate::ir::{Control, Query, QueryKind};
+use crate::stochastic::Precision;
 
 impl LoadedModel {
-    /// Names what makes a game under a strategy one that there is no algorithm for.
-    fn unsupported_under(&self, query: &Query) -> Option<&'static str> {
-        let QueryKind::Control {
-            cooperative,
-            time_optimal,
-            observations,
-            ..
-        } = &query.kind
-        else {
-            return None;
+    /// Refuses a statistical query that contradicts what is asked of its interval.
+    pub(super) fn refuse_contradiction(
+        &self,
+        query: &Query,
+        precision: &Precision,
+    ) -> Result<(), Rejection> {
+        let QueryKind::Statistical(asked) = &query.kind else {
+            return Ok(());
         };
-        let named = self.strategy(query.under.as_deref()?)?;
-        let strategy = &named.permitted.as_ref()?.strategy;
-        if *cooperative || time_optimal.is_some() {
-            Some("E<> control: and control_t* under a strategy")
-        } else if observations.is_some() {
-            Some("games under partial observation and a strategy")
-        } else if strategy.owner == Player::Environment {
-            Some("games under a strategy of the environment")
-        } else if strategy.time_limit.is_some() {
-            Some("games under a strategy within a time")
-        } else {
-            None
+        match contradiction(asked, precision) {
+            Some((message, help)) => {
+                Err(self.refusal(codes::UNSUPPORTED_QUERY, query.span, message, help))
+            }
+            None => Ok(()),
         }
     }
 
     /// Refuses, by name, what there is no algorithm for.
-    pub(super) fn refuse_unsupported(
-        &self,
-        query: &Query,
-        priorities: Priorities,
-    ) -> Result<(), Rejection> {
-        let is_under = query.under.is_some();
-        let kind = match &query.kind {
-            QueryKind::Reachable(_)
-            | QueryKind::Invariantly(_)
-            | QueryKind::PotentiallyAlways(_)
-            | QueryKind::Eventually(_)
-            | QueryKind::LeadsTo(..)
-            | QueryKind::Extremum { .. }
-            | QueryKind::SaveStrategy { .. }
-            | QueryKind::LoadStrategy { .. } => None,
-            QueryKind::Control {
-                objective,
-                cooperative,
-                time_optimal,
-                observations,
-            } => query::game::unsupported_game(
-                objective,
-                time_optimal.is_some(),
-                *cooperative,
-                observations.is_some(),
-            ),
+    pub(super) fn refuse_unsupported(&self, prepared: &PreparedQuery) -> Result<(), Rejection> {
+        let PreparedQuery { query, options, .. } = prepared;
+        self.refuse_contradiction(query, &options.precision)?;
+        let control = match &query.kind {
+            QueryKind::Statistical(_) => return Ok(()),
+            QueryKind::Control(control) => Some(control),
+            _ => None,
         };
-        let is_observed = matches!(
-            query.kind,
-            QueryKind::Control {
-                observations: Some(_),
-                ..
-            }
-        );
-        let features = &self.model.network.features;
+        let kind = control.and_then(query::game::unsupported_game);
+        let is_observed = control.is_some_and(|control| control.observations.is_some());
+        let network = self.network();
+        let features = &network.features;
         let is_kept = query.strategy.is_some() && is_observed;
         let kind = kind.or(is_kept.then_some("observations and a named strategy"));
         let kind = kind.map(|kind| format!("queries with {kind}"));
-        let under = self.unsupported_under(query).map(str::to_owned);
-        let construct = if is_under && features.stopwatches {
+        let strategy = prepared.under.as_ref().map(|under| &under.strategy);
+        let under = control.zip(strategy);
+        let under = under.and_then(|(control, strategy)| unsupported_under(control, strategy));
+        let construct = if strategy.is_some() && features.stopwatches {
             Some("stopwatches in a query under a strategy")
         } else if is_observed {
-            query::partial_observation::unsupported(&self.model.network, priorities)
+            query::partial_observation::unsupported(network, options.priorities)
         } else if !features.clock_guarded_urgent {
             None
         } else if features.stopwatches {
@@ -87,7 +60,7 @@ impl LoadedModel {
             None
         };
         let is_for_under = kind.is_none() && !is_observed;
-        let diagnostic = if let Some(kind) = kind.or(under) {
+        let diagnostic = if let Some(kind) = kind.or(under.map(str::to_owned)) {
             Diagnostic::new(
                 codes::UNSUPPORTED_QUERY,
                 query.span,
@@ -111,5 +84,20 @@ impl LoadedModel {
             return Ok(());
         };
         Err(Rejection::new(vec![diagnostic], &self.sources))
+    }
+}
+
+/// Names what makes a game under a strategy one that there is no algorithm for.
+fn unsupported_under(control: &Control, strategy: &Strategy) -> Option<&'static str> {
+    if control.cooperative || control.time_optimal.is_some() {
+        Some("E<> control: and control_t* under a strategy")
+    } else if control.observations.is_some() {
+        Some("games under partial observation and a strategy")
+    } else if strategy.owner == Player::Environment {
+        Some("games under a strategy of the environment")
+    } else if strategy.time_limit.is_some() {
+        Some("games under a strategy within a time")
+    } else {
+        None
     }
 }

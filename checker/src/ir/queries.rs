@@ -2,6 +2,7 @@
 
 use super::ids::{ClockId, FunctionId, LocationId, ProcessId};
 use super::labels::ClockRange;
+use super::statistical::Statistical;
 use crate::diagnostics::Span;
 
 /// A query, compiled.
@@ -15,8 +16,6 @@ pub struct Query {
     pub under: Option<String>,
     /// What is asked.
     pub kind: QueryKind,
-    /// Where a game is explored first: where the value of this function is least.
-    pub guide: Option<FunctionId>,
     /// The whole query.
     pub span: Span,
 }
@@ -46,16 +45,7 @@ pub enum QueryKind {
         items: Vec<(Measure, String)>,
     },
     /// `control: …`
-    Control {
-        /// The objective.
-        objective: Objective,
-        /// `E<> control: …`
-        cooperative: bool,
-        /// `control_t*(u, g)`.
-        time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
-        /// `{…} control: …`
-        observations: Option<Vec<Predicate>>,
-    },
+    Control(Control),
     /// `saveStrategy`
     SaveStrategy {
         /// The file.
@@ -68,6 +58,40 @@ pub enum QueryKind {
         /// The file.
         file: String,
     },
+    /// `Pr`, `E`, `simulate`: what random runs answer.
+    Statistical(Box<Statistical>),
+}
+
+/// A game for a controller.
+#[derive(Clone, Debug)]
+pub struct Control {
+    /// What it is to enforce.
+    pub objective: Objective,
+    /// `E<> control: …`: only from some state that both players get to together.
+    pub cooperative: bool,
+    /// `control_t*(u, g)`: in the least time.
+    pub time_optimal: Option<TimeBounds>,
+    /// `{…} control: …`: what it sees, if that is not everything.
+    pub observations: Option<Vec<Predicate>>,
+}
+
+/// The bounds of `control_t*(u, g)`.
+#[derive(Clone, Copy, Debug)]
+pub struct TimeBounds {
+    /// The time u within which the goal is to be reached.
+    pub limit: Option<FunctionId>,
+    /// How much g of it must be left wherever the goal does not hold yet.
+    pub rest: Option<FunctionId>,
+}
+
+impl QueryKind {
+    /// The game of a query in which the controller sees everything.
+    pub fn full_game(&self) -> Option<&Control> {
+        match self {
+            QueryKind::Control(control) if control.observations.is_none() => Some(control),
+            _ => None,
+        }
+    }
 }
 
 /// What `sup` and `inf` measure.
@@ -92,6 +116,35 @@ pub enum Objective {
     WeakUntil(Predicate, Predicate),
     /// `A[] (p && A<> q)`
     Buchi(Predicate, Predicate),
+}
+
+impl Objective {
+    /// What is to be reached, if something is.
+    pub fn goal(&self) -> Option<&Predicate> {
+        match self {
+            Objective::Safe(_) => None,
+            Objective::Reach(goal)
+            | Objective::Until(_, goal)
+            | Objective::WeakUntil(_, goal)
+            | Objective::Buchi(_, goal) => Some(goal),
+        }
+    }
+
+    /// What is to be kept, if something is.
+    pub fn keep(&self) -> Option<&Predicate> {
+        match self {
+            Objective::Reach(_) => None,
+            Objective::Safe(keep)
+            | Objective::Until(keep, _)
+            | Objective::WeakUntil(keep, _)
+            | Objective::Buchi(keep, _) => Some(keep),
+        }
+    }
+
+    /// What is to be kept and to be reached.
+    pub fn predicates(&self) -> impl Iterator<Item = &Predicate> {
+        self.keep().into_iter().chain(self.goal())
+    }
 }
 
 /// A state predicate of a query. Quantifiers whose body mentions clocks, and process sets, are

@@ -3,20 +3,6 @@
 use super::formulas::Formula;
 use super::ids::FunctionId;
 use super::labels::Guard;
-use crate::diagnostics::Span;
-
-/// A statistical query, compiled.
-#[derive(Clone, Debug)]
-pub struct StatisticalQuery {
-    /// The text, blanks collapsed.
-    pub text: String,
-    /// The strategy that the controller follows, if any.
-    pub under: Option<String>,
-    /// What is asked.
-    pub kind: Statistical,
-    /// The whole query.
-    pub span: Span,
-}
 
 /// The kinds of statistical queries.
 #[derive(Clone, Debug)]

@@ -19,7 +19,7 @@ use crate::engine::format::{
     strategy_text, text, trajectory_json,
 };
 use crate::engine::session::plan_texts::PlanTexts;
-use crate::engine::{self, LoadedModel, Options, Rejection, Verdict, Wanted};
+use crate::engine::{self, JointQuery, LoadedModel, Options, Rejection, Verdict, Wanted};
 use crate::game::strategy::plan_list::PlanWalk;
 use crate::search::limits::StopReason;
 use crate::stochastic::Precision;
@@ -35,7 +35,7 @@ pub(super) fn check(
     options: &Bound<'_, PyAny>,
 ) -> PyResult<Answer> {
     let (options, raised) = options::read(options)?;
-    let answer = answered(model, query, options);
+    let answer = answered(model, query, &options);
     if let Some(failure) = raised.failure(model.py()) {
         return Err(failure);
     }
@@ -55,19 +55,17 @@ pub(super) fn check(
     Ok(answer)
 }
 
-/// Answers a query by the rule for overflows that the model was loaded with, while other threads of
-/// Python run.
+/// Answers a query while other threads of Python run.
 fn answered(
     model: &Bound<'_, Model>,
     query: &str,
-    options: Options,
+    options: &Options,
 ) -> Result<engine::Answer, Rejection> {
     let inner = model.get();
     model.py().detach(|| {
         inner.with(|model| {
             let text = model.add_query(query);
-            let options = options::by_rule_of(model, options);
-            model.check(&text, &options)
+            model.check(&text, options)
         })
     })
 }
@@ -88,7 +86,7 @@ pub(super) fn block_of_runs<'py>(
         only_runs: Some(first..first.saturating_add(count)),
         ..options
     };
-    let answer = answered(model, query, options).map_err(rejected)?;
+    let answer = answered(model, query, &options).map_err(rejected)?;
     match answer.block {
         Some(block) => Ok(PyBytes::new(model.py(), &block)),
         None if matches!(answer.verdict, Verdict::Unknown(_)) => {
@@ -134,10 +132,13 @@ pub(super) fn check_jointly(
     let inner = model.get();
     let answers = model.py().detach(|| {
         inner.with(|model| {
-            let texts = queries.iter().map(|query| model.add_query(query));
-            let texts: Vec<_> = texts.zip(precisions).collect();
-            let options = options::by_rule_of(model, options);
-            model.check_each_jointly(&texts, &options)
+            let asked = queries.iter().zip(precisions);
+            let asked = asked.map(|(query, precision)| JointQuery {
+                text: model.add_query(query),
+                precision,
+            });
+            let asked: Vec<JointQuery> = asked.collect();
+            model.check_jointly(&asked, &options)
         })
     });
     let answers = answers.map_err(rejected)?;

@@ -14,21 +14,11 @@ use super::convert::{
 };
 use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
-use crate::engine::{
-    Limits, LoadedModel, Options, RareEvent, Reductions, StrategyWanted, TraceWanted,
-};
+use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
 use crate::search::limits::StopReason;
 use crate::search::reachability::report::Order;
 use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
-
-/// Options with the rule for overflows that the model was loaded with.
-pub(super) fn by_rule_of(model: &LoadedModel, options: Options) -> Options {
-    Options {
-        overflow: model.network().overflow,
-        ..options
-    }
-}
 
 /// What ends the work, and what is to be raised in the end unless it is the user or a limit.
 type Cause = (StopReason, Option<PyErr>);

@@ -81,7 +81,6 @@ impl Strategy {
                 let Some(definition) = model.strategy(name).map(|one| one.query.clone()) else {
                     return Ok(None);
                 };
-                let options = options::by_rule_of(model, options);
                 let span = model.add_query(query).span;
                 let strategy = model.permitted_by(name, span, &options)?.strategy;
                 let follower = Follower::new(model.network(), definition, strategy);

@@ -132,20 +132,10 @@ pub enum Reading {
 /// How many slots a dynamic template has at first.
 pub const FIRST_POOL: u32 = 16;
 
-/// Checks and lowers a model; `None` if there are mistakes. The diagnostics are sorted by place.
+/// Checks and lowers a model with the libraries that it may import, and with this number of slots
+/// for the instances of each dynamic template; symbolic readings have one. `None` if there are
+/// mistakes. The diagnostics are sorted by place.
 pub fn analyse(
-    document: &ast::Document,
-    prelude: &[ast::Declaration],
-    sources: &SourceMap,
-    reading: Reading,
-) -> (Option<Model>, Vec<Diagnostic>) {
-    let libraries = Libraries::default();
-    analyse_with(document, prelude, sources, reading, &libraries, FIRST_POOL)
-}
-
-/// The same with the libraries that the model may import, and with this number of slots for the
-/// instances of each dynamic template; symbolic readings have one.
-pub fn analyse_with(
     document: &ast::Document,
     prelude: &[ast::Declaration],
     sources: &SourceMap,
@@ -204,7 +194,8 @@ pub fn is_symbolic(diagnostic: &Diagnostic) -> bool {
 
 impl Model {
     /// Checks and lowers a query; its functions and sites are appended to the network. `strategies`
-    /// are the names of the strategies that exist so far.
+    /// are the names of the strategies that exist so far. Statistical queries need the stochastic
+    /// reading, all others the symbolic one.
     pub fn compile_query(
         &mut self,
         query: &ast::Query,
@@ -214,14 +205,23 @@ impl Model {
         self.compile(sources, |checker| checker.query(query, strategies))
     }
 
-    /// The same for a statistical query; the model is in the stochastic reading.
-    pub fn compile_statistical(
+    /// Checks and lowers what `sup` can measure.
+    pub(crate) fn compile_measure(
         &mut self,
-        query: &ast::Query,
+        expr: &ast::Expr,
         sources: &SourceMap,
-        strategies: &[String],
-    ) -> (Option<ir::StatisticalQuery>, Vec<Diagnostic>) {
-        self.compile(sources, |checker| checker.statistical(query, strategies))
+    ) -> (Option<ir::Measure>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| Some(checker.measure(expr)?.0))
+    }
+
+    /// Checks and lowers what `E` can measure, in the stochastic reading; the function leaves a
+    /// double.
+    pub(crate) fn compile_number(
+        &mut self,
+        expr: &ast::Expr,
+        sources: &SourceMap,
+    ) -> (Option<ir::FunctionId>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| Some(checker.number(expr)?.0))
     }
 
     /// Adds what a query brings to the network.

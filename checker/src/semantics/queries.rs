@@ -3,6 +3,7 @@
 //! A predicate is split only down to clocks and `deadlock`; everything below is one function on the
 //! words.
 
+use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::labels::collapse;
@@ -19,7 +20,8 @@ use crate::syntax::ast;
 impl Checker<'_> {
     /// Checks and lowers a query.
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
-        if let ast::QueryKind::Statistical(_) = &query.kind {
+        if matches!(query.kind, ast::QueryKind::Statistical(_)) && self.reading == Reading::Symbolic
+        {
             self.error(
                 codes::QUERY_UNSUPPORTED,
                 query.formula,
@@ -47,12 +49,11 @@ impl Checker<'_> {
             strategy: name(&query.strategy),
             under: name(&query.under),
             kind,
-            guide: None,
             span: query.span,
         })
     }
 
-    pub(super) fn known_strategy(&mut self, name: &ast::Name, strategies: &[String]) {
+    fn known_strategy(&mut self, name: &ast::Name, strategies: &[String]) {
         if !strategies.contains(&name.text) {
             let help = if strategies.is_empty() {
                 String::from("define it first: strategy S = control: …")
@@ -123,7 +124,11 @@ impl Checker<'_> {
                 }
                 Some(QueryKind::LoadStrategy { file: file.clone() })
             }
-            ast::QueryKind::Statistical(_) | ast::QueryKind::Unsupported(_) => None,
+            ast::QueryKind::Statistical(asked) => {
+                let asked = self.statistical(asked, query.span)?;
+                Some(QueryKind::Statistical(Box::new(asked)))
+            }
+            ast::QueryKind::Unsupported(_) => None,
         }
     }
 
@@ -147,7 +152,8 @@ impl Checker<'_> {
         })
     }
 
-    fn measure(&mut self, item: &ast::Expr) -> Option<(Measure, String)> {
+    /// Checks and lowers what `sup` and `inf` measure, with its text.
+    pub(super) fn measure(&mut self, item: &ast::Expr) -> Option<(Measure, String)> {
         let expr = self.expression(item);
         self.report_members(&expr, item.span);
         if expr.is_error() {
@@ -187,7 +193,10 @@ impl Checker<'_> {
                 let rest = rest.as_ref().map(|rest| self.time_bound(rest));
                 match (bound, rest) {
                     (Some(None), _) | (_, Some(None)) => None,
-                    (bound, rest) => Some(Some((bound.flatten(), rest.flatten()))),
+                    (bound, rest) => Some(Some(ir::TimeBounds {
+                        limit: bound.flatten(),
+                        rest: rest.flatten(),
+                    })),
                 }
             }
         };
@@ -202,12 +211,12 @@ impl Checker<'_> {
                 predicates.into_iter().collect::<Option<Vec<_>>>().map(Some)
             }
         };
-        Some(QueryKind::Control {
+        Some(QueryKind::Control(ir::Control {
             objective: objective?,
             cooperative: control.cooperative,
             time_optimal: time_optimal?,
             observations: observations?,
-        })
+        }))
     }
 
     fn objective(&mut self, objective: &ast::Objective) -> Option<Objective> {

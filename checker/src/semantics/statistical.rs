@@ -2,38 +2,32 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::labels::collapse;
 use super::lower::horizons::curved_number;
 use super::offsets::known_offset;
 use super::typed::{Expr, Kind, Root, conjuncts};
 use super::types::{Memory, Type};
+use crate::diagnostics::Span;
 use crate::exec::arithmetic;
-use crate::ir::{self, Guard, Path, RunBound, RunLimit, ShownItem, Simulation, Statistical};
+use crate::ir::{FunctionId, Guard, Path, RunBound, RunLimit, ShownItem, Simulation, Statistical};
 use crate::syntax::ast;
 
 impl Checker<'_> {
     /// Checks and lowers a statistical query.
     pub(super) fn statistical(
         &mut self,
-        query: &ast::Query,
-        strategies: &[String],
-    ) -> Option<ir::StatisticalQuery> {
-        let ast::QueryKind::Statistical(asked) = &query.kind else {
-            return None;
-        };
-        if let Some(under) = &query.under {
-            self.known_strategy(under, strategies);
-        }
+        asked: &ast::Statistical,
+        span: Span,
+    ) -> Option<Statistical> {
         if self.world.network.features.priorities {
             self.error(
                 codes::QUERY_UNSUPPORTED,
-                query.span,
+                span,
                 "statistical queries are not supported on models with priorities",
                 "remove the priorities of channels and processes",
             );
             return None;
         }
-        let kind = match asked {
+        Some(match asked {
             ast::Statistical::Probability(estimated) => {
                 let (bound, path) = self.estimated(estimated)?;
                 Statistical::Probability(bound, path)
@@ -69,26 +63,12 @@ impl Checker<'_> {
                 value,
             } => {
                 let bound = self.run_bound(bound)?;
-                let value = self.expression(value);
-                self.expect_pure(&value, "a query");
-                if !value.is_error() && !value.ty.is_number() {
-                    self.error(
-                        codes::NUMBER_EXPECTED,
-                        value.span,
-                        format!(
-                            "an expected value is that of a number, but this is {}",
-                            value.ty.described()
-                        ),
-                        "name a clock, or an expression of integers, doubles and clocks",
-                    );
-                    return None;
-                }
-                let range = super::value_ranges::range(&value);
+                let (value, range) = self.number(value)?;
                 Statistical::Expectation {
                     bound,
                     maximum: *maximum,
                     range,
-                    value: self.make_real(value, &[], String::from("query"))?,
+                    value,
                 }
             }
             ast::Statistical::Simulation {
@@ -96,13 +76,28 @@ impl Checker<'_> {
                 items,
                 filter,
             } => Statistical::Simulation(self.simulation(bound, items, filter.as_ref())?),
-        };
-        Some(ir::StatisticalQuery {
-            text: collapse(self.sources.text(query.span)),
-            under: query.under.as_ref().map(|name| name.text.clone()),
-            kind,
-            span: query.span,
         })
+    }
+
+    /// Checks and lowers the number that `E` measures: a function that leaves it as a double, and
+    /// between which numbers it always lies, if that is known.
+    pub(super) fn number(&mut self, value: &ast::Expr) -> Option<(FunctionId, Option<(f64, f64)>)> {
+        let value = self.expression(value);
+        self.expect_pure(&value, "a query");
+        if !value.is_error() && !value.ty.is_number() {
+            self.error(
+                codes::NUMBER_EXPECTED,
+                value.span,
+                format!(
+                    "an expected value is that of a number, but this is {}",
+                    value.ty.described()
+                ),
+                "name a clock, or an expression of integers, doubles and clocks",
+            );
+            return None;
+        }
+        let range = super::value_ranges::range(&value);
+        Some((self.make_real(value, &[], String::from("query"))?, range))
     }
 
     fn simulation(

@@ -68,6 +68,7 @@ use crate::diagnostics::{Diagnostic, Source, SourceMap, Span, Text};
 
 pub use prelude::prelude;
 pub use print::{print_dimension, print_expr, print_type};
+pub(crate) use queries::parse_expression;
 pub use queries::{add_query_text, parse_query};
 pub use tables::{Piece, TableReader};
 

@@ -35,6 +35,18 @@ pub fn parse_query(span: Span, sources: &SourceMap) -> (Option<Query>, Vec<Diagn
     (first.is_none().then_some(query), diagnostics)
 }
 
+/// Parses the expression of a query that stands at `span`; there is no tree if anything was wrong.
+pub(crate) fn parse_expression(span: Span, sources: &SourceMap) -> (Option<Expr>, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let mut parser = Parser::new(span, sources, Dialect::Query, &mut diagnostics);
+    let expr = parser.expression();
+    if !parser.at_end() {
+        parser.expected("the end of the expression");
+    }
+    let is_right = !diagnostics.iter().any(Diagnostic::is_error);
+    (is_right.then_some(expr), diagnostics)
+}
+
 /// Adds a query given as bare text as a source of its own and returns its span.
 pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
     let source = sources.add(Source {

@@ -21,9 +21,9 @@ use std::fs;
 use std::path::Path;
 
 use checker::diagnostics::{Diagnostic, SourceMap};
-use checker::exec::{Context, Executor, Interpreter, RunTimeError};
+use checker::exec::{Context, Executor, Interpreter, Libraries, RunTimeError};
 use checker::ir::{self, Network, Overflow, Predicate, QueryKind, SiteId};
-use checker::semantics::{self, Model, Reading};
+use checker::semantics::{self, FIRST_POOL, Model, Reading};
 use checker::syntax;
 
 use crate::corpus;
@@ -39,8 +39,14 @@ fn load(path: &str, text: &str) -> Loaded {
     let mut sources = SourceMap::default();
     let prelude = syntax::prelude(&mut sources);
     let parsed = syntax::read_model(path, text.as_bytes(), &mut sources);
-    let (model, found) =
-        semantics::analyse(&parsed.document, &prelude, &sources, Reading::Symbolic);
+    let (model, found) = semantics::analyse(
+        &parsed.document,
+        &prelude,
+        &sources,
+        Reading::Symbolic,
+        &Libraries::default(),
+        FIRST_POOL,
+    );
     let mut diagnostics = parsed.diagnostics;
     diagnostics.extend(found);
     Loaded {

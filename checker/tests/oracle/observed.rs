@@ -10,11 +10,11 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use checker::engine::format::machine_json;
-use checker::engine::query::partial_observation::{self, ObservedGame};
+use checker::engine::query::partial_observation;
 use checker::engine::{LoadedModel, Options, Rules, Verdict};
 use checker::game::Forced;
 use checker::game::partial_observation::Machine;
-use checker::ir::QueryKind;
+use checker::ir::{Control, QueryKind};
 use checker::verify::Effort;
 use checker::verify::observed::{Action, MachineState};
 use checker::verify::strategy::Outcome;
@@ -217,11 +217,11 @@ fn check_machine(
 ) -> Result<(), TestCaseError> {
     let text = model.add_query(query);
     let (compiled, _) = model.compile(text.span).expect("it was answered");
-    let QueryKind::Control {
+    let QueryKind::Control(Control {
         objective,
         observations: Some(observations),
         ..
-    } = &compiled.kind
+    }) = &compiled.kind
     else {
         panic!("it is a game with observations");
     };
@@ -255,17 +255,14 @@ fn check_machine(
             let Some(expected) = wins(game, &states) else {
                 continue;
             };
-            let asked = ObservedGame {
-                objective,
-                observations: &observations[..],
-            };
             let rules = Rules {
                 forced,
                 ..Rules::default()
             };
             let checked = partial_observation::verify(
                 network,
-                asked,
+                objective,
+                observations,
                 &states,
                 rules,
                 &mut Effort::up_to(MOST_PLACES),
@@ -597,11 +594,11 @@ fn checks_of_machines_do_not_count_up_to_constants() {
         );
         let text = model.add_query(&query);
         let (compiled, _) = model.compile(text.span).expect("it was answered");
-        let QueryKind::Control {
+        let QueryKind::Control(Control {
             objective,
             observations: Some(observations),
             ..
-        } = &compiled.kind
+        }) = &compiled.kind
         else {
             panic!("it is a game with observations");
         };
@@ -609,14 +606,11 @@ fn checks_of_machines_do_not_count_up_to_constants() {
             machine_json::to_check(&answer.evidence.machine.expect("there is a machine"));
         let acting = states.iter_mut().find(|one| one.action != Action::Wait);
         acting.expect("it stops the belt").action = Action::Wait;
-        let asked = ObservedGame {
-            objective,
-            observations: &observations[..],
-        };
         let rules = options.rules();
         let network = model.network();
         let effort = &mut Effort::up_to(2_000_000);
-        let checked = partial_observation::verify(network, asked, &states, rules, effort);
+        let checked =
+            partial_observation::verify(network, objective, observations, &states, rules, effort);
         assert!(
             matches!(&checked, Ok(Outcome::Violated(..))),
             "{factor}: {checked:?}"

@@ -6,6 +6,7 @@ use std::time::Duration;
 use checker::engine::{CodeEngine, Limits, LoadedModel, Options, Verdict};
 use checker::stochastic::Precision;
 
+use super::joint;
 use crate::checks::{load, try_ask};
 
 fn options(timeout: Option<Duration>) -> Options {
@@ -246,7 +247,7 @@ fn runs_without_end_are_stopped_by_the_time_limit() {
         (&looping, "Pr[<=9](<> n > 5)"),
     ] {
         let mut model = load(model);
-        let queries = [query, "Pr[<=9](<> n > 6)"].map(|query| model.add_query(query));
+        let queries = [query, "Pr[<=9](<> n > 6)"].map(|query| joint(&mut model, query));
         let options = options(Some(Duration::from_millis(100)));
         let answers = model.check_jointly(&queries, &options);
         let answers = answers.unwrap_or_else(|one| panic!("{}", one.rendered.join("\n")));

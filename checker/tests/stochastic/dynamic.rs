@@ -4,7 +4,7 @@
 use checker::diagnostics::SourceMap;
 use checker::engine::{CodeEngine, LoadedModel, Options};
 use checker::exec::{Interpreter, Libraries};
-use checker::ir::Statistical;
+use checker::ir::{QueryKind, Statistical};
 use checker::semantics::{self, Reading};
 use checker::stochastic::{Outcome, Precision, Runner};
 use checker::syntax;
@@ -188,7 +188,7 @@ fn runs_do_not_depend_on_the_number_of_slots() {
         let prelude = syntax::prelude(&mut sources);
         let text = BIRTHS_AND_DEATHS.as_bytes();
         let parsed = syntax::read_model("model.xta", text, &mut sources);
-        let (model, _) = semantics::analyse_with(
+        let (model, _) = semantics::analyse(
             &parsed.document,
             &prelude,
             &sources,
@@ -200,9 +200,12 @@ fn runs_do_not_depend_on_the_number_of_slots() {
         let span = syntax::add_query_text("Pr[<=1](<> numOf(P) >= 4)", &mut sources);
         let (query, _) = syntax::parse_query(span, &sources);
         let query = query.expect("the query is right");
-        let (query, _) = model.compile_statistical(&query, &sources, &[]);
+        let (query, _) = model.compile_query(&query, &sources, &[]);
         let query = query.expect("the query is right");
-        let Statistical::Probability(bound, path) = &query.kind else {
+        let QueryKind::Statistical(asked) = &query.kind else {
+            panic!("it is a statistical query");
+        };
+        let Statistical::Probability(bound, path) = &**asked else {
             panic!("it asks for a probability");
         };
         let network = &model.network;

@@ -8,6 +8,8 @@ use checker::engine::{Answer, CodeEngine, LoadedModel, Options, Rejection};
 use checker::exec::Libraries;
 use checker::stochastic::Precision;
 
+use super::joint;
+
 /// A folder that is gone when the test ends.
 struct Folder(PathBuf);
 
@@ -288,7 +290,7 @@ fn constants_and_hooks_call_libraries() {
     assert!((value("E[<=1;40](max: asked + 0.0)") - 32.0).abs() < 1e-12);
     // Queries that are answered together begin and end once.
     let queries = ["E[<=1;40](max: asked + 0.0)", "E[<=1;40](min: 1 - asked)"];
-    let queries = queries.map(|query| loaded.add_query(query));
+    let queries = queries.map(|query| joint(&mut loaded, query));
     let answers = loaded.check_jointly(&queries, &Options::default());
     let answers = answers.unwrap_or_else(|error| panic!("{}", error.rendered.join("\n")));
     let values = answers
@@ -434,7 +436,7 @@ fn a_function_that_is_not_deterministic_is_found() {
     for code in [CodeEngine::Interpreter, CodeEngine::Jit] {
         let mut model = load(&model, &[&library]).expect("the model is accepted");
         let queries = ["Pr[<=2](<> P.b)", "E[<=2;40](max: n)"];
-        let queries = queries.map(|query| model.add_query(query));
+        let queries = queries.map(|query| joint(&mut model, query));
         let options = Options {
             code,
             ..Options::default()

@@ -6,10 +6,11 @@
 //! passes always.
 
 use checker::diagnostics::{Diagnostic, SourceMap};
-use checker::exec::{Executor, Interpreter, Jit};
-use checker::ir::{Network, RunBound, Simulation, Statistical, StatisticalQuery};
-use checker::semantics::{self, Reading};
-use checker::stochastic::{Failure, Runner};
+use checker::engine::{JointQuery, LoadedModel};
+use checker::exec::{Executor, Interpreter, Jit, Libraries};
+use checker::ir::{Network, QueryKind, RunBound, Simulation, Statistical};
+use checker::semantics::{self, FIRST_POOL, Reading};
+use checker::stochastic::{Failure, Precision, Runner};
 use checker::syntax;
 
 mod bad_input;
@@ -35,6 +36,12 @@ mod rare_events;
 mod refusals;
 mod under;
 mod values;
+
+/// A compiled query with its text.
+struct StatisticalQuery {
+    text: String,
+    kind: Statistical,
+}
 
 /// A model in the stochastic reading, with a compiled query.
 fn load(model: &str, query: &str) -> Result<(Network, StatisticalQuery), String> {
@@ -71,8 +78,14 @@ fn load_all(model: &str, queries: &[&str]) -> Result<(Network, Vec<StatisticalQu
             Err(errors.join("\n"))
         }
     };
-    let (model, more) =
-        semantics::analyse(&parsed.document, &prelude, &sources, Reading::Stochastic);
+    let (model, more) = semantics::analyse(
+        &parsed.document,
+        &prelude,
+        &sources,
+        Reading::Stochastic,
+        &Libraries::default(),
+        FIRST_POOL,
+    );
     found.extend(more);
     text(&found, &sources)?;
     let mut model = model.ok_or("no model")?;
@@ -82,11 +95,26 @@ fn load_all(model: &str, queries: &[&str]) -> Result<(Network, Vec<StatisticalQu
         let (parsed, found) = syntax::parse_query(span, &sources);
         text(&found, &sources)?;
         let parsed = parsed.ok_or("no query")?;
-        let (query, found) = model.compile_statistical(&parsed, &sources, &[]);
+        let (query, found) = model.compile_query(&parsed, &sources, &[]);
         text(&found, &sources)?;
-        compiled.push(query.ok_or("not statistical")?);
+        let query = query.ok_or("no query")?;
+        let QueryKind::Statistical(kind) = query.kind else {
+            return Err("not statistical".to_owned());
+        };
+        compiled.push(StatisticalQuery {
+            text: query.text,
+            kind: *kind,
+        });
     }
     Ok((model.network, compiled))
+}
+
+/// A query that is answered together with others, as exactly as usual.
+fn joint(model: &mut LoadedModel, query: &str) -> JointQuery {
+    JointQuery {
+        text: model.add_query(query),
+        precision: Precision::default(),
+    }
 }
 
 fn executors(network: &Network) -> [Box<dyn Executor>; 2] {

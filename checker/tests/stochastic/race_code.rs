@@ -4,12 +4,12 @@
 //! `NETWORKS=500 cargo test --release --test stochastic race_code::` tries more random networks.
 
 use checker::exec::{Executor, Interpreter, Jit};
-use checker::ir::{Statistical, StatisticalQuery};
+use checker::ir::Statistical;
 use checker::stochastic::{Asked, Failure, Runner};
 
-use crate::load;
 use crate::networks::generate::{Family, network};
 use crate::random::Random;
+use crate::{StatisticalQuery, load};
 
 /// The runs that are compared of a model.
 const RUNS: u64 = 60;

@@ -7,7 +7,7 @@
 //! is searched for, among the states that come before the end of play.
 
 use crate::analysis::Abstraction;
-use crate::ir::{Objective, Predicate, Query, QueryKind};
+use crate::ir::{Control, Objective, Predicate, Query, QueryKind};
 use crate::network::{Extent, Failure, Part, Symbolic};
 use crate::search::Trace;
 use crate::search::reachability::goal::Goal;
@@ -21,7 +21,7 @@ use crate::engine::answer::{Answer, Verdict};
 use crate::engine::limits::{LimitWatch, Limits};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
-use crate::engine::query::subject::{self, Subject};
+use crate::engine::query::problem::{self, Problem};
 use crate::engine::session::walk::{Point, successors_or_failure};
 
 /// The way to the error in a game is searched for among this many times the states that the game
@@ -131,7 +131,7 @@ impl LoadedModel {
         options: &Options,
         answer: &Answer,
     ) -> Option<(Failure, Trace)> {
-        let QueryKind::Control { objective, .. } = kind else {
+        let QueryKind::Control(Control { objective, .. }) = kind else {
             return None;
         };
         let effort = (EFFORT * answer.counters.explored).max(LEAST_EFFORT);
@@ -144,7 +144,7 @@ impl LoadedModel {
             ),
             ..options.limits.clone()
         };
-        let subject = Subject {
+        let problem = Problem {
             network: self.network(),
             executor: self.executor(),
             under: None,
@@ -153,7 +153,7 @@ impl LoadedModel {
             freedom: None,
         };
         let wanted = Abstraction::LowerUpper;
-        let mut symbolic = subject::symbolic(subject, predicates, &[], wanted);
+        let mut symbolic = problem::symbolic(problem, predicates, &[], wanted);
         let mut probe = Probe { predicates };
         let order = Order::BreadthFirst;
         let watch = &mut LimitWatch::new(limits);
@@ -178,16 +178,15 @@ fn is_over_before_the_end(
         .states
         .split_last()
         .map_or(&[][..], |(_, before)| before);
-    let (goal, keep) = match objective {
-        Objective::Reach(goal) => (Some(goal), None),
-        Objective::Until(keep, goal) | Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep)),
-        Objective::Safe(keep) => (None, Some(keep)),
-        Objective::Buchi(..) => return true,
-    };
+    if let Objective::Buchi(..) = objective {
+        return true;
+    }
     before.iter().any(|(words, zone)| {
         let mut words = words.clone();
-        let won = goal.map(|goal| symbolic.extent(goal, &mut words, zone.bounds()));
-        let kept = keep.map(|keep| symbolic.extent(keep, &mut words, zone.bounds()));
+        let won = objective.goal();
+        let won = won.map(|goal| symbolic.extent(goal, &mut words, zone.bounds()));
+        let kept = objective.keep();
+        let kept = kept.map(|keep| symbolic.extent(keep, &mut words, zone.bounds()));
         matches!(won, Some(Ok(Extent::Everywhere))) || matches!(kept, Some(Ok(Extent::Nowhere)))
     })
 }
@@ -201,13 +200,10 @@ fn predicates(kind: &QueryKind) -> Vec<&Predicate> {
         | QueryKind::Eventually(one) => vec![one],
         QueryKind::LeadsTo(cause, effect) => vec![cause, effect],
         QueryKind::Extremum { predicate, .. } => vec![predicate],
-        QueryKind::Control { objective, .. } => match objective {
-            Objective::Reach(one) | Objective::Safe(one) => vec![one],
-            Objective::Until(keep, goal)
-            | Objective::WeakUntil(keep, goal)
-            | Objective::Buchi(keep, goal) => vec![keep, goal],
-        },
-        QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => Vec::new(),
+        QueryKind::Control(control) => control.objective.predicates().collect(),
+        QueryKind::SaveStrategy { .. }
+        | QueryKind::LoadStrategy { .. }
+        | QueryKind::Statistical(_) => Vec::new(),
     }
 }
 

@@ -4,17 +4,17 @@
 use serde_json::Value as Json;
 
 use crate::game::strategy::Strategy;
-use crate::ir::{Network, QueryKind};
+use crate::ir::{Control, Network, QueryKind};
 use crate::verify::Effort;
 
 use super::checked::{Checked, Unreadable};
-use super::strategy_check::{self, Asked, Played};
+use super::strategy_check::{self, Played};
 use super::{certificate, trace_file};
 use crate::engine::format::json_reader::MACHINE_FORMAT;
 use crate::engine::format::{json, machine_json, strategy_json};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Rules;
-use crate::engine::query::partial_observation::{self, ObservedGame};
+use crate::engine::query::partial_observation;
 use crate::engine::rejection::Rejection;
 
 /// Which files are evidence.
@@ -82,13 +82,13 @@ fn check_strategy(
     strategy: &Strategy,
     rules: Rules,
 ) -> Result<Checked, Unreadable> {
-    let Some(asked) = Asked::of(query) else {
+    let Some(control) = query.full_game() else {
         return Err("the query of a strategy over states begins with control:".to_owned());
     };
     let decisions = strategy_check::decisions(network, strategy);
     let played = Played::new(strategy, &decisions);
     let effort = &mut Effort::up_to(strategy_check::MOST_PARTS);
-    let result = strategy_check::verify(network, asked, played, rules, effort);
+    let result = strategy_check::verify(network, control, played, rules, effort);
     Ok(Checked::of_strategy(network, &result).without("states that play by it does not come to"))
 }
 
@@ -99,22 +99,19 @@ fn check_machine(
     file: &Json,
     rules: Rules,
 ) -> Result<Checked, Unreadable> {
-    let QueryKind::Control {
+    let QueryKind::Control(Control {
         objective,
         observations: Some(observations),
         ..
-    } = query
+    }) = query
     else {
         return Err("the query of a machine has observations".to_owned());
     };
     let machine = machine_json::read(network, file, observations.len())
         .map_err(|mismatch| mismatch.to_string())?;
-    let asked = ObservedGame {
-        objective,
-        observations: &observations[..],
-    };
     let effort = &mut Effort::up_to(strategy_check::MOST_PARTS);
-    let result = partial_observation::verify(network, asked, &machine, rules, effort);
+    let result =
+        partial_observation::verify(network, objective, observations, &machine, rules, effort);
     Ok(Checked::of_strategy(network, &result)
         .without("what its states say of where play may be and what is seen there"))
 }

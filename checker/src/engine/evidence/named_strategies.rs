@@ -19,21 +19,11 @@ use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
 use crate::engine::format::strategy_json;
 use crate::engine::limits::{LimitWatch, ended_text, stop_text};
-use crate::engine::loaded_model::{LoadedModel, NamedStrategy, Recipe};
+use crate::engine::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::search::limits::Counters;
-
-/// What a query asks to save or load.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StrategyFile<'q> {
-    /// The file, as the query names it.
-    pub(crate) file: &'q str,
-    /// The name of the strategy.
-    pub(crate) name: &'q str,
-    /// The query.
-    pub(crate) span: Span,
-}
+use crate::semantics::Reading;
 
 impl LoadedModel {
     /// The strategy with this name, as it is saved: one move a state. If it is not made yet, it is
@@ -48,10 +38,10 @@ impl LoadedModel {
         if let Some(strategy) = named.and_then(|one| one.strategy.clone()) {
             return Ok(strategy);
         }
-        let Some(recipe) = named.and_then(|one| one.recipe.clone()) else {
+        let Some(definition) = named.and_then(|one| one.definition.clone()) else {
             return Err(self.no_strategy(name, span, "its query gave none"));
         };
-        match self.made_by(&recipe, None, span, options)? {
+        match self.made_by(&definition, None, span, options)? {
             Ok(strategy) => {
                 if let Some(named) = self.strategy_mut(name) {
                     named.strategy = Some(Arc::clone(&strategy));
@@ -62,37 +52,29 @@ impl LoadedModel {
         }
     }
 
-    /// Makes a strategy that leaves this much to choose. An error of the inner result says why
-    /// there is none; then the next use tries again.
+    /// Makes the strategy of a query, with the code that was wanted for it; it leaves this much to
+    /// choose. An error of the inner result says why there is none; then the next use tries again.
     pub(super) fn made_by(
         &mut self,
-        recipe: &Recipe,
+        definition: &PreparedQuery,
         freedom: Option<Freedom>,
         span: Span,
         options: &Options,
     ) -> Result<Result<Arc<Strategy>, String>, Rejection> {
-        let own = &recipe.options;
-        let with_strategy = Options {
-            strategy: true,
-            limits: options.limits.clone(),
-            ..own.clone()
-        };
-        let with_strategy = match freedom {
-            None => with_strategy,
-            Some(_) => Options {
-                verify: false,
-                plans: None,
-                ..with_strategy
+        let own = &definition.options;
+        self.prepare_code(Reading::Symbolic, own.code, own.tuning, span)?;
+        let is_saved = freedom.is_none();
+        let with_strategy = PreparedQuery {
+            options: Options {
+                strategy: true,
+                verify: own.verify && is_saved,
+                plans: own.plans.filter(|_| is_saved),
+                limits: options.limits.clone(),
+                ..own.clone()
             },
+            ..definition.clone()
         };
-        let answer = self.within_rules_of(recipe, span, options, |model| {
-            model.answer_leaving(
-                &recipe.query,
-                &with_strategy,
-                recipe.within.as_ref(),
-                freedom,
-            )
-        })?;
+        let answer = self.answer_in_zones(&with_strategy, freedom);
         let missing = || match answer.verdict {
             Verdict::Unknown(reason) => stop_text(reason).to_owned(),
             _ => answer
@@ -102,28 +84,12 @@ impl LoadedModel {
         Ok(answer.evidence.strategy.ok_or_else(missing))
     }
 
-    /// Answers something with the code, and the rule for overflows, of a strategy.
-    pub(super) fn within_rules_of(
-        &mut self,
-        recipe: &Recipe,
-        span: Span,
-        options: &Options,
-        answer: impl FnOnce(&LoadedModel) -> Answer,
-    ) -> Result<Answer, Rejection> {
-        self.model.network.overflow = recipe.options.overflow;
-        let prepared = self.prepare_code(recipe.options.code, recipe.options.tuning, span);
-        let answer = prepared.map(|()| answer(self));
-        self.model.network.overflow = options.overflow;
-        answer
-    }
-
     /// The error of a query that needs a strategy that there is not, and why.
     pub(super) fn no_strategy(&self, name: &str, span: Span, reason: &str) -> Rejection {
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let message = format!("there is no strategy '{name}': {reason}");
-        let diagnostic = Diagnostic::new(codes::NO_STRATEGY, span, message)
-            .help(format!("the query was {query}"));
-        Rejection::new(vec![diagnostic], &self.sources)
+        let help = format!("the query was {query}");
+        self.refusal(codes::NO_STRATEGY, span, message, help)
     }
 
     pub(super) fn strategy_mut(&mut self, name: &str) -> Option<&mut NamedStrategy> {
@@ -133,10 +99,11 @@ impl LoadedModel {
     /// Answers `saveStrategy`.
     pub(crate) fn save_strategy(
         &mut self,
-        asked: StrategyFile<'_>,
+        file: &str,
+        name: &str,
+        span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let StrategyFile { file, name, span } = asked;
         let strategy = self.existing_strategy(name, span, options)?;
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let mut watch = LimitWatch::new(options.limits.clone());
@@ -154,7 +121,7 @@ impl LoadedModel {
         let path = self.strategy_path(file, options);
         strategy_place::save(&path, &(text + "\n"), &options.allow_write).map_err(|refusal| {
             let Refusal { message, help } = refusal;
-            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
+            self.refusal(codes::STRATEGY_FILE, span, message, help)
         })?;
         let mut answer = Answer::new(Verdict::Satisfied, Counters::default());
         answer.remark(format!("strategy {name} written to {}", path.display()));
@@ -164,19 +131,22 @@ impl LoadedModel {
     /// Answers `strategy S = loadStrategy("file")`.
     pub(crate) fn load_strategy(
         &mut self,
-        asked: StrategyFile<'_>,
+        file: &str,
+        name: &str,
+        span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let StrategyFile { file, name, span } = asked;
         let path = self.strategy_path(file, options);
         let bytes = strategy_place::load(&path).map_err(|refusal| {
             let Refusal { message, help } = refusal;
-            self.refused(codes::STRATEGY_FILE, span, message, Some(&help))
+            self.refusal(codes::STRATEGY_FILE, span, message, help)
         })?;
         let (query, strategy) =
             strategy_json::read(self.network(), &bytes).map_err(|mismatch| {
                 let message = format!("{}: {mismatch}", path.display());
-                self.refused(codes::STRATEGY_FILE, span, message, mismatch.help)
+                let mut diagnostic = Diagnostic::new(codes::STRATEGY_FILE, span, message);
+                diagnostic.help = mismatch.help.map(str::to_owned);
+                Rejection::new(vec![diagnostic], &self.sources)
             })?;
         let strategy = Arc::new(strategy);
         let states = strategy.states.len();
@@ -210,21 +180,6 @@ impl LoadedModel {
                 )],
             }
         })
-    }
-
-    fn refused(
-        &self,
-        code: crate::diagnostics::Code,
-        span: Span,
-        message: String,
-        help: Option<&str>,
-    ) -> Rejection {
-        let diagnostic = Diagnostic::new(code, span, message);
-        let diagnostic = match help {
-            Some(help) => diagnostic.help(help),
-            None => diagnostic,
-        };
-        Rejection::new(vec![diagnostic], &self.sources)
     }
 
     fn strategy_path(&self, file: &str, options: &Options) -> PathBuf {

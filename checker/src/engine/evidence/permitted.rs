@@ -16,11 +16,11 @@ use std::time::Instant;
 use crate::diagnostics::Span;
 use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Strategy, Under};
-use crate::ir::{Objective, Predicate, Query, QueryKind};
+use crate::ir::{Control, Objective, Predicate, Query, QueryKind};
 
 use crate::engine::answer::{Answer, Verdict};
-use crate::engine::limits::stop_text;
-use crate::engine::loaded_model::{LoadedModel, Permitted, Recipe};
+use crate::engine::limits::{Limits, stop_text};
+use crate::engine::loaded_model::{LoadedModel, Permitted, PreparedQuery};
 use crate::engine::options::{Options, TraceWanted};
 use crate::engine::rejection::Rejection;
 
@@ -40,16 +40,14 @@ impl LoadedModel {
         if let Some(known) = named.and_then(|one| one.permitted.clone()) {
             return Ok(known);
         }
-        let recipe = named.and_then(|one| one.recipe.clone());
+        let definition = named.and_then(|one| one.definition.clone());
         let start = Instant::now();
         // Closed loops of models with stopwatches are not searched.
         let is_searched = !self.network().features.stopwatches;
-        let sought = recipe.as_ref().filter(|_| is_searched).and_then(|recipe| {
-            let goal = goal_of(&recipe.query.kind)?;
-            Some((Arc::clone(recipe), goal.clone()))
-        });
+        let sought = definition.as_ref().filter(|_| is_searched);
+        let sought = sought.and_then(|one| Some((one, goal_of(&one.query.kind)?)));
         let permitted = match sought {
-            Some((recipe, goal)) => match self.freest(name, (&recipe, &goal), span, options)? {
+            Some((definition, goal)) => match self.freest(definition, goal, span, options)? {
                 Ok(permitted) => permitted,
                 Err(reason) => return Err(self.no_strategy(name, span, &reason)),
             },
@@ -68,25 +66,25 @@ impl LoadedModel {
         Ok(permitted)
     }
 
-    /// The greatest set of moves under which the goal is reached in every run; `None` if there is
-    /// none. An error of the inner result says which limit came first.
+    /// The greatest set of moves, of the game of this query, under which the goal is reached in
+    /// every run; `None` if there is none. An error of the inner result says which limit came
+    /// first.
     fn freest(
         &mut self,
-        name: &str,
-        (recipe, goal): (&Recipe, &Predicate),
+        definition: &PreparedQuery,
+        goal: &Predicate,
         span: Span,
         options: &Options,
     ) -> Result<Result<Option<Permitted>, String>, Rejection> {
         let start = Instant::now();
         for freedom in FREEDOMS {
             let options = &options.left_since(start);
-            let strategy = match self.made_by(recipe, Some(freedom), span, options)? {
+            let strategy = match self.made_by(definition, Some(freedom), span, options)? {
                 Ok(strategy) => strategy,
                 Err(reason) => return Ok(Err(reason)),
             };
-            let asked = (recipe, goal);
-            let options = &options.left_since(start);
-            match self.always_reaches(name, asked, (&strategy, span), options)? {
+            let limits = options.limits.left_since(start);
+            match self.always_reaches(definition, goal, &strategy, limits) {
                 Verdict::Satisfied => {
                     let freedom = Some(freedom);
                     return Ok(Ok(Some(Permitted { strategy, freedom })));
@@ -98,40 +96,39 @@ impl LoadedModel {
         Ok(Ok(None))
     }
 
-    /// Whether every run under a strategy reaches the goal.
+    /// Whether every run under a strategy for this query reaches the goal.
     fn always_reaches(
-        &mut self,
-        name: &str,
-        (recipe, goal): (&Recipe, &Predicate),
-        (strategy, span): (&Arc<Strategy>, Span),
-        options: &Options,
-    ) -> Result<Verdict, Rejection> {
-        let query = Query {
-            text: String::new(),
-            strategy: None,
-            under: Some(name.to_owned()),
-            kind: QueryKind::Eventually(goal.clone()),
-            guide: None,
-            span,
-        };
-        let plain = Options {
-            strategy: false,
-            verify: false,
-            plans: None,
-            runs: false,
-            certificate: false,
-            trace: TraceWanted::Any,
-            limits: options.limits.clone(),
-            ..recipe.options.clone()
-        };
-        let under = Arc::new(Under {
-            query: recipe.query.text.clone(),
+        &self,
+        definition: &PreparedQuery,
+        goal: &Predicate,
+        strategy: &Arc<Strategy>,
+        limits: Limits,
+    ) -> Verdict {
+        let under = Under {
+            query: definition.query.text.clone(),
             strategy: Arc::clone(strategy),
-        });
-        let answer = self.within_rules_of(recipe, span, options, |model| {
-            model.answer_within(&query, &plain, Some(&under))
-        })?;
-        Ok(answer.verdict)
+        };
+        let asked = PreparedQuery {
+            query: Query {
+                strategy: None,
+                kind: QueryKind::Eventually(goal.clone()),
+                ..definition.query.clone()
+            },
+            options: Options {
+                strategy: false,
+                verify: false,
+                plans: None,
+                runs: false,
+                certificate: false,
+                trace: TraceWanted::Any,
+                limits,
+                ..definition.options.clone()
+            },
+            guide: None,
+            level: None,
+            under: Some(Arc::new(under)),
+        };
+        self.answer_in_zones(&asked, None).verdict
     }
 
     /// Says in the answer to a query under a strategy what the strategy leaves to choose.
@@ -153,12 +150,12 @@ impl LoadedModel {
 /// The goal of a game to reach something from the start, in any time.
 fn goal_of(query: &QueryKind) -> Option<&Predicate> {
     match query {
-        QueryKind::Control {
+        QueryKind::Control(Control {
             objective: Objective::Reach(goal) | Objective::Until(_, goal),
             cooperative: false,
             time_optimal: None,
             observations: None,
-        } => Some(goal),
+        }) => Some(goal),
         _ => None,
     }
 }

@@ -3,7 +3,7 @@
 use crate::game::strategy::closed_loop;
 use crate::game::strategy::{Decision, Selection, Start, Strategy, Under, Way};
 use crate::game::{Forced, Player, Priorities};
-use crate::ir::{FunctionId, Network, Objective, Predicate, QueryKind};
+use crate::ir::{Control, Network, Objective, Predicate};
 use crate::network::Part;
 use crate::network::symbolic::predicate;
 use crate::search::StopReason;
@@ -27,50 +27,6 @@ use crate::syntax::ast::QueryText;
 
 /// Zones, or regions, that a check looks at before it gives up.
 pub const MOST_PARTS: u64 = 2_000_000;
-
-/// What a control query asks for.
-#[derive(Clone, Copy, Debug)]
-pub struct Asked<'q> {
-    /// The objective.
-    pub objective: &'q Objective,
-    /// Whether it need be enforced only from some state that both players get to together.
-    pub is_cooperative: bool,
-    /// The bounds u and g of `control_t*(u, g)`; `None` for plain `control`.
-    pub time_optimal: Option<(Option<FunctionId>, Option<FunctionId>)>,
-}
-
-impl<'q> Asked<'q> {
-    /// What a query asks for; `None` if it is no control query, or one with observations.
-    pub fn of(query: &'q QueryKind) -> Option<Asked<'q>> {
-        match query {
-            QueryKind::Control {
-                objective,
-                cooperative,
-                time_optimal,
-                observations: None,
-                ..
-            } => Some(Asked {
-                objective,
-                is_cooperative: *cooperative,
-                time_optimal: *time_optimal,
-            }),
-            _ => None,
-        }
-    }
-
-    /// The game that is played within a time limit, if there is one.
-    pub(crate) fn game<'n>(
-        &self,
-        network: &'n Network,
-        limit: Option<i32>,
-    ) -> time_clock::LimitedGame<'n>
-    where
-        'q: 'n,
-    {
-        let rest = self.time_optimal.and_then(|(_, rest)| rest);
-        time_clock::game(network, self.objective, limit, rest)
-    }
-}
 
 /// A strategy as it is checked.
 #[derive(Clone, Copy, Debug)]
@@ -107,7 +63,7 @@ impl<'s> Played<'s> {
 /// query.
 pub fn verify(
     network: &Network,
-    asked: Asked<'_>,
+    control: &Control,
     played: Played<'_>,
     rules: Rules,
     effort: &mut Effort<'_>,
@@ -122,7 +78,7 @@ pub fn verify(
         let outcome = strategy::Outcome::Violated(Box::new(violation), Coverage::default());
         Ok(outcome)
     };
-    if !is_for(network, asked, &played)? {
+    if !is_for(network, control, &played)? {
         return violated_at_once(Defect::OtherGame);
     }
     let start = match played.start {
@@ -139,7 +95,7 @@ pub fn verify(
             None => return violated_at_once(Defect::ImpossibleWay),
         },
     };
-    let game = asked.game(network, played.time_limit);
+    let game = time_clock::game(network, control, played.time_limit);
     let mut claim = claim(&game.objective, played.owner, played.selection, rules);
     let allowed = played
         .under
@@ -160,9 +116,8 @@ impl LoadedModel {
         effort: &mut Effort<'_>,
     ) -> Result<Verification, Rejection> {
         let (query, _) = self.compile(text.span)?;
-        let network = &self.model.network;
-        Ok(match Asked::of(&query.kind) {
-            Some(asked) => verify(network, asked, strategy, rules, effort),
+        Ok(match query.kind.full_game() {
+            Some(control) => verify(self.network(), control, strategy, rules, effort),
             None => Err(verify::Error::Unsupported("queries other than control")),
         })
     }
@@ -217,7 +172,7 @@ fn without_priorities(network: &Network) -> Network {
 /// Whether a strategy with this start and time limit answers the query, if it wins.
 pub(crate) fn is_for(
     network: &Network,
-    asked: Asked<'_>,
+    control: &Control,
     played: &Played<'_>,
 ) -> Result<bool, verify::Error> {
     let Played {
@@ -226,27 +181,28 @@ pub(crate) fn is_for(
         time_limit,
         ..
     } = *played;
-    let has_start = match (asked.is_cooperative, owner) {
+    let has_start = match (control.cooperative, owner) {
         (false, _) => *start == Start::Initial,
         (true, Player::Controller) => *start != Start::Anywhere,
         (true, Player::Environment) => *start == Start::Anywhere,
     };
-    Ok(has_start && is_for_time(network, asked, owner, time_limit)?)
+    Ok(has_start && is_for_time(network, control, owner, time_limit)?)
 }
 
 /// Whether a strategy that wins with a time limit answers the query: the controller is to need
 /// no more time than the query leaves it, the environment to hold out for as long.
 fn is_for_time(
     network: &Network,
-    asked: Asked<'_>,
+    control: &Control,
     owner: Player,
     time_limit: Option<i32>,
 ) -> Result<bool, verify::Error> {
-    let Some((longest, _)) = asked.time_optimal else {
+    let Some(bounds) = control.time_optimal else {
         return Ok(time_limit.is_none());
     };
     let semantics = Semantics::new(network, 1);
     let initial = semantics.initial()?;
+    let longest = bounds.limit;
     let longest = longest.map(|longest| semantics.value(longest, &initial));
     Ok(match (owner, time_limit, longest.transpose()?) {
         (Player::Controller, Some(limit), longest) => {
@@ -265,14 +221,12 @@ pub(crate) fn claim(
     selection: Selection,
     rules: Rules,
 ) -> Claim<'_> {
-    let (goal, keep, aim) = match objective {
-        Objective::Reach(goal) => (Some(goal), None, Aim::Reach),
-        Objective::Until(keep, goal) => (Some(goal), Some(keep), Aim::Reach),
-        Objective::Safe(keep) => (None, Some(keep), Aim::Keep),
-        Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Aim::Keep),
-        Objective::Buchi(keep, goal) => (Some(goal), Some(keep), Aim::Recur),
+    let aim = match objective {
+        Objective::Reach(_) | Objective::Until(..) => Aim::Reach,
+        Objective::Safe(_) | Objective::WeakUntil(..) => Aim::Keep,
+        Objective::Buchi(..) => Aim::Recur,
     };
-    let (constant, has_differences) = constants(goal.into_iter().chain(keep));
+    let (constant, has_differences) = constants(objective.predicates());
     Claim {
         owner: match owner {
             Player::Controller => Owner::Controller,
@@ -280,8 +234,8 @@ pub(crate) fn claim(
         },
         is_permissive: selection == Selection::Any,
         aim,
-        goal,
-        keep,
+        goal: objective.goal(),
+        keep: objective.keep(),
         forcing: match rules.forced {
             Forced::Tiga => Forcing::Component,
             Forced::Product => Forcing::Network,

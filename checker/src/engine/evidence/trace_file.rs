@@ -10,10 +10,10 @@ use crate::verify::{self, Part};
 
 use super::checked::{Checked, Unreadable};
 use super::shown_states;
-use super::strategy_check::Asked;
 use super::witness::{Missing, Proof};
 use crate::engine::format::json_reader::{Difference, integer, only};
 use crate::engine::format::text;
+use crate::engine::query::time_clock;
 
 /// Replays the runs of a file with traces.
 pub(super) fn check_file(
@@ -133,17 +133,14 @@ fn replay_of(
             };
             Claim::Takes(predicate, measure, shown)
         }
-        QueryKind::Control { .. }
-            if trace["priorities"] == "ignore" && network.features.priorities =>
-        {
+        QueryKind::Control(_) if trace["priorities"] == "ignore" && network.features.priorities => {
             let what = verify::Error::Unsupported("plays that ignore the priorities of the model");
             return Ok((Proof::Missing(Missing::NotCovered(what)), Ok(Vec::new())));
         }
-        QueryKind::Control { .. } if trace["kind"] == "play" => {
+        QueryKind::Control(control) if trace["kind"] == "play" => {
             let limit = trace["time_limit"].as_i64();
             let limit = limit.map(|limit| i32::try_from(limit).unwrap_or(i32::MAX));
-            let asked = Asked::of(query).expect("it is a control query");
-            game = asked.game(network, limit);
+            game = time_clock::game(network, control, limit);
             network = &game.network;
             match (trace["winner"].as_str(), &*game.objective) {
                 (None, _) => Claim::Possible,

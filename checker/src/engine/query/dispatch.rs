@@ -1,13 +1,11 @@
 //! From a compiled query to its answer: which search each kind of query takes, within which limits.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use crate::cancellation;
-use crate::game::strategy::Under;
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::game::strategy::freedom::Freedom;
-use crate::ir::{Predicate, Query, QueryKind};
+use crate::ir::{Predicate, QueryKind};
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Symmetry};
 use crate::search::limits::StopReason;
@@ -16,51 +14,43 @@ use crate::zones::{Bound, wide};
 
 use super::extremum::extremum;
 use super::liveness::{always, leads_to};
-use super::partial_observation::ObservedGame;
+use super::problem::{Followed, Problem};
 use super::reachable::reachable;
-use super::subject::{Followed, Subject};
-use super::time_optimal::{Race, fastest};
+use super::time_optimal::fastest;
 use super::{game, partial_observation, time_clock};
 use crate::engine::answer::{Answer, Verdict};
-use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{CLOCKS_GREW, LimitWatch, OUT_OF_STATES};
-use crate::engine::loaded_model::LoadedModel;
-use crate::engine::options::Options;
+use crate::engine::loaded_model::{LoadedModel, PreparedQuery};
 
 impl LoadedModel {
-    /// Answers a query that is no file operation, under this strategy.
-    pub(crate) fn answer_within(
+    /// Answers a query by a search or a game; a strategy to reach something leaves this much to
+    /// choose.
+    pub(in crate::engine) fn answer_in_zones(
         &self,
-        query: &Query,
-        options: &Options,
-        within: Option<&Arc<Under>>,
-    ) -> Answer {
-        self.answer_leaving(query, options, within, None)
-    }
-
-    /// The same; a strategy to reach something leaves this much to choose.
-    pub(crate) fn answer_leaving(
-        &self,
-        query: &Query,
-        options: &Options,
-        within: Option<&Arc<Under>>,
+        prepared: &PreparedQuery,
         freedom: Option<Freedom>,
     ) -> Answer {
-        let time_limit = within.and_then(|within| within.strategy.time_limit);
-        let network = time_clock::with_limit(&self.model.network, time_limit);
-        let under = within.map(|within| ClosedLoop::new(&network, &within.strategy));
-        let subject = Subject {
+        let PreparedQuery {
+            query,
+            options,
+            guide,
+            under,
+            ..
+        } = prepared;
+        let under = under.as_ref();
+        let time_limit = under.and_then(|under| under.strategy.time_limit);
+        let network = time_clock::with_limit(self.network(), time_limit);
+        let moves = under.map(|under| ClosedLoop::new(&network, &under.strategy));
+        let followed = moves.as_ref().zip(under);
+        let problem = Problem {
             network: &network,
             executor: self.executor(),
-            under: under
-                .as_ref()
-                .zip(within)
-                .map(|(moves, strategy)| Followed { moves, strategy }),
+            under: followed.map(|(moves, strategy)| Followed { moves, strategy }),
             options,
-            guide: query.guide,
+            guide: *guide,
             freedom,
         };
-        let mut answer = answer(subject, query);
+        let mut answer = answer_within_limits(problem, &query.kind);
         if time_limit.is_some() && query.strategy.is_none() {
             answer.evidence.forget_last_clock();
         }
@@ -68,18 +58,17 @@ impl LoadedModel {
     }
 }
 
-/// Answers a query that [`crate::engine::LoadedModel`] has accepted.
-fn answer(subject: Subject<'_>, query: &Query) -> Answer {
-    let options = subject.options;
+/// Answers a query that [`LoadedModel`] has accepted.
+fn answer_within_limits(problem: Problem<'_>, query: &QueryKind) -> Answer {
+    let options = problem.options;
     wide::start();
-    let start = Instant::now();
-    let zone_bytes = subject.network.clocks.len().pow(2) * size_of::<Bound>();
-    let at_hand_bytes = (zones_in_use(&query.kind) * zone_bytes) as u64;
+    let zone_bytes = problem.network.clocks.len().pow(2) * size_of::<Bound>();
+    let at_hand_bytes = (zones_in_use(query) * zone_bytes) as u64;
     let mut watch = LimitWatch::with_at_hand(options.limits.clone(), at_hand_bytes);
     let result = watch.bound(|watch| {
         // Where there are thousands of clocks this alone may be too much.
         cancellation::ask_for(zone_bytes);
-        answer_within(subject, query, watch)
+        dispatch(problem, query, watch)
     });
     let mut answer =
         result.unwrap_or_else(|(reason, counters)| Answer::new(Verdict::Unknown(reason), counters));
@@ -98,10 +87,9 @@ fn answer(subject: Subject<'_>, query: &Query) -> Answer {
         answer.remark(OUT_OF_STATES);
     }
     if options.plans.is_some() {
-        game::note_missing_plans(&mut answer, &query.kind, subject.under.is_some());
+        game::note_missing_plans(&mut answer, query, problem.under.is_some());
     }
-    answer.seconds = start.elapsed().as_secs_f64();
-    answer.peak_bytes = watch.peak_bytes().max(answer.counters.bytes);
+    watch.measure(&mut answer);
     answer
 }
 
@@ -115,33 +103,33 @@ fn zones_in_use(kind: &QueryKind) -> usize {
             1
         }
         QueryKind::Extremum { .. } => 1,
-        QueryKind::Control { .. } => 4,
+        QueryKind::Control(_) => 4,
         _ => 8,
     }
 }
 
-/// The same, within the limits.
-fn answer_within(subject: Subject<'_>, query: &Query, watch: &mut LimitWatch) -> Answer {
-    match &query.kind {
-        QueryKind::Reachable(goal) => reduced(subject, |symmetry| {
-            reachable(subject, goal, symmetry, watch)
+/// What answers each kind of query.
+fn dispatch(problem: Problem<'_>, query: &QueryKind, watch: &mut LimitWatch) -> Answer {
+    match query {
+        QueryKind::Reachable(goal) => reduced(problem, |symmetry| {
+            reachable(problem, goal, symmetry, watch)
         }),
         QueryKind::Invariantly(invariant) => {
             let broken = invariant.negated();
-            let answer = reduced(subject, |symmetry| {
-                reachable(subject, &broken, symmetry, watch)
+            let answer = reduced(problem, |symmetry| {
+                reachable(problem, &broken, symmetry, watch)
             });
             answer.negated()
         }
-        QueryKind::PotentiallyAlways(keep) => always(subject, keep, watch),
+        QueryKind::PotentiallyAlways(keep) => always(problem, keep, watch),
         QueryKind::Eventually(goal) => {
             let keep = goal.negated();
-            always(subject, &keep, watch).negated()
+            always(problem, &keep, watch).negated()
         }
         QueryKind::LeadsTo(cause, effect) => {
             let open = Predicate::And(vec![cause.clone(), effect.negated()]);
             let keep = effect.negated();
-            leads_to(subject, &open, &keep, watch)
+            leads_to(problem, &open, &keep, watch)
         }
         QueryKind::Extremum {
             least,
@@ -154,50 +142,23 @@ fn answer_within(subject: Subject<'_>, query: &Query, watch: &mut LimitWatch) ->
                 items,
                 least: *least,
                 greatest: *greatest,
-                further: subject.atoms(),
+                further: problem.atoms(),
             };
-            reduced(subject, |symmetry| {
-                extremum(subject, question, symmetry, watch)
+            reduced(problem, |symmetry| {
+                extremum(problem, question, symmetry, watch)
             })
         }
-        QueryKind::Control {
-            objective,
-            time_optimal: Some((limit, rest)),
-            ..
-        } => {
-            let (limit, rest) = (*limit, *rest);
-            let race = Race {
-                objective,
-                limit,
-                rest,
-            };
-            fastest(subject, &race, watch)
-        }
-        QueryKind::Control {
-            objective,
-            observations: Some(observations),
-            ..
-        } => {
-            let asked = ObservedGame {
-                objective,
-                observations: &observations[..],
-            };
-            partial_observation::game(subject, asked, watch)
-        }
-        QueryKind::Control {
-            objective,
-            cooperative,
-            ..
-        } => {
-            let asked = Asked {
-                objective,
-                is_cooperative: *cooperative,
-                time_optimal: None,
-            };
-            game::game(subject, asked, watch)
-        }
-        QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
-            unreachable!("strategies are saved and loaded elsewhere")
+        QueryKind::Control(control) => match (control.time_optimal, &control.observations) {
+            (Some(bounds), _) => fastest(problem, control, bounds, watch),
+            (None, Some(observations)) => {
+                partial_observation::game(problem, &control.objective, observations, watch)
+            }
+            (None, None) => game::game(problem, control, watch),
+        },
+        QueryKind::SaveStrategy { .. }
+        | QueryKind::LoadStrategy { .. }
+        | QueryKind::Statistical(_) => {
+            unreachable!("neither files nor random runs need zones")
         }
     }
 }
@@ -207,12 +168,12 @@ fn answer_within(subject: Subject<'_>, query: &Query, watch: &mut LimitWatch) ->
 /// which a quantifier runs through members. So a failure that is found in this way is searched
 /// again among all states.
 fn reduced(
-    subject: Subject<'_>,
+    problem: Problem<'_>,
     mut answer: impl FnMut(Option<&Arc<Symmetry>>) -> Answer,
 ) -> Answer {
-    let is_allowed = subject.options.reductions.symmetry && subject.under.is_none();
+    let is_allowed = problem.options.reductions.symmetry && problem.under.is_none();
     let symmetry = is_allowed
-        .then(|| Symmetry::of_network(subject.network))
+        .then(|| Symmetry::of_network(problem.network))
         .flatten();
     let first = answer(symmetry.as_ref());
     match first.verdict {

@@ -14,7 +14,7 @@ use crate::search::reachability::search;
 use crate::verify::replay::Shown;
 
 use super::optimal_trace::{Sought, best, not_the_best};
-use super::subject::{Subject, live_variables, symbolic};
+use super::problem::{Problem, live_variables, symbolic};
 use super::witnesses::{Witnesses, found};
 use crate::engine::answer::{Answer, Evidence, Values, Verdict};
 use crate::engine::evidence::timed_run::{Shows, Takes};
@@ -23,27 +23,27 @@ use crate::engine::limits::LimitWatch;
 
 /// The least and greatest values.
 pub(super) fn extremum(
-    subject: Subject<'_>,
+    problem: Problem<'_>,
     question: Question<'_>,
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let options = subject.options;
+    let options = problem.options;
     let read = predicate::functions(question.predicate).into_iter();
     let read = read.chain(question.items.iter().filter_map(|(item, _)| match *item {
         Measure::Integer(function) => Some(function),
         Measure::Clock(clock) => predicate::chooser(clock),
     }));
-    let live = live_variables(subject, read, symmetry);
+    let live = live_variables(problem, read, symmetry);
     let mut zones = |further: &[ClockAtom]| {
         let predicates = [question.predicate];
-        symbolic(subject, &predicates, further, Abstraction::LowerUpper)
+        symbolic(problem, &predicates, further, Abstraction::LowerUpper)
             .reduced_by(symmetry.cloned())
             .forgetting(live.clone())
     };
     let report = extremum::search(
         question,
-        subject.network,
+        problem.network,
         &mut zones,
         options.manner(),
         watch,
@@ -76,7 +76,7 @@ pub(super) fn extremum(
         && (options.runs || report.is_approximate)
     {
         let mut runs = Runs {
-            subject,
+            problem,
             question,
             witnesses: Vec::new(),
             why_not_best: None,
@@ -100,7 +100,7 @@ pub(super) fn extremum(
 
 /// Runs to states with the values that were found.
 struct Runs<'q> {
-    subject: Subject<'q>,
+    problem: Problem<'q>,
     question: Question<'q>,
     witnesses: Vec<Witness>,
     /// Why some are any ones where the best were wanted.
@@ -150,7 +150,7 @@ impl Runs<'_> {
         mut symbolic: Symbolic<'_>,
         watch: &mut LimitWatch,
     ) -> Option<Verdict> {
-        let options = self.subject.options;
+        let options = self.problem.options;
         let search = || search::search_shared(&mut symbolic, &mut taking, options.manner(), watch);
         let report = cancellation::unless_cut(search).ok()?;
         let Ok(Outcome::Found(trace)) = report.outcome else {
@@ -162,7 +162,7 @@ impl Runs<'_> {
             predicate: self.question.predicate,
             atoms,
         };
-        let (trace, deadline) = match best(self.subject, &mut symbolic, sought, watch) {
+        let (trace, deadline) = match best(self.problem, &mut symbolic, sought, watch) {
             Ok(None) => (trace, None),
             Ok(Some((best, deadline))) => (best, deadline),
             Err(reason) => {

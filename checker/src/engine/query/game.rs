@@ -18,7 +18,7 @@ use crate::game::strategy::freedom::{self, Freedom};
 use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
-use crate::ir::{ClockAtom, Objective, Predicate, QueryKind};
+use crate::ir::{ClockAtom, Control, Objective, Predicate, QueryKind};
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::{StopReason, Watch};
@@ -33,9 +33,8 @@ use super::game_zones::{
     IGNORED_PRIORITIES, add_check, can_be_discrete, objective_atoms, zones_of,
 };
 use super::plans::add_plans;
-use super::subject::{Subject, has_differences};
+use super::problem::{Problem, has_differences};
 use crate::engine::answer::{Answer, Verdict, Wanted};
-use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 
 /// What is said where plans are wanted of a game for which none are listed.
@@ -44,11 +43,11 @@ const NO_PLANS: &str = "plans are listed for control: A<> and A[ U ] only, and n
 /// Adds a remark if plans are wanted of a game that sees everything but for which none are listed,
 /// whoever wins.
 pub(super) fn note_missing_plans(answer: &mut Answer, query: &QueryKind, is_under: bool) {
-    let Some(asked) = Asked::of(query) else {
+    let Some(control) = query.full_game() else {
         return;
     };
-    let has_plans = can_race(asked.objective) && !asked.is_cooperative && !is_under;
-    if !has_plans || asked.time_optimal.is_some() {
+    let has_plans = can_race(&control.objective) && !control.cooperative && !is_under;
+    if !has_plans || control.time_optimal.is_some() {
         answer.remark(NO_PLANS);
     }
 }
@@ -59,15 +58,11 @@ fn can_race(objective: &Objective) -> bool {
 }
 
 /// Names the part of a game query that there is no algorithm for.
-pub(crate) fn unsupported_game(
-    objective: &Objective,
-    is_time_optimal: bool,
-    is_cooperative: bool,
-    has_observations: bool,
-) -> Option<&'static str> {
-    if has_observations && matches!(objective, Objective::Buchi(..)) {
+pub(crate) fn unsupported_game(control: &Control) -> Option<&'static str> {
+    let objective = &control.objective;
+    if control.observations.is_some() && matches!(objective, Objective::Buchi(..)) {
         Some("observations and A[] (p && A<> q)")
-    } else if is_time_optimal && (is_cooperative || !can_race(objective)) {
+    } else if control.time_optimal.is_some() && (control.cooperative || !can_race(objective)) {
         Some("control_t* and other objectives than A<> and A[ U ]")
     } else {
         None
@@ -75,8 +70,8 @@ pub(crate) fn unsupported_game(
 }
 
 /// Answers a game query.
-pub(super) fn game(subject: Subject<'_>, asked: Asked<'_>, watch: &mut LimitWatch) -> Answer {
-    let game = Game::new(subject, asked);
+pub(super) fn game(problem: Problem<'_>, control: &Control, watch: &mut LimitWatch) -> Answer {
+    let game = Game::new(problem, control);
     let mut explored = 0;
     let play = |attempt| {
         let mut end = game.play(attempt, watch);
@@ -92,8 +87,8 @@ pub(super) fn game(subject: Subject<'_>, asked: Asked<'_>, watch: &mut LimitWatc
 
 /// The game of a query.
 struct Game<'a> {
-    subject: Subject<'a>,
-    asked: Asked<'a>,
+    problem: Problem<'a>,
+    control: &'a Control,
     /// The comparisons of clocks that its zones keep.
     atoms: Vec<ClockAtom>,
 }
@@ -135,68 +130,65 @@ struct Sides<'q> {
 }
 
 impl<'q> Sides<'q> {
-    fn of(objective: &'q Objective) -> Sides<'q> {
-        let (goal, keep, seeker) = match objective {
-            Objective::Reach(goal) => (Some(goal), None, Player::Controller),
-            Objective::Until(keep, goal) => (Some(goal), Some(keep), Player::Controller),
-            Objective::Safe(keep) => (None, Some(keep), Player::Environment),
-            Objective::WeakUntil(keep, goal) => (Some(goal), Some(keep), Player::Environment),
+    fn new(objective: &'q Objective) -> Sides<'q> {
+        let goal = match objective {
             Objective::Buchi(keep, goal) => {
                 let recurring = Predicate::And(vec![keep.clone(), goal.clone()]);
-                return Sides {
-                    goal: Some(Cow::Owned(recurring)),
-                    keep: Some(keep),
-                    seeker: Player::Controller,
-                };
+                Some(Cow::Owned(recurring))
             }
+            _ => objective.goal().map(Cow::Borrowed),
+        };
+        let seeker = match objective {
+            Objective::Safe(_) | Objective::WeakUntil(..) => Player::Environment,
+            _ => Player::Controller,
         };
         Sides {
-            goal: goal.map(Cow::Borrowed),
-            keep,
+            goal,
+            keep: objective.keep(),
             seeker,
         }
     }
 }
 
 impl<'a> Game<'a> {
-    fn new(subject: Subject<'a>, asked: Asked<'a>) -> Game<'a> {
-        let mut atoms = objective_atoms(asked.objective);
-        atoms.extend(subject.atoms().iter().cloned());
+    fn new(problem: Problem<'a>, control: &'a Control) -> Game<'a> {
+        let mut atoms = objective_atoms(&control.objective);
+        atoms.extend(problem.atoms().iter().cloned());
         Game {
-            subject,
-            asked,
+            problem,
+            control,
             atoms,
         }
     }
 
     fn is_recurring(&self) -> bool {
-        matches!(self.asked.objective, Objective::Buchi(..))
+        matches!(self.control.objective, Objective::Buchi(..))
     }
 
     fn is_strategy_wanted(&self) -> bool {
-        self.subject.options.strategy || self.subject.options.verify
+        self.problem.options.strategy || self.problem.options.verify
     }
 
     /// How many plans are wanted, if the game has plans.
     fn plans(&self) -> Option<usize> {
-        let has_plans = can_race(self.asked.objective)
-            && !self.asked.is_cooperative
-            && self.subject.under.is_none();
-        self.subject.options.plans.filter(|_| has_plans)
+        let has_plans = can_race(&self.control.objective)
+            && !self.control.cooperative
+            && self.problem.under.is_none();
+        self.problem.options.plans.filter(|_| has_plans)
     }
 
     /// The graphs in which the game is played: with zones, until these are many for each discrete
     /// state, then with one node for each, and if that takes too much with zones after all. Where
     /// two clocks are compared, without abstraction first.
     fn attempts(&self) -> Vec<Attempt> {
-        let options = self.subject.options;
+        let options = self.problem.options;
         let in_zones = |abstraction, nodes| Attempt {
             abstraction,
             nodes,
             allowance: None,
             doubt: Doubt::Nothing,
         };
-        if has_differences(self.subject.network, &self.atoms) {
+        if has_differences(self.problem.network, &self.atoms) {
             let without_abstraction = Attempt {
                 allowance: Some(WITHOUT_ABSTRACTION),
                 doubt: Doubt::ClockRange,
@@ -216,9 +208,9 @@ impl<'a> Game<'a> {
             doubt: Doubt::AnyFailure,
             ..in_zones(Abstraction::Exact, Nodes::Discrete)
         };
-        let network = self.subject.network;
-        let can_be_discrete = self.subject.under.is_none()
-            && can_be_discrete(network, self.asked.is_cooperative, options);
+        let network = self.problem.network;
+        let can_be_discrete = self.problem.under.is_none()
+            && can_be_discrete(network, self.control.cooperative, options);
         let last = in_symbolic_states(Nodes::Symbolic);
         match options.nodes {
             Nodes::Automatic if can_be_discrete => {
@@ -235,7 +227,7 @@ impl<'a> Game<'a> {
 
     /// Plays the game once.
     fn play(&self, attempt: Attempt, watch: &mut dyn Watch) -> AttemptEnd {
-        let sides = Sides::of(self.asked.objective);
+        let sides = Sides::new(&self.control.objective);
         let mut symbolic = self.zones(attempt.abstraction, &sides);
         let mut zones_of_runs = symbolic.another();
         let objective = self.objective(&sides);
@@ -247,12 +239,12 @@ impl<'a> Game<'a> {
             Ok(graph) => graph,
             Err(failure) => return Answer::failed(failure).into(),
         };
-        if self.subject.freedom.is_some() {
+        if self.problem.freedom.is_some() {
             graph.disable_chains();
         }
-        let mut solver = Solver::new(&mut graph, sides.seeker, self.subject.options.forced);
-        solver.be_guided_by(self.subject.guide);
-        solver.share_among(self.subject.options.thread_count());
+        let mut solver = Solver::new(&mut graph, sides.seeker, self.problem.options.forced);
+        solver.be_guided_by(self.problem.guide);
+        solver.share_among(self.problem.options.thread_count());
         solver.give_up_beyond(attempt.allowance);
         if attempt.nodes == Nodes::Automatic {
             solver.set_crowd_limit(STATES_BEFORE_CROWD, CROWD);
@@ -286,15 +278,15 @@ impl<'a> Game<'a> {
         if let Some(most) = self.plans() {
             add_plans(&mut answer, &mut solver, most, watch);
         }
-        if !self.subject.options.want_strategy_of(winner) {
+        if !self.problem.options.want_strategy_of(winner) {
             return answer.into();
         }
         let solved = Solved {
             winner,
             rounds: self.is_recurring().then_some(&rounds[..]),
             zones: &mut zones_of_runs,
-            options: self.subject.options,
-            freedom: self.subject.freedom,
+            options: self.problem.options,
+            freedom: self.problem.freedom,
         };
         let has_given_up = self.find_strategy(&mut solver, solved, &mut answer, watch);
         AttemptEnd {
@@ -312,7 +304,7 @@ impl<'a> Game<'a> {
         answer: &mut Answer,
         watch: &mut dyn Watch,
     ) -> bool {
-        let strategy = if self.asked.is_cooperative {
+        let strategy = if self.control.cooperative {
             cut_as_interrupted(|| cooperative::strategy(solver, solved, watch))
         } else {
             let explored = cut_as_interrupted(|| solver.explore_dead_ends(watch));
@@ -351,18 +343,18 @@ impl<'a> Game<'a> {
     /// The zones of the game. A strategy says what to do in states with all their values, and plans
     /// have such states; where neither is wanted, values that nothing reads any more are forgotten.
     fn zones(&self, abstraction: Abstraction, sides: &Sides<'_>) -> Symbolic<'a> {
-        let symbolic = zones_of(self.subject, &self.atoms, abstraction);
-        let options = self.subject.options;
+        let symbolic = zones_of(self.problem, &self.atoms, abstraction);
+        let options = self.problem.options;
         let forgets = options.reductions.live_variables
             && !self.is_strategy_wanted()
             && options.plans.is_none()
-            && self.subject.under.is_none();
+            && self.problem.under.is_none();
         if !forgets {
             return symbolic;
         }
         let read = [sides.goal.as_deref(), sides.keep].into_iter().flatten();
         let read = read.flat_map(predicate::functions);
-        let live = LiveVariables::new(self.subject.network, read, false);
+        let live = LiveVariables::new(self.problem.network, read, false);
         symbolic.forgetting(live.map(Arc::new))
     }
 
@@ -377,9 +369,9 @@ impl<'a> Game<'a> {
             // anywhere. Under a strategy the controller may be obliged to move there, and lose for
             // having no move.
             leaves_dead_ends: !self.is_recurring()
-                && self.subject.under.is_none()
+                && self.problem.under.is_none()
                 && (!self.is_strategy_wanted()
-                    || (sides.seeker == Player::Controller && !self.asked.is_cooperative)),
+                    || (sides.seeker == Player::Controller && !self.control.cooperative)),
         }
     }
 
@@ -392,7 +384,7 @@ impl<'a> Game<'a> {
         watch: &mut dyn Watch,
     ) -> Result<Solution, Failure> {
         let is_strategy_wanted = self.is_strategy_wanted();
-        let is_cooperative = self.asked.is_cooperative;
+        let is_cooperative = self.control.cooperative;
         if is_cooperative && is_strategy_wanted {
             solver.graph.disable_chains();
         }
@@ -404,7 +396,7 @@ impl<'a> Game<'a> {
             return solver.solve_cooperative(watch);
         }
         let extent = match self.plans() {
-            _ if self.subject.freedom.is_some() => Extent::Everything,
+            _ if self.problem.freedom.is_some() => Extent::Everything,
             Some(most) if most > 1 => Extent::Everything,
             // A strategy that keeps out of what was not explored would not be the most permissive
             // one.
@@ -416,9 +408,9 @@ impl<'a> Game<'a> {
 
     /// Adds the winner's strategy, with its check if that is wanted.
     fn add_strategy(&self, answer: &mut Answer, mut strategy: Strategy, watch: &mut dyn Watch) {
-        strategy.under = self.subject.under.map(|under| Arc::clone(under.strategy));
-        if self.subject.options.verify {
-            add_check(answer, self.subject, self.asked, &strategy, watch);
+        strategy.under = self.problem.under.map(|under| Arc::clone(under.strategy));
+        if self.problem.options.verify {
+            add_check(answer, self.problem, self.control, &strategy, watch);
         }
         answer.evidence.strategy = Some(Arc::new(strategy));
     }

@@ -4,16 +4,16 @@ use crate::analysis::{Abstraction, ClockBounds};
 use crate::cancellation::{self, Cut};
 use crate::game::Priorities;
 use crate::game::strategy::Strategy;
-use crate::ir::{ClockAtom, Network, Objective};
+use crate::ir::{ClockAtom, Control, Network, Objective};
 use crate::network::symbolic::predicate;
 use crate::network::{Restriction, Stepper, Symbolic};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::verify::strategy::{Coverage, Outcome};
 use crate::verify::{Effort, GivenUp};
 
-use super::subject::Subject;
+use super::problem::Problem;
 use crate::engine::answer::{Answer, Verification, Wanted};
-use crate::engine::evidence::strategy_check::{self, Asked, Played};
+use crate::engine::evidence::strategy_check::{self, Played};
 use crate::engine::options::Options;
 
 /// What is said of a game whose model has priorities.
@@ -23,19 +23,19 @@ pub(super) const IGNORED_PRIORITIES: &str =
 /// The zones of games: with the priorities of the network, if they are to count, and within the
 /// strategy that the game is played under.
 pub(super) fn zones_of<'a>(
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     atoms: &[ClockAtom],
     abstraction: Abstraction,
 ) -> Symbolic<'a> {
-    let tuning = subject.options.tuning;
-    let bounds = ClockBounds::new(subject.network, atoms, abstraction, tuning);
-    let stepper = Stepper::tuned(subject.network, subject.executor, tuning);
+    let tuning = problem.options.tuning;
+    let bounds = ClockBounds::new(problem.network, atoms, abstraction, tuning);
+    let stepper = Stepper::tuned(problem.network, problem.executor, tuning);
     let symbolic = Symbolic::new(stepper, bounds);
-    let symbolic = match subject.options.priorities {
+    let symbolic = match problem.options.priorities {
         Priorities::Kept => symbolic,
         Priorities::Ignored => symbolic.without_priorities(),
     };
-    let followed = subject.under.map(|under| under.moves as &dyn Restriction);
+    let followed = problem.under.map(|under| under.moves as &dyn Restriction);
     symbolic.restricted(followed)
 }
 
@@ -51,30 +51,22 @@ pub(super) fn can_be_discrete(network: &Network, is_cooperative: bool, options: 
 
 /// The clock comparisons of an objective.
 pub(super) fn objective_atoms(objective: &Objective) -> Vec<ClockAtom> {
-    let (one, other) = match objective {
-        Objective::Reach(goal) => (goal, None),
-        Objective::Safe(keep) => (keep, None),
-        Objective::Until(keep, goal)
-        | Objective::WeakUntil(keep, goal)
-        | Objective::Buchi(keep, goal) => (keep, Some(goal)),
-    };
-    let both = std::iter::once(one).chain(other);
-    both.flat_map(predicate::atoms).collect()
+    objective.predicates().flat_map(predicate::atoms).collect()
 }
 
 /// Checks a strategy in closed loop, and adds how that ended.
 pub(super) fn add_check(
     answer: &mut Answer,
-    subject: Subject<'_>,
-    asked: Asked<'_>,
+    problem: Problem<'_>,
+    control: &Control,
     strategy: &Strategy,
     watch: &mut dyn Watch,
 ) {
-    add_check_by(answer, subject.options, watch, |effort| {
-        let decisions = strategy_check::decisions(subject.network, strategy);
+    add_check_by(answer, problem.options, watch, |effort| {
+        let decisions = strategy_check::decisions(problem.network, strategy);
         let played = Played::new(strategy, &decisions);
-        let rules = subject.options.rules();
-        strategy_check::verify(subject.network, asked, played, rules, effort)
+        let rules = problem.options.rules();
+        strategy_check::verify(problem.network, control, played, rules, effort)
     });
 }
 

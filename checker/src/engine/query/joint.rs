@@ -3,180 +3,205 @@
 
 use std::time::Instant;
 
-use super::prepared::{begin_libraries, without_runs};
-use super::statistical::{remark, verdict};
-use crate::diagnostics::Diagnostic;
-use crate::engine::answer::Answer;
+use super::libraries::begin_libraries;
+use super::statistical::{concluded, precision_of, without_runs};
+use crate::engine::answer::{Answer, Verdict};
 use crate::engine::codes;
 use crate::engine::limits::LimitWatch;
-use crate::engine::loaded_model::{LoadedModel, StochasticModel};
+use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
-use crate::ir::{Statistical, StatisticalQuery};
+use crate::ir::{Query, QueryKind, Statistical};
 use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::{Behaviour, Estimate, Precision, bound_of, estimate_jointly};
+use crate::semantics::Reading;
+use crate::stochastic::{Behaviour, Estimate, Failure, Precision, bound_of, estimate_jointly};
 use crate::syntax::ast::QueryText;
 
+/// A query that is answered together with others.
+#[derive(Clone, Debug)]
+pub struct JointQuery {
+    /// Its text.
+    pub text: QueryText,
+    /// How exact its answer is to be.
+    pub precision: Precision,
+}
+
+/// A compiled query that is answered together with others.
+struct Member {
+    query: Query,
+    asked: Statistical,
+    /// How exact the answer is to be, so that all intervals hold together.
+    precision: Precision,
+    warnings: Vec<String>,
+}
+
 impl LoadedModel {
-    /// Answers queries for probabilities and means from the same runs.
+    /// Answers queries for probabilities and means from the same runs, each as exactly as it says
+    /// itself.
     pub fn check_jointly(
         &mut self,
-        queries: &[QueryText],
+        queries: &[JointQuery],
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
-        let asked = |query: &QueryText| (query.clone(), options.precision);
-        let queries: Vec<(QueryText, Precision)> = queries.iter().map(asked).collect();
-        self.check_each_jointly(&queries, options)
+        self.with_room(|model| model.check_jointly_once(queries, options))
     }
 
-    /// The same with what is asked of each query, in place of what `options` say of precision.
-    pub fn check_each_jointly(
+    fn check_jointly_once(
         &mut self,
-        queries: &[(QueryText, Precision)],
-        options: &Options,
-    ) -> Result<Vec<Answer>, Rejection> {
-        self.in_stochastic_reading(options, |kept, stochastic| {
-            kept.joint_answers(stochastic, queries, options)
-        })
-    }
-
-    fn joint_answers(
-        &mut self,
-        stochastic: &mut StochasticModel,
-        queries: &[(QueryText, Precision)],
+        queries: &[JointQuery],
         options: &Options,
     ) -> Result<Vec<Answer>, Rejection> {
         let start = Instant::now();
-        let mut compiled = Vec::new();
-        let mut warnings = Vec::new();
-        for (text, precision) in queries {
-            let alone = Options {
-                precision: *precision,
-                ..options.clone()
-            };
-            let (query, found) = self.joint_query(stochastic, text, &alone)?;
-            compiled.push(query);
-            warnings.push(found);
-        }
-        let Some(first) = compiled.first() else {
+        let members = queries.iter().map(|one| self.member(one, queries.len()));
+        let members = members.collect::<Result<Vec<Member>, Rejection>>()?;
+        let Some(first) = members.first() else {
             return Ok(Vec::new());
         };
-        self.prepare_stochastic(stochastic, (first.span, start), options)?;
-        let network = &stochastic.model.network;
-        let behaviour = stochastic.behaviour(None, options);
-        let threads = stochastic.precision(options).threads;
-        let count = compiled.len() as f64;
-        let alone = |precision: &Precision| Precision {
-            alpha: precision.alpha / count,
-            beta: precision.beta / count,
-            threads,
-            ..*precision
+        self.load_seconds += start.elapsed().as_secs_f64();
+        let span = first.query.span;
+        let mut answers = match self.prepare_in_time(Reading::Stochastic, span, options)? {
+            Some(cut) => vec![cut; members.len()],
+            None => self.answer_by_same_runs(&members, options)?,
         };
-        let precisions: Vec<Precision> = queries.iter().map(|(_, asked)| alone(asked)).collect();
-        let start = Instant::now();
+        for (answer, member) in answers.iter_mut().zip(members) {
+            answer.warnings = member.warnings;
+            answer.load_seconds = self.load_seconds;
+        }
+        Ok(answers)
+    }
+
+    /// Answers queries whose code is ready.
+    fn answer_by_same_runs(
+        &mut self,
+        members: &[Member],
+        options: &Options,
+    ) -> Result<Vec<Answer>, Rejection> {
+        let behaviour = self.behaviour(None, options);
         let mut watch = LimitWatch::new(options.limits.clone());
-        let kinds: Vec<&Statistical> = compiled.iter().map(|query| &query.kind).collect();
         // The first query of the group whose runs are made.
         let mut at_hand = 0;
         let result = watch.bound(|watch| {
-            let _hooks = begin_libraries(behaviour, &kinds, precisions[0].seed)?;
-            let mut estimates: Vec<Option<Estimate>> = vec![None; compiled.len()];
-            for group in same_runs(&compiled, &precisions) {
+            let asked: Vec<&Statistical> = members.iter().map(|one| &one.asked).collect();
+            let _hooks = begin_libraries(behaviour, &asked, members[0].precision.seed)?;
+            let mut estimates: Vec<Option<Estimate>> = vec![None; members.len()];
+            for group in same_runs(members) {
                 at_hand = group[0];
-                let asked: Vec<(&Statistical, Precision)> =
-                    group.iter().map(|&i| (kinds[i], precisions[i])).collect();
-                let behaviour = Behaviour {
-                    fixed_step: precisions[at_hand].discretisation,
-                    ..behaviour
-                };
-                let ends = |runs| {
-                    let counters = Counters {
-                        explored: runs,
-                        ..Counters::default()
-                    };
-                    watch.look(&counters).is_some()
-                };
-                let found = estimate_jointly(behaviour, &asked, ends)?;
+                let found = estimates_of(behaviour, members, &group, options, watch)?;
                 for (&index, estimate) in group.iter().zip(found) {
                     estimates[index] = Some(estimate);
                 }
             }
             Ok(estimates)
         });
-        let unknown = |answer: Answer| Ok(vec![answer; queries.len()]);
-        let estimates = match result {
-            Err((reason, counters)) => return unknown(without_runs(reason, counters)),
+        let mut answers = match result {
+            Err((reason, counters)) => vec![without_runs(reason, counters); members.len()],
             Ok(Err(failure)) => {
-                let failed = (&failure, &compiled[at_hand]);
-                let verdict = self.after_failure(network, failed, &watch)?;
-                return unknown(Answer::new(verdict, Counters::default()));
+                let answer = self.after_failure(&failure, &members[at_hand].query, &watch)?;
+                vec![answer; members.len()]
             }
-            Ok(Ok(estimates)) => estimates,
+            Ok(Ok(estimates)) => {
+                let together = together(members);
+                let answers = members.iter().zip(estimates).map(|(member, estimate)| {
+                    let answer = Answer {
+                        estimate,
+                        ..Answer::new(Verdict::Satisfied, Counters::default())
+                    };
+                    let mut answer = concluded(answer, &member.asked, &watch);
+                    if let Some(together) = &together {
+                        answer.remark(together);
+                    }
+                    answer
+                });
+                answers.collect()
+            }
         };
-        let seconds = start.elapsed().as_secs_f64();
-        let together = together(&precisions);
-        let parts = compiled.iter().zip(estimates).zip(warnings);
-        let answers = parts.map(|((query, estimate), warnings)| {
-            let verdict = verdict(&query.kind, estimate.as_ref(), &watch);
-            let mut answer = Answer::new(verdict, Counters::default());
-            let method = estimate.as_ref().map(|estimate| estimate.method);
-            if let Some(remark) = remark(&query.kind, verdict, method) {
-                answer.remark(remark);
-            }
-            if let Some(together) = &together {
-                answer.remark(together);
-            }
-            answer.estimate = estimate;
-            answer.seconds = seconds;
-            answer.load_seconds = self.load_seconds;
-            answer.warnings = warnings;
-            answer
-        });
-        Ok(answers.collect())
+        for answer in &mut answers {
+            watch.measure(answer);
+        }
+        Ok(answers)
     }
 
-    /// A query that can be answered together with others, and warnings about it.
-    fn joint_query(
-        &self,
-        stochastic: &mut StochasticModel,
-        text: &QueryText,
-        options: &Options,
-    ) -> Result<(StatisticalQuery, Vec<String>), Rejection> {
-        let refused = |message: &str, help: &str| {
-            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, text.span, message).help(help);
-            Rejection::new(vec![error], &self.sources)
+    /// A query that is answered together with others; there are `count`.
+    fn member(&mut self, one: &JointQuery, count: usize) -> Result<Member, Rejection> {
+        let JointQuery { text, precision } = one;
+        let refused = |model: &LoadedModel, message: &str| {
+            let help = "ask for this one alone";
+            Err(model.refusal(codes::UNSUPPORTED_QUERY, text.span, message, help))
         };
-        let Some(parsed) = self.statistical_query(text.span) else {
-            return Err(refused(
-                "only statistical queries can be answered from the same runs",
-                "ask for this one alone",
-            ));
+        let not_statistical = "only statistical queries can be answered from the same runs";
+        if self.reading_of(text.span) == Reading::Symbolic {
+            return refused(self, not_statistical);
+        }
+        let (query, warnings) = self.compile_in(Reading::Stochastic, text.span, &[])?;
+        self.refuse_contradiction(&query, precision)?;
+        let QueryKind::Statistical(asked) = &query.kind else {
+            return refused(self, not_statistical);
         };
-        let (query, warnings) = self.compiled(stochastic, &parsed, &[], options)?;
-        if matches!(query.kind, Statistical::Simulation(_)) {
-            return Err(refused(
-                "simulate shows runs, and has no part in a joint guarantee",
-                "ask for this one alone",
-            ));
+        match &**asked {
+            Statistical::Simulation(_) => {
+                let message = "simulate shows runs, and has no part in a joint guarantee";
+                return refused(self, message);
+            }
+            Statistical::Comparison { .. } => {
+                let message = "a comparison has runs of its own, and no part in a joint guarantee";
+                return refused(self, message);
+            }
+            _ => {}
         }
-        if matches!(query.kind, Statistical::Comparison { .. }) {
-            return Err(refused(
-                "a comparison has runs of its own, and no part in a joint guarantee",
-                "ask for this one alone",
-            ));
-        }
-        Ok((query, warnings))
+        Ok(Member {
+            asked: Statistical::clone(asked),
+            precision: Precision {
+                alpha: precision.alpha / count as f64,
+                beta: precision.beta / count as f64,
+                ..*precision
+            },
+            query,
+            warnings,
+        })
     }
 }
 
+/// The estimates of the queries of a group, in its order.
+fn estimates_of(
+    behaviour: Behaviour<'_>,
+    members: &[Member],
+    group: &[usize],
+    options: &Options,
+    watch: &mut LimitWatch,
+) -> Result<Vec<Estimate>, Failure> {
+    let threads = precision_of(behaviour, options).threads;
+    let asked = group.iter().map(|&index| {
+        let member = &members[index];
+        let precision = Precision {
+            threads,
+            ..member.precision
+        };
+        (&member.asked, precision)
+    });
+    let asked: Vec<(&Statistical, Precision)> = asked.collect();
+    let behaviour = Behaviour {
+        fixed_step: asked[0].1.discretisation,
+        ..behaviour
+    };
+    let ends = |runs| {
+        let counters = Counters {
+            explored: runs,
+            ..Counters::default()
+        };
+        watch.look(&counters).is_some()
+    };
+    estimate_jointly(behaviour, &asked, ends)
+}
+
 /// The queries by the runs that they can share, in order.
-fn same_runs(queries: &[StatisticalQuery], precisions: &[Precision]) -> Vec<Vec<usize>> {
+fn same_runs(members: &[Member]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
-    for (index, query) in queries.iter().enumerate() {
-        let bound = bound_of(&query.kind);
+    for (index, member) in members.iter().enumerate() {
+        let bound = bound_of(&member.asked);
         let known = groups.iter_mut().find(|group| {
-            let other = bound_of(&queries[group[0]].kind);
-            let (one, another) = (&precisions[index], &precisions[group[0]]);
+            let first = &members[group[0]];
+            let other = bound_of(&first.asked);
+            let (one, another) = (&member.precision, &first.precision);
             other.limit == bound.limit
                 && other.value.to_bits() == bound.value.to_bits()
                 && one.seed == another.seed
@@ -191,9 +216,9 @@ fn same_runs(queries: &[StatisticalQuery], precisions: &[Precision]) -> Vec<Vec<
 }
 
 /// What the intervals promise together: the sum of their risks; `None` for a single one.
-fn together(precisions: &[Precision]) -> Option<String> {
-    let count = precisions.len();
-    let alpha: f64 = precisions.iter().map(|precision| precision.alpha).sum();
+fn together(members: &[Member]) -> Option<String> {
+    let count = members.len();
+    let alpha: f64 = members.iter().map(|member| member.precision.alpha).sum();
     // Without the last digits, which are rounding.
     let percent = (1e6 * (1.0 - alpha)).round() / 1e4;
     (count > 1).then(|| format!("all {count} intervals hold together at {percent} %"))

@@ -17,7 +17,7 @@ use crate::search::{Outcome, Trace};
 
 use super::attempts::{Accuracy, first_of_use};
 use super::optimal_trace::not_the_best;
-use super::subject::{Subject, can_be_coarse, coarse, symbolic};
+use super::problem::{Problem, can_be_coarse, coarse, symbolic};
 use super::witnesses::Witnesses;
 use crate::engine::answer::{Answer, Verdict};
 use crate::engine::evidence::timed_run::Shows;
@@ -27,41 +27,41 @@ use crate::engine::{Options, TraceWanted};
 /// The result of a search in coarser zones, unless it found something that may not exist; otherwise
 /// the result of the same search in exact zones.
 fn settle<'a, T>(
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     predicates: &[&Predicate],
     mut search: impl FnMut(Symbolic<'a>) -> T,
     is_found: impl Fn(&T) -> bool,
 ) -> T {
-    let attempts: &[Accuracy] = if can_be_coarse(subject, predicates) {
+    let attempts: &[Accuracy] = if can_be_coarse(problem, predicates) {
         &[Accuracy::Coarse, Accuracy::Exact]
     } else {
         &[Accuracy::Exact]
     };
     let make = |accuracy| {
         search(match accuracy {
-            Accuracy::Coarse => coarse(subject, predicates),
-            Accuracy::Exact => symbolic(subject, predicates, &[], Abstraction::Maximum),
+            Accuracy::Coarse => coarse(problem, predicates),
+            Accuracy::Exact => symbolic(problem, predicates, &[], Abstraction::Maximum),
         })
     };
     first_of_use(attempts, make, |_, result| !is_found(result))
 }
 
 /// Is there a run inside the predicate that never leaves it?
-pub(super) fn always<'a>(subject: Subject<'a>, keep: &Predicate, watch: &mut LimitWatch) -> Answer {
+pub(super) fn always<'a>(problem: Problem<'a>, keep: &Predicate, watch: &mut LimitWatch) -> Answer {
     let search = |mut symbolic: Symbolic<'a>| {
         let mut search = Liveness::new(&symbolic, keep);
         let outcome = search.from_start(&mut symbolic, watch);
         (symbolic, search, outcome)
     };
     let is_found = |(.., outcome): &(_, _, Result<_, _>)| matches!(outcome, Ok(Outcome::Found(_)));
-    let (mut symbolic, search, outcome) = settle(subject, &[keep], search, is_found);
-    let mut witnesses = Witnesses::new(&mut symbolic, subject.options).doubting(search.is_coarse());
+    let (mut symbolic, search, outcome) = settle(problem, &[keep], search, is_found);
+    let mut witnesses = Witnesses::new(&mut symbolic, problem.options).doubting(search.is_coarse());
     let mut message = None;
     let verdict = match outcome {
         Ok(Outcome::Found(run)) => {
             let wanted = Wanted { open: None, keep };
             let any = (run.trace, run.ending, 0);
-            let best = best(&mut witnesses, wanted, subject.options, watch);
+            let best = best(&mut witnesses, wanted, problem.options, watch);
             let (trace, ending, _) = chosen(any, best, &mut message);
             let shows = Shows::Stays(Stays { from: None, keep });
             witnesses.add(trace, Some(ending), shows)
@@ -82,20 +82,20 @@ pub(super) fn always<'a>(subject: Subject<'a>, keep: &Predicate, watch: &mut Lim
 
 /// Does every state of `open` lead out of `keep`?
 pub(super) fn leads_to<'a>(
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     open: &Predicate,
     keep: &Predicate,
     watch: &mut LimitWatch,
 ) -> Answer {
     let search = |mut symbolic: Symbolic<'a>| {
         let mut goal = Unanswered::new(&symbolic, open, keep);
-        let report = search::search(&mut symbolic, &mut goal, subject.options.order, watch);
+        let report = search::search(&mut symbolic, &mut goal, problem.options.order, watch);
         (symbolic, goal, report)
     };
     let is_found =
         |(.., report): &(_, _, report::Report)| matches!(report.outcome, Ok(Outcome::Found(_)));
-    let (mut symbolic, mut goal, report) = settle(subject, &[open, keep], search, is_found);
-    let mut witnesses = Witnesses::new(&mut symbolic, subject.options).doubting(goal.is_coarse());
+    let (mut symbolic, mut goal, report) = settle(problem, &[open, keep], search, is_found);
+    let mut witnesses = Witnesses::new(&mut symbolic, problem.options).doubting(goal.is_coarse());
     let mut message = None;
     let verdict = match report.outcome {
         Ok(Outcome::Found(way)) => {
@@ -106,7 +106,7 @@ pub(super) fn leads_to<'a>(
                 open: Some(open),
                 keep,
             };
-            let best = best(&mut witnesses, wanted, subject.options, watch);
+            let best = best(&mut witnesses, wanted, problem.options, watch);
             let (trace, ending, start) = chosen(any, best, &mut message);
             let stays = Stays {
                 from: Some((start, open)),

@@ -10,7 +10,7 @@ use crate::search::reachability::goal::Target;
 use crate::search::{Outcome, Trace};
 use crate::zones::Bound;
 
-use super::subject::{Subject, symbolic};
+use super::problem::{Problem, symbolic};
 use super::time_clock::with_time;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::options::TraceWanted;
@@ -32,7 +32,7 @@ pub(super) fn not_the_best(reason: &str) -> String {
 /// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
 /// `zones` keeps the comparisons of what is sought.
 pub(super) fn best(
-    subject: Subject<'_>,
+    problem: Problem<'_>,
     zones: &mut Symbolic<'_>,
     sought: Sought<'_>,
     watch: &mut LimitWatch,
@@ -43,24 +43,24 @@ pub(super) fn best(
         mut atoms,
     } = sought;
     let none = Counters::default();
-    let way = match subject.options.trace {
+    let way = match problem.options.trace {
         TraceWanted::Any => return Ok(None),
         TraceWanted::Shortest => {
             let mut search =
                 best_first::BestFirst::new(zones, &*target, best_first::Measure::Moves, none);
             cut_as_interrupted(|| search.run(watch))
         }
-        TraceWanted::Fastest if subject.under.is_some() => {
+        TraceWanted::Fastest if problem.under.is_some() => {
             return Err("there is none for fastest traces under a strategy".to_owned());
         }
         TraceWanted::Fastest => {
-            let (timed, clock) = with_time(subject.network);
-            let subject = Subject {
+            let (timed, clock) = with_time(problem.network);
+            let problem = Problem {
                 network: &timed,
-                ..subject
+                ..problem
             };
-            atoms.push(time_atom(subject.network, clock));
-            let mut zones = symbolic(subject, &[predicate], &atoms, Abstraction::LowerUpper);
+            atoms.push(time_atom(problem.network, clock));
+            let mut zones = symbolic(problem, &[predicate], &atoms, Abstraction::LowerUpper);
             let measure = best_first::Measure::Time(clock);
             let mut search = best_first::BestFirst::new(&mut zones, &*target, measure, none);
             cut_as_interrupted(|| search.run(watch))
@@ -68,7 +68,7 @@ pub(super) fn best(
     };
     match way {
         Ok(Outcome::Found(way)) => {
-            let deadline = (subject.options.trace == TraceWanted::Fastest).then_some(way.cost);
+            let deadline = (problem.options.trace == TraceWanted::Fastest).then_some(way.cost);
             Ok(Some((way.trace(zones, target), deadline)))
         }
         Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),

@@ -12,35 +12,23 @@ use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
 use super::game_zones::{IGNORED_PRIORITIES, add_check_by, objective_atoms, zones_of};
-use super::subject::{Subject, has_differences};
+use super::problem::{Problem, has_differences};
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::machine_json;
 use crate::engine::limits::LimitWatch;
 use crate::engine::options::Rules;
 
-/// What a game query with observations asks for.
-#[derive(Clone, Copy, Debug)]
-pub struct ObservedGame<'q> {
-    /// What the controller is to enforce.
-    pub objective: &'q Objective,
-    /// What it sees.
-    pub observations: &'q [Predicate],
-}
-
 /// Answers a game query with observations.
 pub(super) fn game(
-    subject: Subject<'_>,
-    asked: ObservedGame<'_>,
+    problem: Problem<'_>,
+    objective: &Objective,
+    observations: &[Predicate],
     watch: &mut LimitWatch,
 ) -> Answer {
-    let Subject {
+    let Problem {
         network, options, ..
-    } = subject;
-    let ObservedGame {
-        objective,
-        observations,
-    } = asked;
+    } = problem;
     let observed = observations.iter().flat_map(predicate::atoms);
     let atoms: Vec<ClockAtom> = objective_atoms(objective)
         .into_iter()
@@ -51,20 +39,12 @@ pub(super) fn game(
     } else {
         Abstraction::Maximum
     };
-    let mut symbolic = zones_of(subject, &atoms, abstraction);
-    let (goal, keep, must_reach) = match objective {
-        Objective::Reach(goal) => (Some(goal), None, true),
-        Objective::Until(keep, goal) => (Some(goal), Some(keep), true),
-        Objective::Safe(keep) => (None, Some(keep), false),
-        Objective::WeakUntil(keep, goal) | Objective::Buchi(keep, goal) => {
-            (Some(goal), Some(keep), false)
-        }
-    };
+    let mut symbolic = zones_of(problem, &atoms, abstraction);
     let question = Question {
         observations,
-        goal,
-        keep,
-        must_reach,
+        goal: objective.goal(),
+        keep: objective.keep(),
+        must_reach: matches!(objective, Objective::Reach(_) | Objective::Until(..)),
         forced: options.forced,
     };
     let ignores_priorities = symbolic.ignores_priorities();
@@ -95,7 +75,7 @@ pub(super) fn game(
                 let machine = machine_json::to_check(&machine);
                 let rules = options.rules();
                 add_check_by(&mut answer, options, watch, |effort| {
-                    verify(network, asked, &machine, rules, effort)
+                    verify(network, objective, observations, &machine, rules, effort)
                 });
             }
             answer.evidence.machine = Some(Arc::new(machine));
@@ -113,17 +93,18 @@ pub(super) fn game(
 /// the query.
 pub fn verify(
     network: &Network,
-    asked: ObservedGame<'_>,
+    objective: &Objective,
+    observations: &[Predicate],
     machine: &[MachineState],
     rules: Rules,
     effort: &mut Effort<'_>,
 ) -> Verification {
     let (owner, selection) = (Player::Controller, Selection::First);
-    let mut claim = strategy_check::claim(asked.objective, owner, selection, rules);
-    let (constant, has_differences) = strategy_check::constants(asked.observations.iter());
+    let mut claim = strategy_check::claim(objective, owner, selection, rules);
+    let (constant, has_differences) = strategy_check::constants(observations.iter());
     claim.constant = claim.constant.max(constant);
     claim.has_differences |= has_differences;
-    observed::verify(network, machine, asked.observations, &claim, effort)
+    observed::verify(network, machine, observations, &claim, effort)
 }
 
 /// Names what a model has that there is no algorithm for under partial observation.

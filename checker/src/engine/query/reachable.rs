@@ -13,7 +13,7 @@ use crate::search::{Outcome, Trace};
 
 use super::attempts::{Accuracy, first_of_use};
 use super::optimal_trace::{Sought, best, not_the_best};
-use super::subject::{Subject, can_be_coarse, coarse, live_variables, symbolic};
+use super::problem::{Problem, can_be_coarse, coarse, live_variables, symbolic};
 use super::witnesses::Witnesses;
 use crate::engine::answer::{Answer, Evidence, Verdict, Wanted};
 use crate::engine::evidence::certificate;
@@ -29,22 +29,22 @@ struct Searched<'a> {
 
 /// Is there a state in which the goal holds?
 pub(super) fn reachable<'a>(
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     goal: &Predicate,
     symmetry: Option<&Arc<Symmetry>>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let options = subject.options;
+    let options = problem.options;
     // A strategy may forbid moves in one order and allow them in another.
-    let is_ordered = options.reductions.partial_order && subject.under.is_none();
+    let is_ordered = options.reductions.partial_order && problem.under.is_none();
     let order = is_ordered
-        .then(|| PartialOrder::new(subject.network, goal, options.tuning))
+        .then(|| PartialOrder::new(problem.network, goal, options.tuning))
         .flatten();
-    let live = live_variables(subject, predicate::functions(goal), symmetry);
+    let live = live_variables(problem, predicate::functions(goal), symmetry);
     let search = |accuracy| {
         let symbolic = match accuracy {
-            Accuracy::Coarse => coarse(subject, &[goal]),
-            Accuracy::Exact => symbolic(subject, &[goal], &[], Abstraction::LowerUpper),
+            Accuracy::Coarse => coarse(problem, &[goal]),
+            Accuracy::Exact => symbolic(problem, &[goal], &[], Abstraction::LowerUpper),
         };
         let symbolic = symbolic.reduced_by(symmetry.cloned());
         let mut symbolic = symbolic.ordered_by(order.clone()).forgetting(live.clone());
@@ -56,18 +56,18 @@ pub(super) fn reachable<'a>(
         Ok(Outcome::Found(trace)) => ends_in(&mut searched.symbolic, goal, trace),
         _ => true,
     };
-    let attempts = attempts(subject, goal);
+    let attempts = attempts(problem, goal);
     let searched = first_of_use(attempts, search, |_, searched| is_settled(searched));
-    conclude(subject, goal, searched, watch)
+    conclude(problem, goal, searched, watch)
 }
 
 /// A deadlock is first searched in zones that are too large for it. One that is found counts if it
 /// remains in the exact zones of its trace.
-fn attempts(subject: Subject<'_>, goal: &Predicate) -> &'static [Accuracy] {
+fn attempts(problem: Problem<'_>, goal: &Predicate) -> &'static [Accuracy] {
     // The zones of a certificate must be free of deadlocks themselves, and the best trace is found
     // in them.
-    let is_exact = subject.options.certificate || subject.options.trace != TraceWanted::Any;
-    if is_exact || !predicate::has_deadlock(goal) || !can_be_coarse(subject, &[goal]) {
+    let is_exact = problem.options.certificate || problem.options.trace != TraceWanted::Any;
+    if is_exact || !predicate::has_deadlock(goal) || !can_be_coarse(problem, &[goal]) {
         return &[Accuracy::Exact];
     }
     &[Accuracy::Coarse, Accuracy::Exact]
@@ -87,12 +87,12 @@ fn ends_in(symbolic: &mut Symbolic<'_>, goal: &Predicate, trace: &Trace) -> bool
 
 /// The answer that the report of a search for the goal amounts to.
 fn conclude(
-    subject: Subject<'_>,
+    problem: Problem<'_>,
     goal: &Predicate,
     searched: Searched<'_>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let options = subject.options;
+    let options = problem.options;
     let Searched {
         mut symbolic,
         report,
@@ -109,7 +109,7 @@ fn conclude(
                 predicate: goal,
                 atoms: Vec::new(),
             };
-            let (trace, deadline) = match best(subject, symbolic, sought, watch) {
+            let (trace, deadline) = match best(problem, symbolic, sought, watch) {
                 Ok(None) => (trace, None),
                 Ok(Some((best, deadline))) => (best, deadline),
                 Err(reason) => {
@@ -120,15 +120,15 @@ fn conclude(
             witnesses.add(trace, None, Shows::Reaches(goal, deadline))
         }
         Ok(Outcome::Exhausted) => {
-            if options.certificate && subject.under.is_some() {
+            if options.certificate && problem.under.is_some() {
                 message = Some("no certificate: it would be about the model alone".to_owned());
             } else if options.certificate {
-                let whole = certificate::with_all_words(subject.network);
-                let subject = Subject {
+                let whole = certificate::with_all_words(problem.network);
+                let problem = Problem {
                     network: &whole,
-                    ..subject
+                    ..problem
                 };
-                let mut zones = self::symbolic(subject, &[goal], &[], Abstraction::LowerUpper);
+                let mut zones = self::symbolic(problem, &[goal], &[], Abstraction::LowerUpper);
                 match certificate::reached(&mut zones, goal, counters, watch) {
                     Ok(reached) => certificate = Some(reached),
                     Err((why, reason)) => {

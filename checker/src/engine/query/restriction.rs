@@ -1,30 +1,23 @@
 //! What the strategy that a statistical query names allows in random runs.
 
-use crate::diagnostics::Diagnostic;
 use crate::engine::codes;
-use crate::engine::loaded_model::LoadedModel;
-use crate::engine::options::Options;
+use crate::engine::loaded_model::{ANALYSED, LoadedModel, PreparedQuery};
 use crate::engine::rejection::Rejection;
-use crate::ir::Network;
 use crate::stochastic::{Restriction, Unfit};
-use crate::syntax::ast;
 
 impl LoadedModel {
-    /// What the strategy of a statistical query allows; `stochastic` is the network in that
-    /// reading. `None` if the query names none.
+    /// What the strategy of a statistical query allows; `None` if the query names none.
     pub(super) fn restriction(
-        &mut self,
-        query: &ast::Query,
-        stochastic: &Network,
-        options: &Options,
+        &self,
+        prepared: &PreparedQuery,
     ) -> Result<Option<Restriction>, Rejection> {
-        let Some(name) = &query.under else {
+        let Some(under) = &prepared.under else {
             return Ok(None);
         };
-        self.expect_symbolic()?;
-        let strategy = self.permitted_by(&name.text, query.span, options)?.strategy;
+        let stochastic = self.stochastic.as_ref().expect(ANALYSED).network();
         let readings = (self.network(), stochastic);
-        let restriction = Restriction::new(readings, &strategy, options.under_choice);
+        let choice = prepared.options.under_choice;
+        let restriction = Restriction::new(readings, &under.strategy, choice);
         restriction.map(Some).map_err(|unfit| {
             let (message, help) = match unfit {
                 Unfit::Environment => (
@@ -36,9 +29,7 @@ impl LoadedModel {
                     "ask without `under`",
                 ),
             };
-            let diagnostic =
-                Diagnostic::new(codes::UNSUPPORTED_QUERY, name.span, message).help(help);
-            Rejection::new(vec![diagnostic], &self.sources)
+            self.refusal(codes::UNSUPPORTED_QUERY, prepared.query.span, message, help)
         })
     }
 }

@@ -1,61 +1,60 @@
 //! Queries for the probability of rare events: the level of states, and what splitting found.
 
-use crate::diagnostics::Diagnostic;
 use crate::engine::codes;
-use crate::engine::loaded_model::LoadedModel;
+use crate::engine::loaded_model::{LoadedModel, PreparedQuery};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
-use crate::ir::{Path, Statistical, StatisticalQuery};
-use crate::semantics::Model;
+use crate::ir::{FunctionId, Path, Query, QueryKind, Statistical};
 use crate::stochastic::{Rare, Splitting};
 
 impl LoadedModel {
-    /// How the rare event of a query is looked for, if that is wanted and the query is one for a
-    /// probability.
-    pub(super) fn splitting(
+    /// What says how near a state is to the rare event of a query, if that is wanted and the query
+    /// is one for a probability.
+    pub(in crate::engine) fn level(
         &mut self,
-        model: &mut Model,
-        query: &StatisticalQuery,
+        query: &Query,
         options: &Options,
-    ) -> Result<Option<Splitting>, Rejection> {
-        let Some(wanted) = &options.rare else {
+    ) -> Result<Option<FunctionId>, Rejection> {
+        let (Some(wanted), QueryKind::Statistical(asked)) = (&options.rare, &query.kind) else {
             return Ok(None);
         };
-        let Statistical::Probability(_, path) = &query.kind else {
+        let Statistical::Probability(_, path) = &**asked else {
             return Ok(None);
         };
-        if matches!(path, Path::Always(_)) {
-            let message = "levels lead to an event, and [] asks for none";
-            let help = "ask for the event: Pr[…](<> !p), and take 1 minus the estimate";
-            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
-            return Err(Rejection::new(vec![error], &self.sources));
-        }
-        if matches!(path, Path::Formula(_)) {
-            let message =
-                "levels lead to a state, and whether a formula holds is seen of whole runs";
-            let help = "ask for a state: Pr[…](<> p) or Pr[…](p U q), without bounds behind them";
-            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
-            return Err(Rejection::new(vec![error], &self.sources));
-        }
-        // Whatever `E` can measure is a level.
-        let text = self.add_query(&format!("E[<=1; 1](max: {})", wanted.levels));
-        let measured = self.statistical_query(text.span);
-        let measured =
-            measured.and_then(|asked| model.compile_statistical(&asked, &self.sources, &[]).0);
-        let Some(Statistical::Expectation { value: level, .. }) = measured.map(|one| one.kind)
-        else {
-            let message = format!("`{}` is no level", wanted.levels);
-            let help = "write one expression of integers, doubles and clocks that says how near a \
-                        state is to the event";
-            let error = Diagnostic::new(codes::UNSUPPORTED_QUERY, query.span, message).help(help);
-            return Err(Rejection::new(vec![error], &self.sources));
+        let refused = |message: &str, help: &str| {
+            self.refusal(codes::UNSUPPORTED_QUERY, query.span, message, help)
         };
-        Ok(Some(Splitting {
-            level,
-            effort: wanted.effort,
-            repetitions: wanted.repetitions,
-        }))
+        match path {
+            Path::Always(_) => Err(refused(
+                "levels lead to an event, and [] asks for none",
+                "ask for the event: Pr[…](<> !p), and take 1 minus the estimate",
+            )),
+            Path::Formula(_) => Err(refused(
+                "levels lead to a state, and whether a formula holds is seen of whole runs",
+                "ask for a state: Pr[…](<> p) or Pr[…](p U q), without bounds behind them",
+            )),
+            _ => match self.compile_level(&wanted.levels) {
+                Some(level) => Ok(Some(level)),
+                None => Err(self.refusal(
+                    codes::UNSUPPORTED_QUERY,
+                    query.span,
+                    format!("`{}` is no level", wanted.levels),
+                    "write one expression of integers, doubles and clocks that says how near a \
+                     state is to the event",
+                )),
+            },
+        }
     }
+}
+
+/// How the rare event of a query is looked for, if it is.
+pub(super) fn splitting_of(prepared: &PreparedQuery) -> Option<Splitting> {
+    let wanted = prepared.options.rare.as_ref()?;
+    Some(Splitting {
+        level: prepared.level?,
+        effort: wanted.effort,
+        repetitions: wanted.repetitions,
+    })
 }
 
 /// What splitting did, and what it gained.

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 
 use crate::game::strategy::Strategy;
 use crate::ir::{
-    Block, Clock, ClockChoice, ClockId, ClockPredicate, Function, FunctionId, Instruction,
+    Block, Clock, ClockChoice, ClockId, ClockPredicate, Control, Function, FunctionId, Instruction,
     IntegerOperator, Network, Objective, Predicate, Register, RegisterType, SiteId, Terminator,
 };
 
@@ -50,14 +50,15 @@ pub(crate) struct LimitedGame<'n> {
     pub(crate) objective: Cow<'n, Objective>,
 }
 
-/// The game for an objective, within a limit if there is one. `rest` is how much of it must be left
-/// wherever the goal does not hold yet; a negative value counts as 0.
+/// The game of a query, within a limit if there is one. What must be left of it wherever the goal
+/// does not hold yet counts as 0 if it is negative.
 pub(crate) fn game<'n>(
     network: &'n Network,
-    objective: &'n Objective,
+    control: &'n Control,
     limit: Option<i32>,
-    rest: Option<FunctionId>,
 ) -> LimitedGame<'n> {
+    let objective = &control.objective;
+    let rest = control.time_optimal.and_then(|bounds| bounds.rest);
     let Some(limit) = limit else {
         return LimitedGame {
             network: Cow::Borrowed(network),
@@ -65,11 +66,8 @@ pub(crate) fn game<'n>(
         };
     };
     let (mut network, clock) = with_time(network);
-    let (goal, keep) = match objective {
-        Objective::Until(keep, goal) => (goal, Some(keep)),
-        Objective::Reach(goal) => (goal, None),
-        _ => unreachable!("other objectives of games within a time were refused"),
-    };
+    let goal = objective.goal();
+    let goal = goal.expect("games for other objectives within a time were refused");
     let mut until = |rest: Option<FunctionId>| {
         network.functions.push(limit_less(limit, rest));
         Predicate::Clock(ClockPredicate {
@@ -82,7 +80,7 @@ pub(crate) fn game<'n>(
         })
     };
     let goal = Predicate::And(vec![goal.clone(), until(None)]);
-    let kept = keep.into_iter().cloned().chain([until(rest)]);
+    let kept = objective.keep().into_iter().cloned().chain([until(rest)]);
     let objective = Objective::Until(Predicate::And(kept.collect()), goal);
     LimitedGame {
         network: Cow::Owned(network),

@@ -27,7 +27,7 @@ use crate::game::solver::Solver;
 use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
-use crate::ir::{ClockAtom, ClockId, ClockRange, FunctionId, Objective, Predicate};
+use crate::ir::{ClockAtom, ClockId, ClockRange, Control, TimeBounds};
 use crate::network::{Failure, Stepper};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::optimum::extremum::{Extreme, Extremes};
@@ -37,10 +37,9 @@ use super::attempts::first_of_use;
 use super::budgets::{CROWD_IN_RACES, RACE_IN_DISCRETE_STATES, STATES_BEFORE_CROWD};
 use super::game;
 use super::game_zones::{self, add_check, objective_atoms, zones_of};
-use super::subject::{Subject, has_differences};
+use super::problem::{Problem, has_differences};
 use super::time_clock::{TIME, with_time};
 use crate::engine::answer::{Answer, Values, Verdict, Wanted};
-use crate::engine::evidence::strategy_check::Asked;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::options::Options;
 
@@ -49,13 +48,6 @@ const FIRST_LIMIT: i32 = 16;
 
 /// The limit to start from in discrete states.
 const FIRST_LIMIT_IN_DISCRETE_STATES: i32 = 1 << 12;
-
-/// What is asked: the goal, what is kept, and the bounds u and g.
-pub(super) struct Race<'q> {
-    pub(super) objective: &'q Objective,
-    pub(super) limit: Option<FunctionId>,
-    pub(super) rest: Option<FunctionId>,
-}
 
 /// The least time, and whether it is reached or only approached.
 type Time = (i32, bool);
@@ -71,19 +63,25 @@ enum RaceEnd {
 }
 
 /// Answers a time-optimal query.
-pub(super) fn fastest(subject: Subject<'_>, race: &Race<'_>, watch: &mut LimitWatch) -> Answer {
-    let (first_limit, counters) = match first_limit(subject, race, watch) {
+pub(super) fn fastest(
+    problem: Problem<'_>,
+    control: &Control,
+    bounds: TimeBounds,
+    watch: &mut LimitWatch,
+) -> Answer {
+    let (first_limit, counters) = match first_limit(problem, control, bounds, watch) {
         Ok(found) => found,
         Err(answer) => return *answer,
     };
-    let (timed, clock) = with_time(subject.network);
+    let (timed, clock) = with_time(problem.network);
     let game = ClockedGame {
-        subject: Subject {
+        problem: Problem {
             network: &timed,
-            ..subject
+            ..problem
         },
         clock,
-        race,
+        control,
+        bounds,
     };
     let mut tried = Tried {
         limit: first_limit,
@@ -114,12 +112,12 @@ pub(super) fn fastest(subject: Subject<'_>, race: &Race<'_>, watch: &mut LimitWa
     // Where the time is only approached, the strategy needs less than a unit more.
     let limit = match (verdict, time) {
         (Verdict::Satisfied, Some((value, is_reached))) => Some(value + i32::from(!is_reached)),
-        (Verdict::NotSatisfied, _) if race.limit.is_some() => Some(tried.limit),
+        (Verdict::NotSatisfied, _) if bounds.limit.is_some() => Some(tried.limit),
         _ => None,
     };
-    let is_strategy_wanted = subject.options.strategy || subject.options.verify;
+    let is_strategy_wanted = problem.options.strategy || problem.options.verify;
     if let Some(limit) = limit.filter(|_| is_strategy_wanted) {
-        game.add_strategy(subject, limit, &mut answer, watch);
+        game.add_strategy(problem, limit, &mut answer, watch);
     }
     answer
 }
@@ -127,17 +125,18 @@ pub(super) fn fastest(subject: Subject<'_>, race: &Race<'_>, watch: &mut LimitWa
 /// The limit to begin with, and what was done to find it: that of the query, or a small one if the
 /// goal can be forced at all. An error is the answer to the query.
 fn first_limit(
-    subject: Subject<'_>,
-    race: &Race<'_>,
+    problem: Problem<'_>,
+    control: &Control,
+    bounds: TimeBounds,
     watch: &mut LimitWatch,
 ) -> Result<(i32, Counters), Box<Answer>> {
-    let Subject {
+    let Problem {
         network,
         executor,
         options,
         ..
-    } = subject;
-    if let Some(limit) = race.limit {
+    } = problem;
+    if let Some(limit) = bounds.limit {
         let mut words = network.initial.clone();
         let limit = Stepper::tuned(network, executor, options.tuning).evaluate(limit, &mut words);
         return match limit {
@@ -146,10 +145,9 @@ fn first_limit(
             Err(error) => Err(Box::new(Answer::failed(error.into()))),
         };
     }
-    let asked = Asked {
-        objective: race.objective,
-        is_cooperative: false,
+    let untimed = Control {
         time_optimal: None,
+        ..control.clone()
     };
     let plain = Options {
         limits: options.limits.clone(),
@@ -158,11 +156,11 @@ fn first_limit(
         tuning: options.tuning,
         ..Options::default()
     };
-    let plain_game = Subject {
+    let plain_game = Problem {
         options: &plain,
-        ..subject
+        ..problem
     };
-    let answer = game::game(plain_game, asked, watch);
+    let answer = game::game(plain_game, &untimed, watch);
     match answer.verdict {
         Verdict::Satisfied => Ok((FIRST_LIMIT, answer.counters)),
         Verdict::NotSatisfied if options.want_strategy_of(Player::Environment) => {
@@ -171,11 +169,11 @@ fn first_limit(
                 verify: options.verify,
                 ..plain
             };
-            let game_with_strategy = Subject {
+            let game_with_strategy = Problem {
                 options: &with_strategy,
-                ..subject
+                ..problem
             };
-            Err(Box::new(game::game(game_with_strategy, asked, watch)))
+            Err(Box::new(game::game(game_with_strategy, &untimed, watch)))
         }
         _ => Err(Box::new(answer)),
     }
@@ -203,21 +201,22 @@ struct Tried {
 }
 
 /// The game on the network with the clock.
-struct ClockedGame<'a, 'q> {
+struct ClockedGame<'a> {
     /// About the network with the clock.
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     clock: usize,
-    race: &'a Race<'q>,
+    control: &'a Control,
+    bounds: TimeBounds,
 }
 
-impl ClockedGame<'_, '_> {
+impl ClockedGame<'_> {
     /// The kinds of graphs in which the time is searched, one after the other.
     fn attempts(&self) -> &'static [Nodes] {
-        let Subject {
+        let Problem {
             network, options, ..
-        } = self.subject;
+        } = self.problem;
         let can_be_discrete = game_zones::can_be_discrete(network, false, options)
-            && !has_differences(network, &objective_atoms(self.race.objective));
+            && !has_differences(network, &objective_atoms(&self.control.objective));
         match options.nodes {
             Nodes::Automatic if can_be_discrete => {
                 &[Nodes::Automatic, Nodes::Discrete, Nodes::Symbolic]
@@ -234,17 +233,17 @@ impl ClockedGame<'_, '_> {
         tried: &mut Tried,
         watch: &mut LimitWatch,
     ) -> Result<RaceEnd, Failure> {
-        if self.race.limit.is_none() {
+        if self.bounds.limit.is_none() {
             tried.limit = match nodes {
                 Nodes::Discrete => tried.limit.max(FIRST_LIMIT_IN_DISCRETE_STATES),
                 Nodes::Automatic | Nodes::Symbolic => FIRST_LIMIT,
             };
         }
-        let longest = Bound::reach(greatest_constant(self.subject.network));
+        let longest = Bound::reach(greatest_constant(self.problem.network));
         loop {
             let end = self.time_needed(nodes, tried, watch);
             let is_enough = !matches!(end, Ok(RaceEnd::Time(None)));
-            let is_last = self.race.limit.is_some() || tried.limit >= longest;
+            let is_last = self.bounds.limit.is_some() || tried.limit >= longest;
             if is_enough || is_last {
                 return end;
             }
@@ -275,11 +274,11 @@ impl ClockedGame<'_, '_> {
         self.solve(limit, Some(nodes), watch, conclude)
     }
 
-    /// Adds the strategy of the player who wins with this limit, or why there is none. `subject` is
+    /// Adds the strategy of the player who wins with this limit, or why there is none. `problem` is
     /// about the network without the clock.
     fn add_strategy(
         &self,
-        subject: Subject<'_>,
+        problem: Problem<'_>,
         limit: i32,
         answer: &mut Answer,
         watch: &mut LimitWatch,
@@ -295,13 +294,8 @@ impl ClockedGame<'_, '_> {
                 return;
             }
         };
-        if subject.options.verify {
-            let asked = Asked {
-                objective: self.race.objective,
-                is_cooperative: false,
-                time_optimal: Some((self.race.limit, self.race.rest)),
-            };
-            add_check(answer, subject, asked, &strategy, watch);
+        if problem.options.verify {
+            add_check(answer, problem, self.control, &strategy, watch);
         }
         answer.remark(match strategy.owner {
             Player::Controller => format!("the strategy gets there within {TIME} <= {limit}"),
@@ -348,31 +342,26 @@ impl ClockedGame<'_, '_> {
         watch: &mut dyn Watch,
         conclude: impl FnOnce(Solution, &mut Solver<'_, '_, '_>, &mut dyn Watch) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let Subject {
+        let Problem {
             network, options, ..
-        } = self.subject;
-        let mut atoms = objective_atoms(self.race.objective);
+        } = self.problem;
+        let mut atoms = objective_atoms(&self.control.objective);
         atoms.extend(limits_of(self.clock, limit.max(0)));
         let abstraction = match nodes {
             _ if has_differences(network, &atoms) => Abstraction::Differences,
             Some(Nodes::Discrete) => Abstraction::Exact,
             _ => Abstraction::Maximum,
         };
-        let mut symbolic = zones_of(self.subject, &atoms, abstraction);
-        let (goal, keep): (&Predicate, _) = match self.race.objective {
-            Objective::Until(keep, goal) => (goal, Some(keep)),
-            Objective::Reach(goal) => (goal, None),
-            _ => unreachable!("other objectives were refused"),
-        };
+        let mut symbolic = zones_of(self.problem, &atoms, abstraction);
         let wanted = GameObjective {
-            goal: Some(goal),
-            keep,
+            goal: self.control.objective.goal(),
+            keep: self.control.objective.keep(),
             must_progress: true,
             deadline: Some(Deadline {
                 clock: self.clock,
                 limit,
                 starts_anywhere: nodes.is_some(),
-                rest: self.race.rest,
+                rest: self.bounds.rest,
             }),
             leaves_dead_ends: true,
         };

@@ -23,7 +23,7 @@ use crate::verify::strategy::{Outcome, Owner};
 use crate::verify::timed::{Timed, least_multiple};
 use crate::verify::{self, Effort, Part, Semantics};
 
-use crate::engine::evidence::strategy_check::{self, Asked, Played};
+use crate::engine::evidence::strategy_check::{self, Played};
 use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::{json, strategy_json};
 use crate::engine::loaded_model::LoadedModel;
@@ -355,14 +355,14 @@ impl LoadedModel {
             diagnostics: Vec::new(),
             rendered: vec![message],
         };
-        let Some(asked) = Asked::of(&query.kind) else {
+        let Some(control) = query.kind.full_game() else {
             return Err(rejection(format!(
                 "error: {} is no game: it does not begin with control:",
                 text.text
             )));
         };
         let strategy = &follower.strategy;
-        match strategy_check::is_for(self.network(), asked, &Played::new(strategy, &[])) {
+        match strategy_check::is_for(self.network(), control, &Played::new(strategy, &[])) {
             Ok(true) => {}
             Ok(false) => {
                 return Err(rejection(format!(
@@ -431,8 +431,8 @@ fn beginning(
 
 impl Play {
     fn game<'n>(&'n self, network: &'n Network) -> time_clock::LimitedGame<'n> {
-        let asked = Asked::of(&self.query.kind).expect("only games are played");
-        asked.game(network, self.follower.strategy.time_limit)
+        let control = self.query.kind.full_game().expect("only games are played");
+        time_clock::game(network, control, self.follower.strategy.time_limit)
     }
 
     fn network<'n>(&self, network: &'n Network) -> Cow<'n, Network> {

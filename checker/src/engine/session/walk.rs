@@ -12,6 +12,7 @@ use crate::search::Outcome;
 use crate::search::StopReason;
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first::{BestFirst, Link, Measure, Met};
+use crate::semantics::Reading;
 use crate::tuning::Tuning;
 use crate::verify;
 use crate::verify::choices::Choices;
@@ -20,7 +21,7 @@ use crate::zones::{Zone, wide};
 use crate::engine::limits::{LimitWatch, Limits};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::CodeEngine;
-use crate::engine::query::subject::has_differences;
+use crate::engine::query::problem::has_differences;
 use crate::engine::rejection::Rejection;
 
 /// How finely the times of simulated runs are chosen, unless finer ones are asked for.
@@ -61,7 +62,8 @@ impl LoadedModel {
     /// Makes the code ready to run; needed once before the other functions here.
     pub fn prepare_simulation(&mut self, code: CodeEngine) -> Result<(), Rejection> {
         self.expect_symbolic()?;
-        self.prepare_code(code, Tuning::default(), crate::diagnostics::Span::default())
+        let span = crate::diagnostics::Span::default();
+        self.prepare_code(Reading::Symbolic, code, Tuning::default(), span)
     }
 
     /// The initial state.

@@ -16,7 +16,7 @@ use crate::engine::options::Options;
 
 /// What a query is about.
 #[derive(Clone, Copy)]
-pub(crate) struct Subject<'a> {
+pub(crate) struct Problem<'a> {
     pub(crate) network: &'a Network,
     pub(crate) executor: &'a dyn Executor,
     /// The strategy that the controller follows.
@@ -39,7 +39,7 @@ pub(crate) struct Followed<'a> {
     pub(crate) strategy: &'a Arc<Under>,
 }
 
-impl<'a> Subject<'a> {
+impl<'a> Problem<'a> {
     /// The comparisons of the strategy.
     pub(super) fn atoms(&self) -> &'a [ClockAtom] {
         self.under.map_or(&[], |under| under.moves.atoms())
@@ -49,17 +49,17 @@ impl<'a> Subject<'a> {
 /// The variables that a search whose question reads words by `functions` may forget where they are
 /// not live. What a strategy allows depends on all of them.
 pub(super) fn live_variables(
-    subject: Subject<'_>,
+    problem: Problem<'_>,
     functions: impl IntoIterator<Item = FunctionId>,
     symmetry: Option<&Arc<Symmetry>>,
 ) -> Option<Arc<LiveVariables>> {
-    if !subject.options.reductions.live_variables || subject.under.is_some() {
+    if !problem.options.reductions.live_variables || problem.under.is_some() {
         return None;
     }
     // An initial value is the same member for all, so that states would no longer be each other's
     // images.
     let keeps_scalars = symmetry.is_some();
-    LiveVariables::new(subject.network, functions, keeps_scalars).map(Arc::new)
+    LiveVariables::new(problem.network, functions, keeps_scalars).map(Arc::new)
 }
 
 /// Whether the network or a query compares two clocks.
@@ -70,21 +70,21 @@ pub(crate) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
 /// Zones for searches, with an abstraction that is sound for the network and these predicates, and
 /// keeps what further comparisons tell.
 pub(crate) fn symbolic<'a>(
-    subject: Subject<'a>,
+    problem: Problem<'a>,
     predicates: &[&Predicate],
     further: &[ClockAtom],
     wanted: Abstraction,
 ) -> Symbolic<'a> {
-    let Subject {
+    let Problem {
         network,
         executor,
         under,
         options,
         guide: _,
         freedom: _,
-    } = subject;
+    } = problem;
     let mut atoms = atoms_of(predicates);
-    atoms.extend(further.iter().chain(subject.atoms()).cloned());
+    atoms.extend(further.iter().chain(problem.atoms()).cloned());
     let mut needs_maximum = predicates.iter().any(|one| predicate::has_deadlock(one));
     if predicate::depends_on_negations(network) {
         if further.is_empty() {
@@ -112,23 +112,23 @@ pub(crate) fn symbolic<'a>(
 }
 
 /// Whether there are zones coarser than those of [`symbolic`] that show that there is nothing.
-pub(super) fn can_be_coarse(subject: Subject<'_>, predicates: &[&Predicate]) -> bool {
-    if !subject.options.tuning.coarser_first || predicate::depends_on_negations(subject.network) {
+pub(super) fn can_be_coarse(problem: Problem<'_>, predicates: &[&Predicate]) -> bool {
+    if !problem.options.tuning.coarser_first || predicate::depends_on_negations(problem.network) {
         return false;
     }
     let mut atoms = atoms_of(predicates);
-    atoms.extend(subject.atoms().iter().cloned());
-    !has_differences(subject.network, &atoms)
+    atoms.extend(problem.atoms().iter().cloned());
+    !has_differences(problem.network, &atoms)
 }
 
 /// Zones that may be too large for what is asked, where those of [`symbolic`] would be many more:
 /// nothing that these zones do not have is there, but what they have may not be. They are sound
 /// where [`can_be_coarse`] says so.
-pub(super) fn coarse<'a>(subject: Subject<'a>, predicates: &[&Predicate]) -> Symbolic<'a> {
+pub(super) fn coarse<'a>(problem: Problem<'a>, predicates: &[&Predicate]) -> Symbolic<'a> {
     let atoms = atoms_of(predicates);
     // What simulates a valuation may have more moves: a deadlock could be left out for a state that
     // has none.
-    symbolic(subject, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets()
+    symbolic(problem, &[], &atoms, Abstraction::LowerUpper).comparing_as_sets()
 }
 
 /// The comparisons of clocks in these predicates.
