@@ -145,7 +145,8 @@ fn texts(model: &LoadedModel, answer: &Answer, query: &str) -> Vec<String> {
         texts.push(text);
     }
     if let Some(certificate) = &evidence.certificate {
-        texts.push(certificate.text(network, query));
+        let lines = certificate.lines(0..certificate.state_count());
+        texts.push(certificate.head(network, query) + &lines);
     }
     if let Some(strategy) = &evidence.strategy {
         texts.push(strategy_json::text(network, strategy, query));

@@ -3,11 +3,56 @@
 
 use std::collections::BTreeSet;
 
-use checker::engine::format::explain::{Example, Role, examples, explanations};
+use checker::engine::format::explain::explanations;
 use checker::engine::{LoadedModel, Rejection};
 use checker::syntax::ast::QueryText;
 
 use crate::checks::interpreted;
+
+/// What an example is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Role {
+    /// The model that the queries of the page are about.
+    Model,
+    /// It has the mistake.
+    Wrong,
+    /// It is fixed.
+    Right,
+}
+
+/// An example of a page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Example {
+    /// `xta`, `xml`, `query` or `q`.
+    language: &'static str,
+    /// What it is.
+    role: Role,
+    /// The text between the fences.
+    text: &'static str,
+}
+
+/// The examples of a page, in order.
+fn examples(page: &'static str) -> Vec<Example> {
+    // Outside and inside of fences alternate.
+    let blocks = page.split("```").skip(1).step_by(2);
+    let examples = blocks.filter_map(|block| {
+        let (heading, text) = block.split_once('\n')?;
+        let (language, role) = heading.split_once(' ')?;
+        let role = match role {
+            "model" => Role::Model,
+            "wrong" => Role::Wrong,
+            "right" => Role::Right,
+            _ => return None,
+        };
+        let text = text.strip_suffix('\n').unwrap_or(text);
+        Some(Example {
+            language,
+            role,
+            text,
+        })
+    });
+    examples.collect()
+}
 
 /// Codes that no short text can give: a file of 256 MiB, a machine without compiler, and libraries
 /// that are not as the model says.

@@ -159,7 +159,8 @@ fn other_words_and_clocks_are_refused() {
 fn file_is_checked() {
     let (mut model, answer) = certified(CROSSING, QUERY);
     let certificate = answer.evidence.certificate.expect("it is satisfied");
-    let text = certificate.text(model.network(), QUERY);
+    let text =
+        certificate.head(model.network(), QUERY) + &certificate.lines(0..certificate.state_count());
     let checked = model
         .verify_evidence("safe.jsonl", &text, Rules::default())
         .expect("it is one");

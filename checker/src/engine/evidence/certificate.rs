@@ -94,19 +94,9 @@ pub(crate) fn reached(
 }
 
 impl Certificate {
-    /// How many zones it has.
-    pub fn zone_count(&self) -> usize {
-        self.states.iter().map(|state| state.zones.len()).sum()
-    }
-
     /// How many states it has.
     pub fn state_count(&self) -> usize {
         self.states.len()
-    }
-
-    /// The certificate as a file.
-    pub fn text(&self, network: &Network, query: &str) -> String {
-        self.head(network, query) + &self.lines(0..self.states.len())
     }
 
     /// The first line of the file.

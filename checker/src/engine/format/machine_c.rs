@@ -14,36 +14,7 @@ use super::strategy_c::{array, comment, quoted, starts};
 use crate::engine::query_form::observations;
 
 /// What does not depend on the machine.
-const RUNTIME: &str = "
-static int controller_sees(int state, const unsigned char *seen)
-{
-    int i;
-    for (i = 0; i < CONTROLLER_OBSERVATIONS; i++)
-        if (controller_seen[(size_t)state * CONTROLLER_OBSERVATIONS + (size_t)i] != (seen[i] != 0))
-            return 0;
-    return 1;
-}
-
-int controller_propose(int state)
-{
-    if (state < 0 || state >= CONTROLLER_STATES)
-        return CONTROLLER_NONE;
-    return controller_actions[state];
-}
-
-int controller_next(int state, const unsigned char *seen)
-{
-    size_t i;
-    if (state < 0 || state >= CONTROLLER_STATES)
-        return CONTROLLER_NONE;
-    if (controller_sees(state, seen))
-        return state;
-    for (i = controller_starts[state]; i < controller_starts[state + 1]; i++)
-        if (controller_sees((int)controller_targets[i], seen))
-            return (int)controller_targets[i];
-    return CONTROLLER_NONE;
-}
-";
+const RUNTIME: &str = include_str!("machine_runtime.c");
 
 /// A machine for a query as the text of a C file.
 pub fn write(network: &Network, machine: &Machine, query: &str) -> String {
@@ -72,33 +43,28 @@ pub fn write(network: &Network, machine: &Machine, query: &str) -> String {
         text.push_str("    0,\n");
     }
     text.push_str("};\n#endif\n\n");
-    let states = machine.states.iter();
+    let states = || machine.states.iter();
+    let text = &mut text;
     array(
-        &mut text,
+        text,
         "controller_actions",
-        states.clone().map(|state| number(state.action)).collect(),
+        states().map(|state| number(state.action)),
     );
-    let seen = states
-        .clone()
-        .flat_map(|state| &state.knowledge.observation[..]);
+    let seen = states().flat_map(|state| &state.knowledge.observation[..]);
+    array(text, "controller_seen", seen.map(|&value| value.into()));
     array(
-        &mut text,
-        "controller_seen",
-        seen.map(|&value| i64::from(value)).collect(),
-    );
-    array(
-        &mut text,
+        text,
         "controller_starts",
-        starts(states.clone().map(|state| state.next.len())),
+        starts(states().map(|state| state.next.len())),
     );
-    let targets = states.flat_map(|state| &state.next);
+    let targets = states().flat_map(|state| &state.next);
     array(
-        &mut text,
+        text,
         "controller_targets",
-        targets.map(|&(_, next)| next as i64).collect(),
+        targets.map(|&(_, next)| next as i64),
     );
     text.push_str(RUNTIME);
-    text
+    std::mem::take(text)
 }
 
 /// The comment that the file begins with, and its interface.

@@ -102,8 +102,14 @@ impl Span {
     }
 }
 
-/// `left - right` is at most the bound, or less if it is strict.
-type Comparison = (usize, usize, i32, bool);
+/// What is done in a discrete state.
+#[derive(Clone, Default, PartialEq, Eq, Hash)]
+struct Row {
+    /// Rules by the numbers of their zones and actions; action 0 is to wait.
+    rules: Vec<(usize, usize)>,
+    /// How many of them are the owner's own; behind them are the legs that are picked.
+    own: usize,
+}
 
 struct Tables {
     owner: Player,
@@ -111,12 +117,11 @@ struct Tables {
     spans: Vec<Span>,
     /// The packed states with the numbers of their rows, ascending by key.
     states: Vec<(Vec<u32>, usize)>,
-    /// Rules by zone and action; 0 is to wait. Behind them the legs that are picked, from this
-    /// index on. The first row stands for the end of play.
-    rows: Pool<(Vec<(usize, usize)>, usize)>,
+    /// The first row stands for the end of play.
+    rows: Pool<Row>,
     /// Zones as lists of constraints.
     zones: Pool<Vec<usize>>,
-    constraints: Pool<Comparison>,
+    constraints: Pool<Constraint>,
     actions: Pool<Vec<Part>>,
 }
 
@@ -141,7 +146,7 @@ impl Tables {
             constraints: Pool::new(),
             actions: Pool::new(),
         };
-        tables.rows.number((Vec::new(), 0));
+        tables.rows.number(Row::default());
         for entry in entries {
             let key = tables.key(entry.words);
             let row = tables.row(entry);
@@ -173,115 +178,125 @@ impl Tables {
         if entry.is_goal {
             return 0;
         }
-        let mut row = Vec::new();
+        let mut row = Row::default();
         let mut decided: Option<Federation> = None;
-        for Rule { action, mut zones } in entry.rules {
-            let own = zones.clone();
+        for mut rule in entry.rules {
+            let own = rule.zones.clone();
             if let Some(decided) = decided.as_ref().filter(|_| !self.is_permissive) {
-                decision_table::simplify_within(&mut zones, decided);
+                decision_table::simplify_within(&mut rule.zones, decided);
             }
-            let action = action.map_or(0, |parts| 1 + self.actions.number(parts));
-            for bounds in zones.zones() {
-                row.push((self.zone(bounds, zones.dimension()), action));
-            }
+            self.add(rule, &mut row);
             match &mut decided {
                 Some(decided) => _ = decided.unite(&own),
                 None => decided = Some(own),
             }
         }
-        let own = row.len();
-        for Rule { action, zones } in entry.legs {
-            let action = action.map_or(0, |parts| 1 + self.actions.number(parts));
-            for bounds in zones.zones() {
-                row.push((self.zone(bounds, zones.dimension()), action));
-            }
+        row.own = row.rules.len();
+        for leg in entry.legs {
+            self.add(leg, &mut row);
         }
-        self.rows.number((row, own))
+        self.rows.number(row)
+    }
+
+    /// Adds a rule to a row, once for each of its zones.
+    fn add(&mut self, rule: Rule, row: &mut Row) {
+        let action = rule
+            .action
+            .map_or(0, |parts| 1 + self.actions.number(parts));
+        for bounds in rule.zones.zones() {
+            row.rules
+                .push((self.zone(bounds, rule.zones.dimension()), action));
+        }
     }
 
     fn zone(&mut self, bounds: &[Bound], dimension: usize) -> usize {
         let mut zone = Vec::new();
         minimal::for_each_minimal(bounds, dimension, |one| {
-            let Constraint { left, right, bound } = one;
-            let comparison = (left, right, bound.value(), bound.is_strict());
-            zone.push(self.constraints.number(comparison));
+            zone.push(self.constraints.number(one));
         });
         self.zones.number(zone)
     }
 
     fn write(&self, network: &Network, text: &mut String) {
         self.write_actions(network, text);
-        let lows = self.spans.iter().map(|span| i64::from(span.low));
-        array(text, "controller_lows", lows.collect());
-        let ranges = self.spans.iter().map(|span| i64::from(span.range()));
-        array(text, "controller_ranges", ranges.collect());
-        let widths = self.spans.iter().map(|span| span.width() as i64);
-        array(text, "controller_widths", widths.collect());
+        let spans = || self.spans.iter();
+        array(text, "controller_lows", spans().map(|span| span.low.into()));
+        array(
+            text,
+            "controller_ranges",
+            spans().map(|span| span.range().into()),
+        );
+        array(
+            text,
+            "controller_widths",
+            spans().map(|span| span.width() as i64),
+        );
 
         let constraints = || self.constraints.all.iter();
         array(
             text,
             "controller_left",
-            constraints().map(|one| one.0 as i64).collect(),
+            constraints().map(|one| one.left as i64),
         );
         array(
             text,
             "controller_right",
-            constraints().map(|one| one.1 as i64).collect(),
+            constraints().map(|one| one.right as i64),
         );
+        let bounds = || constraints().map(|one| one.bound);
         array(
             text,
             "controller_bounds",
-            constraints().map(|one| one.2.into()).collect(),
+            bounds().map(|bound| bound.value().into()),
         );
         array(
             text,
             "controller_strict",
-            constraints().map(|one| one.3.into()).collect(),
+            bounds().map(|bound| bound.is_strict().into()),
         );
 
-        let zones = self.zones.all.iter();
-        array(
-            text,
-            "controller_zones",
-            starts(zones.clone().map(Vec::len)),
-        );
+        let zones = || self.zones.all.iter();
+        array(text, "controller_zones", starts(zones().map(Vec::len)));
+        let constraints = zones().flatten();
         array(
             text,
             "controller_constraints",
-            zones.flatten().map(|&one| one as i64).collect(),
+            constraints.map(|&one| one as i64),
         );
 
-        let rows = self.rows.all.iter();
+        let rows = || self.rows.all.iter();
         array(
             text,
             "controller_row_starts",
-            starts(rows.clone().map(|row| row.0.len())),
+            starts(rows().map(|row| row.rules.len())),
         );
         if self.has_legs() {
-            let own = rows.clone().map(|row| row.1 as i64);
-            array(text, "controller_row_owns", own.collect());
+            array(
+                text,
+                "controller_row_owns",
+                rows().map(|row| row.own as i64),
+            );
         }
-        let rules = || self.rows.all.iter().flat_map(|row| &row.0);
+        let rules = || rows().flat_map(|row| &row.rules);
         array(
             text,
             "controller_rule_zones",
-            rules().map(|rule| rule.0 as i64).collect(),
+            rules().map(|rule| rule.0 as i64),
         );
         array(
             text,
             "controller_rule_actions",
-            rules().map(|rule| rule.1 as i64).collect(),
+            rules().map(|rule| rule.1 as i64),
         );
 
         let rows = self.states.iter().map(|state| state.1 as i64);
-        array(text, "controller_rows", rows.collect());
+        array(text, "controller_rows", rows);
         self.write_keys(text);
     }
 
     /// Whether the strategy picks legs of moves of the controller.
     fn has_legs(&self) -> bool {
-        self.rows.all.iter().any(|row| row.1 < row.0.len())
+        self.rows.all.iter().any(|row| row.own < row.rules.len())
     }
 
     /// The texts of the actions, which a program may leave out.
@@ -412,8 +427,12 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
             );
         }
     });
-    let _ = write!(
-        text,
+    text + &interface(network, tables)
+}
+
+/// What the file declares.
+fn interface(network: &Network, tables: &Tables) -> String {
+    format!(
         " */\n\
          #include <stddef.h>\n\
          #include <stdint.h>\n\n\
@@ -426,7 +445,7 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
          #define CONTROLLER_WAIT (-1)\n\
          #define CONTROLLER_OVER (-2)\n\
          #define CONTROLLER_NONE (-3)\n\
-         #define CONTROLLER_STATE_WORDS {words}\n\
+         #define CONTROLLER_STATE_WORDS {}\n\
          #define CONTROLLER_CLOCKS {}\n\
          #define CONTROLLER_IS_PERMISSIVE {}\n\
          #define CONTROLLER_HAS_LEGS {}\n\
@@ -439,11 +458,11 @@ fn opening(network: &Network, strategy: &Strategy, query: &str, tables: &Tables)
          }} controller_decision;\n\n\
          controller_decision controller_decide(const int32_t *state, const controller_time *clocks);\n\
          int controller_allows(const int32_t *state, const controller_time *clocks, int action);\n\n",
+        tables.spans.len(),
         network.clocks.len().saturating_sub(1),
         i32::from(tables.is_permissive),
         i32::from(tables.has_legs()),
-    );
-    text
+    )
 }
 
 /// Text that stays inside a comment.
@@ -467,18 +486,17 @@ pub(super) fn quoted(text: &str) -> String {
 }
 
 /// Where each of the lists begins if they are put together, and the end of the last.
-pub(super) fn starts(lengths: impl Iterator<Item = usize>) -> Vec<i64> {
-    let mut end = 0;
-    let mut starts = vec![0];
-    starts.extend(lengths.map(|length| {
-        end += length as i64;
-        end
-    }));
-    starts
+pub(super) fn starts(lengths: impl Iterator<Item = usize>) -> impl Iterator<Item = i64> {
+    let ends = lengths.scan(0, |end, length| {
+        *end += length as i64;
+        Some(*end)
+    });
+    std::iter::once(0).chain(ends)
 }
 
 /// A table of the smallest type that holds its values.
-pub(super) fn array(text: &mut String, name: &str, values: Vec<i64>) {
+pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = i64>) {
+    let values: Vec<i64> = values.collect();
     let low = values.iter().copied().min().unwrap_or(0);
     let high = values.iter().copied().max().unwrap_or(0);
     let kind = match (low, high) {
