@@ -21,6 +21,7 @@ use crate::engine::format::{
 use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, JointQuery, LoadedModel, Options, Rejection, Verdict, Wanted};
 use crate::game::strategy::plan_list::PlanWalk;
+use crate::ir::Network;
 use crate::search::limits::StopReason;
 use crate::stochastic::Precision;
 
@@ -365,12 +366,20 @@ impl Answer {
 
     /// The traces in UPPAAL's form, with the runs with exact times; `None` without a trace.
     fn trace_text(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
-        written(slf, Answer::trace_text_or_none)
+        written(slf, |answer, network| {
+            let witnesses = &answer.inner.evidence.witnesses;
+            let texts = witnesses.iter().map(|one| text::witness_text(network, one));
+            (!witnesses.is_empty()).then(|| texts.collect::<Vec<_>>().join("\n"))
+        })
     }
 
     /// The traces as JSON; `None` without a trace.
     fn trace_json(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
-        written(slf, Answer::trace_json_or_none)
+        written(slf, |answer, network| {
+            let witnesses = &answer.inner.evidence.witnesses;
+            let write = || json::written(&json::witnesses(network, witnesses, &answer.query));
+            (!witnesses.is_empty()).then(write)
+        })
     }
 
     /// Of each trace, the zones of its states as matrices.
@@ -393,7 +402,16 @@ impl Answer {
     /// A piece of the file of the certificate: the first line is the piece 0. `None` without a
     /// certificate, and behind the last piece.
     fn certificate_piece(&self, py: Python<'_>, index: usize) -> PyResult<Option<String>> {
-        until_signal(py, || self.certificate_piece_or_none(index))
+        until_signal(py, || {
+            let certificate = self.inner.evidence.certificate.as_ref()?;
+            let Some(before) = index.checked_sub(1) else {
+                let head = |network: &Network| certificate.head(network, &self.query);
+                return Some(self.with_network(head));
+            };
+            let first = before * STATES_IN_PIECE;
+            let end = certificate.state_count().min(first + STATES_IN_PIECE);
+            (first < end).then(|| certificate.lines(first..end))
+        })
     }
 
     /// Whether the strategy and the traces passed their checks; `None` if none was made or one came
@@ -413,17 +431,22 @@ impl Answer {
             let stopped = &mut evidence.stopped.iter();
             let stop = stopped.find(|one| one.what == Wanted::Check);
             let stop = stop.map(|one| one.reason);
-            let describe =
-                |model: &mut LoadedModel| strategy_check::describe(model.network(), result, stop);
-            lines.extend(self.model.get().with(describe));
+            let describe = |network: &Network| strategy_check::describe(network, result, stop);
+            lines.extend(self.with_network(describe));
         }
         lines
     }
 
     /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
     fn strategy_json(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
-        written(slf, |answer| {
-            answer.strategy_json_or_none().map(LongText::new)
+        written(slf, |answer, network| {
+            let (evidence, query) = (&answer.inner.evidence, &answer.query);
+            let text = if let Some(machine) = &evidence.machine {
+                json::written(&machine_json::write(network, machine, query))
+            } else {
+                strategy_json::text(network, evidence.strategy.as_ref()?, query)
+            };
+            Some(LongText::new(text))
         })
     }
 
@@ -435,21 +458,40 @@ impl Answer {
         process: &str,
         variables: Vec<String>,
     ) -> PyResult<Option<Vec<DecisionEntry>>> {
-        until_signal(py, move || self.decisions_or_none(process, &variables))
+        until_signal(py, move || {
+            let strategy = self.inner.evidence.strategy.as_ref()?;
+            self.with_network(|network| {
+                let found = decisions::of_process(network, strategy, process, &variables)?;
+                let entries = found.into_iter();
+                let entries = entries.map(|one| (one.values, step_entry(network, &one.parts)));
+                Some(entries.collect())
+            })
+        })
     }
 
     /// The strategy, or the machine of a game with observations, as a controller in C; `None`
     /// without any.
     fn controller_c(slf: &Bound<'_, Self>) -> PyResult<Option<String>> {
-        let text = written(slf, Answer::controller_c_or_reason)?;
+        let text = written(slf, |answer, network| {
+            let (evidence, query) = (&answer.inner.evidence, &answer.query);
+            match (&evidence.machine, &evidence.strategy) {
+                (Some(machine), _) => Ok(Some(machine_c::write(network, machine, query))),
+                (None, Some(strategy)) => strategy_c::write(network, strategy, query).map(Some),
+                (None, None) => Ok(None),
+            }
+        })?;
         text.map_err(|reason| RejectedError::new_err((vec![format!("error: {reason}")],)))
     }
 
     /// The strategy as text in TIGA's form, or the machine of a game with observations; `None`
     /// without any.
     fn strategy_text(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
-        written(slf, |answer| {
-            answer.strategy_text_or_none().map(LongText::new)
+        written(slf, |answer, network| {
+            let text = match &answer.inner.evidence.machine {
+                Some(machine) => machine_json::text(network, machine, &answer.query),
+                None => strategy_text::write(network, answer.inner.evidence.strategy.as_ref()?),
+            };
+            Some(LongText::new(text))
         })
     }
 }
@@ -457,104 +499,20 @@ impl Answer {
 /// Writes something of an answer, perhaps something long, unless a signal comes.
 fn written<T: Send + 'static>(
     answer: &Bound<'_, Answer>,
-    write: impl FnOnce(&Answer) -> T + Send + 'static,
+    write: impl FnOnce(&Answer, &Network) -> T + Send + 'static,
 ) -> PyResult<T> {
     let held = answer.clone().unbind();
-    until_signal_apart(answer.py(), move || write(held.get()))
+    until_signal_apart(answer.py(), move || {
+        let answer = held.get();
+        answer.with_network(|network| write(answer, network))
+    })
 }
 
 /// A decision: the values of variables, each with all elements, and the edges of its move.
 type DecisionEntry = (Vec<Vec<i32>>, StepEntry);
 
 impl Answer {
-    fn trace_text_or_none(&self) -> Option<String> {
-        let witnesses = &self.inner.evidence.witnesses;
-        if witnesses.is_empty() {
-            return None;
-        }
-        let texts: Vec<String> = self.model.get().with(|model| {
-            let texts = witnesses.iter();
-            texts
-                .map(|one| text::witness_text(model.network(), one))
-                .collect()
-        });
-        Some(texts.join("\n"))
-    }
-
-    fn trace_json_or_none(&self) -> Option<String> {
-        let witnesses = &self.inner.evidence.witnesses;
-        if witnesses.is_empty() {
-            return None;
-        }
-        Some(
-            self.model.get().with(|model| {
-                json::written(&json::witnesses(model.network(), witnesses, &self.query))
-            }),
-        )
-    }
-
-    fn certificate_piece_or_none(&self, index: usize) -> Option<String> {
-        let certificate = self.inner.evidence.certificate.as_ref()?;
-        if index == 0 {
-            let model = self.model.get();
-            return Some(model.with(|model| certificate.head(model.network(), &self.query)));
-        }
-        let first = (index - 1) * STATES_IN_PIECE;
-        let end = certificate.state_count().min(first + STATES_IN_PIECE);
-        (first < end).then(|| certificate.lines(first..end))
-    }
-
-    fn strategy_json_or_none(&self) -> Option<String> {
-        if let Some(machine) = &self.inner.evidence.machine {
-            let write = |model: &mut LoadedModel| {
-                json::written(&machine_json::write(model.network(), machine, &self.query))
-            };
-            return Some(self.model.get().with(write));
-        }
-        let strategy = self.inner.evidence.strategy.as_ref()?;
-        Some(
-            self.model
-                .get()
-                .with(|model| strategy_json::text(model.network(), strategy, &self.query)),
-        )
-    }
-
-    fn decisions_or_none(&self, process: &str, variables: &[String]) -> Option<Vec<DecisionEntry>> {
-        let strategy = self.inner.evidence.strategy.as_ref()?;
-        self.model.get().with(|model| {
-            let network = model.network();
-            let found = decisions::of_process(network, strategy, process, variables)?;
-            let entries = found
-                .into_iter()
-                .map(|one| (one.values, step_entry(network, &one.parts)));
-            Some(entries.collect())
-        })
-    }
-
-    fn strategy_text_or_none(&self) -> Option<String> {
-        if let Some(machine) = &self.inner.evidence.machine {
-            let write =
-                |model: &mut LoadedModel| machine_json::text(model.network(), machine, &self.query);
-            return Some(self.model.get().with(write));
-        }
-        let strategy = self.inner.evidence.strategy.as_ref()?;
-        let write = |model: &mut LoadedModel| strategy_text::write(model.network(), strategy);
-        Some(self.model.get().with(write))
-    }
-
-    fn controller_c_or_reason(&self) -> Result<Option<String>, strategy_c::NoController> {
-        if let Some(machine) = &self.inner.evidence.machine {
-            let write =
-                |model: &mut LoadedModel| machine_c::write(model.network(), machine, &self.query);
-            return Ok(Some(self.model.get().with(write)));
-        }
-        let Some(strategy) = self.inner.evidence.strategy.as_ref() else {
-            return Ok(None);
-        };
-        let text = self
-            .model
-            .get()
-            .with(|model| strategy_c::write(model.network(), strategy, &self.query));
-        text.map(Some)
+    fn with_network<T>(&self, action: impl FnOnce(&Network) -> T) -> T {
+        self.model.get().with(|model| action(model.network()))
     }
 }

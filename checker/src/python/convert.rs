@@ -37,12 +37,19 @@ pub(super) fn unknown(what: &str, value: &str) -> PyErr {
     PyValueError::new_err(format!("unknown {what}: {value}"))
 }
 
+/// What a name stands for among these; `what` says what they are.
+pub(super) fn choice<T: Copy>(what: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
+    let found = known.iter().find(|one| one.0 == name);
+    found.map(|one| one.1).ok_or_else(|| unknown(what, name))
+}
+
 pub(super) fn code_engine(name: &str) -> PyResult<CodeEngine> {
-    match name {
-        "jit" => Ok(CodeEngine::Jit),
-        "interpreter" => Ok(CodeEngine::Interpreter),
-        other => Err(unknown("engine", other)),
-    }
+    use CodeEngine::{Interpreter, Jit};
+    choice(
+        "engine",
+        name,
+        &[("jit", Jit), ("interpreter", Interpreter)],
+    )
 }
 
 pub(super) fn time_limit(seconds: Option<f64>) -> PyResult<Option<Duration>> {
@@ -72,28 +79,19 @@ pub(super) fn stop_name(reason: StopReason) -> Option<&'static str> {
 }
 
 pub(super) fn forced_rule(name: &str) -> PyResult<Forced> {
-    match name {
-        "tiga" => Ok(Forced::Tiga),
-        "product" => Ok(Forced::Product),
-        "neutral" => Ok(Forced::Neutral),
-        other => Err(unknown("rule for forced moves", other)),
-    }
+    use Forced::{Neutral, Product, Tiga};
+    let known = [("tiga", Tiga), ("product", Product), ("neutral", Neutral)];
+    choice("rule for forced moves", name, &known)
 }
 
 pub(super) fn overflow_rule(name: &str) -> PyResult<Overflow> {
-    match name {
-        "wrap" => Ok(Overflow::Wrap),
-        "error" => Ok(Overflow::Error),
-        other => Err(unknown("rule for overflows", other)),
-    }
+    let known = [("wrap", Overflow::Wrap), ("error", Overflow::Error)];
+    choice("rule for overflows", name, &known)
 }
 
 pub(super) fn priority_rule(name: &str) -> PyResult<Priorities> {
-    match name {
-        "ignore" => Ok(Priorities::Ignored),
-        "keep" => Ok(Priorities::Kept),
-        other => Err(unknown("rule for priorities", other)),
-    }
+    let known = [("ignore", Priorities::Ignored), ("keep", Priorities::Kept)];
+    choice("rule for priorities", name, &known)
 }
 
 pub(super) fn rejected(rejection: Rejection) -> PyErr {

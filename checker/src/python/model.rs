@@ -116,6 +116,17 @@ fn json_list(entries: Vec<serde_json::Value>) -> String {
     serde_json::Value::Array(entries).to_string()
 }
 
+/// Writes something of a model as JSON, unless a signal comes.
+fn written(
+    model: &Bound<'_, Model>,
+    describe: fn(&LoadedModel) -> serde_json::Value,
+) -> PyResult<String> {
+    let held = model.clone().unbind();
+    until_signal_apart(model.py(), move || {
+        held.get().with(|model| json::written(&describe(model)))
+    })
+}
+
 /// What went wrong in the model.
 pub(super) fn failed(model: &LoadedModel, failure: Failure) -> PyErr {
     FailedError::new_err(text::failure_text(model, failure))
@@ -163,24 +174,14 @@ impl Model {
         self.with(|model| model.load_seconds)
     }
 
-    /// What is in the model, as JSON; see `engine::facts`.
+    /// What is in the model, as JSON; see `engine::format::model_json`.
     fn facts_json(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let model = slf.clone().unbind();
-        until_signal_apart(slf.py(), move || {
-            model
-                .get()
-                .with(|model| json::written(&model_json::facts(model)))
-        })
+        written(slf, model_json::facts)
     }
 
     /// The network, as JSON; see `engine::format::network_json`.
     fn network_json(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let model = slf.clone().unbind();
-        until_signal_apart(slf.py(), move || {
-            model
-                .get()
-                .with(|model| json::written(&network_json::network(model)))
-        })
+        written(slf, network_json::network)
     }
 
     /// The queries of the file, as JSON.

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::convert::{
-    code_engine, forced_rule, observer, priority_rule, reason_of, thread_count, time_limit, unknown,
+    choice, code_engine, forced_rule, observer, priority_rule, reason_of, thread_count, time_limit,
 };
 use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
@@ -171,13 +171,13 @@ fn rare_event(given: &Bound<'_, PyAny>) -> PyResult<Option<RareEvent>> {
 }
 
 fn mean_method(name: &str) -> PyResult<MeanMethod> {
-    match name {
-        "auto" => Ok(MeanMethod::Auto),
-        "student" => Ok(MeanMethod::Student),
-        "bernstein" => Ok(MeanMethod::EmpiricalBernstein),
-        "dkw" => Ok(MeanMethod::DvoretzkyKieferWolfowitz),
-        other => Err(unknown("interval of means", other)),
-    }
+    let known = [
+        ("auto", MeanMethod::Auto),
+        ("student", MeanMethod::Student),
+        ("bernstein", MeanMethod::EmpiricalBernstein),
+        ("dkw", MeanMethod::DvoretzkyKieferWolfowitz),
+    ];
+    choice("interval of means", name, &known)
 }
 
 /// A number for both sides of a threshold, or a number for each.
@@ -197,46 +197,42 @@ fn threads(given: &Bound<'_, PyAny>) -> PyResult<usize> {
 }
 
 fn order(name: &str, seed: u64) -> PyResult<Order> {
-    match name {
-        "bfs" => Ok(Order::BreadthFirst),
-        "dfs" => Ok(Order::DepthFirst),
-        "random" => Ok(Order::Random(seed)),
-        other => Err(unknown("search order", other)),
-    }
+    use Order::{BreadthFirst, DepthFirst, Random};
+    let known = [
+        ("bfs", BreadthFirst),
+        ("dfs", DepthFirst),
+        ("random", Random(seed)),
+    ];
+    choice("search order", name, &known)
 }
 
 fn under_choice(name: &str) -> PyResult<UnderChoice> {
-    match name {
-        "race" => Ok(UnderChoice::Race),
-        "eager" => Ok(UnderChoice::Eager),
-        "lazy" => Ok(UnderChoice::Lazy),
-        other => Err(unknown("choice under a strategy", other)),
-    }
+    use UnderChoice::{Eager, Lazy, Race};
+    let known = [("race", Race), ("eager", Eager), ("lazy", Lazy)];
+    choice("choice under a strategy", name, &known)
 }
 
 fn plans(wanted: &str, most: usize) -> PyResult<Option<usize>> {
-    match wanted {
-        "none" => Ok(None),
-        "all" => Ok(Some(most)),
-        other => Err(unknown("choice of plans", other)),
-    }
+    choice(
+        "choice of plans",
+        wanted,
+        &[("none", None), ("all", Some(most))],
+    )
 }
 
 fn strategy_wanted(name: &str) -> PyResult<StrategyWanted> {
-    match name {
-        "winner" => Ok(StrategyWanted::Winner),
-        "controller" => Ok(StrategyWanted::Controller),
-        other => Err(unknown("strategy", other)),
-    }
+    use StrategyWanted::{Controller, Winner};
+    choice(
+        "strategy",
+        name,
+        &[("winner", Winner), ("controller", Controller)],
+    )
 }
 
 fn trace_wanted(name: &str) -> PyResult<TraceWanted> {
-    match name {
-        "any" => Ok(TraceWanted::Any),
-        "shortest" => Ok(TraceWanted::Shortest),
-        "fastest" => Ok(TraceWanted::Fastest),
-        other => Err(unknown("trace", other)),
-    }
+    use TraceWanted::{Any, Fastest, Shortest};
+    let known = [("any", Any), ("shortest", Shortest), ("fastest", Fastest)];
+    choice("trace", name, &known)
 }
 
 /// `all`, `none`, or names with commas between them.
