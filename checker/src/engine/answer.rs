@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::evidence::witness::{Proof, Witness};
+use super::limits::{LimitWatch, stop_text};
 use crate::game::partial_observation::Machine;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::plan_list::PlanList;
@@ -93,18 +94,9 @@ impl Evidence {
     /// Whether the strategy and all runs passed their independent checks; `None` if there was none,
     /// or one came to no end.
     pub fn is_verified(&self) -> Option<bool> {
-        let strategy = self.verification.iter().map(|check| match check {
-            Ok(StrategyCheck::Verified(_)) => Some(true),
-            Ok(StrategyCheck::Violated(..)) => Some(false),
-            Ok(StrategyCheck::GivenUp(..)) | Err(_) => None,
-        });
+        let strategy = self.verification.iter().map(holds);
         let runs = self.witnesses.iter().filter_map(|one| one.run.as_ref());
-        let runs = runs.map(|run| match run {
-            Proof::Replayed(..) => Some(true),
-            Proof::Violated(..) | Proof::Impossible => Some(false),
-            Proof::Missing(_) => None,
-        });
-        let checks: Vec<Option<bool>> = strategy.chain(runs).collect();
+        let checks: Vec<Option<bool>> = strategy.chain(runs.map(Proof::holds)).collect();
         if checks.contains(&Some(false)) {
             return Some(false);
         }
@@ -193,9 +185,21 @@ impl Answer {
         Answer { verdict, ..self }
     }
 
+    /// Says how long it took since this watch began, and how much memory.
+    pub(super) fn measure(&mut self, watch: &LimitWatch) {
+        self.seconds = watch.seconds();
+        self.peak_bytes = watch.peak_bytes().max(self.counters.bytes);
+    }
+
     /// Notes that a limit came before this was made.
     pub(crate) fn lacks(&mut self, what: Wanted, reason: StopReason) {
         self.evidence.stopped.push(Stopped { what, reason });
+    }
+
+    /// Notes that a limit came before the strategy was made.
+    pub(crate) fn lacks_strategy(&mut self, reason: StopReason) {
+        self.lacks(Wanted::Strategy, reason);
+        self.remark(format!("no strategy: {}", stop_text(reason)));
     }
 
     /// Adds a remark for the user after the existing ones.
@@ -210,6 +214,15 @@ impl Answer {
 
 /// How the check of a strategy ended; an error says why it could not be done.
 pub type Verification = Result<StrategyCheck, verify::Error>;
+
+/// Whether a strategy passed its check; `None` if that came to no end.
+pub(super) fn holds(check: &Verification) -> Option<bool> {
+    match check {
+        Ok(StrategyCheck::Verified(_)) => Some(true),
+        Ok(StrategyCheck::Violated(..)) => Some(false),
+        Ok(StrategyCheck::GivenUp(..)) | Err(_) => None,
+    }
+}
 
 /// States that contain all reachable ones.
 #[derive(Clone, Debug, PartialEq, Eq)]

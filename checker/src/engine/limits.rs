@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use super::answer::Answer;
 use crate::cancellation::{self, Cut, Look, OUT_OF_NUMBERS};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
@@ -186,10 +185,14 @@ impl LimitWatch {
         result.map_err(|Cut| (self.stop(), self.shared.seen().counters))
     }
 
-    /// Says in an answer how long it took since the watch began, and how much memory.
-    pub(super) fn measure(&self, answer: &mut Answer) {
-        answer.seconds = self.shared.start.elapsed().as_secs_f64();
-        answer.peak_bytes = self.shared.seen().peak_bytes.max(answer.counters.bytes);
+    /// The seconds since it began.
+    pub(super) fn seconds(&self) -> f64 {
+        self.shared.start.elapsed().as_secs_f64()
+    }
+
+    /// The greatest number of bytes seen.
+    pub(super) fn peak_bytes(&self) -> u64 {
+        self.shared.seen().peak_bytes
     }
 
     /// Why an end was called for, by the limit of time or by the user.

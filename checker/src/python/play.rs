@@ -18,7 +18,7 @@ use crate::engine::session::play::{
     self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
 };
 use crate::engine::{LoadedModel, NamedStrategy};
-use crate::game::strategy::Selection;
+use crate::game::strategy::{self, Selection};
 use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.
@@ -26,6 +26,14 @@ use crate::verify::{self, Effort};
 pub(super) struct Strategy {
     model: Py<Model>,
     inner: Arc<Follower>,
+}
+
+impl Strategy {
+    fn new(model: Py<Model>, query: String, strategy: Arc<strategy::Strategy>) -> Strategy {
+        let follower = |model: &mut LoadedModel| Follower::new(model.network(), query, strategy);
+        let inner = Arc::new(model.get().with(follower));
+        Strategy { model, inner }
+    }
 }
 
 fn unadvised(model: &LoadedModel, why: Unadvised) -> PyErr {
@@ -57,12 +65,7 @@ impl Strategy {
         let answer = answer.get();
         let strategy = Arc::clone(answer.inner.evidence.strategy.as_ref()?);
         let query = unnamed(&answer.query).to_owned();
-        let model = answer.model.get();
-        let follower = model.with(|model| Follower::new(model.network(), query, strategy));
-        Some(Strategy {
-            model: answer.model.clone_ref(py),
-            inner: Arc::new(follower),
-        })
+        Some(Strategy::new(answer.model.clone_ref(py), query, strategy))
     }
 
     /// What a query under the strategy with this name follows, made now if only its winner is known
@@ -100,21 +103,19 @@ impl Strategy {
     /// Reads a strategy from the bytes of a file; `path` names it.
     #[staticmethod]
     fn read(model: &Bound<'_, Model>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Strategy> {
-        let follower = model.get().with(|model| {
-            let read = model.read_strategy(path, data.as_bytes());
-            let (query, strategy) = read.map_err(rejected)?;
-            let strategy = Arc::new(strategy);
-            Ok::<_, PyErr>(Follower::new(model.network(), query, strategy))
-        })?;
-        Ok(Strategy {
-            model: model.clone().unbind(),
-            inner: Arc::new(follower),
-        })
+        let inner = model.get();
+        let read = inner.with(|model| model.read_strategy(path, data.as_bytes()));
+        let (query, strategy) = read.map_err(rejected)?;
+        Ok(Strategy::new(
+            model.clone().unbind(),
+            query,
+            Arc::new(strategy),
+        ))
     }
 
     /// How many states it has.
     fn __len__(&self) -> usize {
-        self.inner.len()
+        self.inner.state_count()
     }
 
     /// The names of the model's processes and clocks.
@@ -149,12 +150,7 @@ impl Strategy {
     fn under(&self, py: Python<'_>) -> Option<Strategy> {
         let under = self.inner.strategy.under.as_ref()?;
         let (query, strategy) = (under.query.clone(), Arc::clone(&under.strategy));
-        let model = self.model.get();
-        let follower = model.with(|model| Follower::new(model.network(), query, strategy));
-        Some(Strategy {
-            model: self.model.clone_ref(py),
-            inner: Arc::new(follower),
-        })
+        Some(Strategy::new(self.model.clone_ref(py), query, strategy))
     }
 
     /// Where play begins, as JSON: "initial", "anywhere" or the run that leads there.
@@ -218,7 +214,8 @@ impl Strategy {
             let effort = &mut Effort::up_to(most);
             model.with(|model| inner.verify(model, rules, effort))
         })?;
-        result.map_err(rejected)
+        let checked = result.map_err(rejected)?;
+        Ok((checked.holds, checked.lines))
     }
 
     /// Lets queries of the model be asked under it by a name.

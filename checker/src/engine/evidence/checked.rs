@@ -1,8 +1,7 @@
 //! What the check of a file of evidence came to.
 
-use crate::engine::answer::Verification;
+use crate::engine::answer::{Verification, holds};
 use crate::ir::Network;
-use crate::verify::strategy::Outcome as StrategyOutcome;
 
 use super::strategy_check;
 
@@ -19,11 +18,7 @@ impl Checked {
     /// What the check of a strategy came to.
     pub(crate) fn of_strategy(network: &Network, result: &Verification) -> Checked {
         Checked {
-            holds: match result {
-                Ok(StrategyOutcome::Verified(_)) => Some(true),
-                Ok(StrategyOutcome::Violated(..)) => Some(false),
-                Ok(StrategyOutcome::GivenUp(..)) | Err(_) => None,
-            },
+            holds: holds(result),
             lines: strategy_check::describe(network, result, None),
         }
     }

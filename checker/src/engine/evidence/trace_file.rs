@@ -62,11 +62,7 @@ pub(super) fn check_file(
         let run = run_of(network, &trace["run"])
             .ok_or("the run in it does not fit the model".to_owned())?;
         let (proof, difference) = replay_of(network, query, trace, run)?;
-        let holds = match &proof {
-            Proof::Replayed(..) => Some(difference.is_ok()),
-            Proof::Violated(..) | Proof::Impossible => Some(false),
-            Proof::Missing(_) => None,
-        };
+        let holds = proof.holds().map(|holds| holds && difference.is_ok());
         checked.holds = match (checked.holds, holds) {
             (Some(false), _) | (_, Some(false)) => Some(false),
             (Some(true), Some(true)) => Some(true),

@@ -61,6 +61,17 @@ pub enum Proof {
     Missing(Missing),
 }
 
+impl Proof {
+    /// Whether the run shows what it should; `None` if there is none.
+    pub(crate) fn holds(&self) -> Option<bool> {
+        match self {
+            Proof::Replayed(..) => Some(true),
+            Proof::Violated(..) | Proof::Impossible => Some(false),
+            Proof::Missing(_) => None,
+        }
+    }
+}
+
 /// Why there is no run with exact times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Missing {

@@ -89,7 +89,7 @@ fn answer_within_limits(problem: Problem<'_>, query: &QueryKind) -> Answer {
     if options.plans.is_some() {
         game::note_missing_plans(&mut answer, query, problem.under.is_some());
     }
-    watch.measure(&mut answer);
+    answer.measure(&watch);
     answer
 }
 

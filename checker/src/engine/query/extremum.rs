@@ -13,7 +13,7 @@ use crate::search::optimum::value_goal::Taking;
 use crate::search::reachability::search;
 use crate::verify::replay::Shown;
 
-use super::optimal_trace::{Sought, best, not_the_best};
+use super::optimal_trace::{Sought, best_instead};
 use super::problem::{Problem, live_variables, symbolic};
 use super::witnesses::{Witnesses, found};
 use crate::engine::answer::{Answer, Evidence, Values, Verdict};
@@ -162,16 +162,10 @@ impl Runs<'_> {
             predicate: self.question.predicate,
             atoms,
         };
-        let (trace, deadline) = match best(self.problem, &mut symbolic, sought, watch) {
-            Ok(None) => (trace, None),
-            Ok(Some((best, deadline))) => (best, deadline),
-            Err(reason) => {
-                self.why_not_best = Some(not_the_best(&reason));
-                (trace, None)
-            }
-        };
+        let mut witnesses = Witnesses::new(&mut symbolic, options);
+        let (trace, deadline) = best_instead(trace, &mut witnesses, self.problem, sought, watch);
         let mut words = trace.states.last()?.0.clone();
-        let constraints = taking.constraints(&mut symbolic, &mut words).ok()??;
+        let constraints = taking.constraints(witnesses.symbolic, &mut words).ok()??;
         let shows = Shows::Takes(Takes {
             item,
             measure: taking.measure,
@@ -184,15 +178,15 @@ impl Runs<'_> {
             constraints: &constraints,
             deadline,
         });
-        let mut witnesses = Witnesses::new(&mut symbolic, options);
         let verdict = witnesses.add(trace, None, shows);
+        self.why_not_best = witnesses.message.take().or(self.why_not_best.take());
         let which = if taking.is_greatest {
             "greatest"
         } else {
             "least"
         };
         let text = &self.question.items[item].1;
-        let found = witnesses.into_evidence().witnesses.into_iter();
+        let found = witnesses.into_witnesses().into_iter();
         self.witnesses.extend(found.map(|witness| Witness {
             title: Some(format!("{which} {text}")),
             ..witness

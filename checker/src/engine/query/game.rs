@@ -331,9 +331,7 @@ impl<'a> Game<'a> {
             // early.
             Err(Failure::Interrupted) => {
                 let reason = watch.look(&solver.counters());
-                let reason = reason.unwrap_or(StopReason::Interrupted);
-                answer.lacks(Wanted::Strategy, reason);
-                answer.remark(format!("no strategy: {}", stop_text(reason)));
+                answer.lacks_strategy(reason.unwrap_or(StopReason::Interrupted));
             }
             Err(failure) => answer.verdict = Verdict::Error(failure),
         }

@@ -116,7 +116,7 @@ impl LoadedModel {
             }
         };
         for answer in &mut answers {
-            watch.measure(answer);
+            answer.measure(&watch);
         }
         Ok(answers)
     }

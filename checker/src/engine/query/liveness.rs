@@ -6,7 +6,7 @@
 
 use crate::analysis::Abstraction;
 use crate::ir::Predicate;
-use crate::network::{Failure, Symbolic};
+use crate::network::Symbolic;
 use crate::search::liveness::emptiness::Liveness;
 use crate::search::liveness::ending::RunEnding;
 use crate::search::liveness::leads_to::{self, Unanswered};
@@ -16,13 +16,13 @@ use crate::search::timed_trace::schedule::Stays;
 use crate::search::{Outcome, Trace};
 
 use super::attempts::{Accuracy, first_of_use};
-use super::optimal_trace::not_the_best;
+use super::optimal_trace::{found_best, not_the_best};
 use super::problem::{Problem, can_be_coarse, coarse, symbolic};
 use super::witnesses::Witnesses;
-use crate::engine::answer::{Answer, Verdict};
+use crate::engine::answer::Answer;
 use crate::engine::evidence::timed_run::Shows;
-use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
-use crate::engine::{Options, TraceWanted};
+use crate::engine::limits::LimitWatch;
+use crate::engine::options::TraceWanted;
 
 /// The result of a search in coarser zones, unless it found something that may not exist; otherwise
 /// the result of the same search in exact zones.
@@ -56,28 +56,17 @@ pub(super) fn always<'a>(problem: Problem<'a>, keep: &Predicate, watch: &mut Lim
     let is_found = |(.., outcome): &(_, _, Result<_, _>)| matches!(outcome, Ok(Outcome::Found(_)));
     let (mut symbolic, search, outcome) = settle(problem, &[keep], search, is_found);
     let mut witnesses = Witnesses::new(&mut symbolic, problem.options).doubting(search.is_coarse());
-    let mut message = None;
-    let verdict = match outcome {
-        Ok(Outcome::Found(run)) => {
+    let verdict = match witnesses.found_by(outcome) {
+        Ok(run) => {
             let wanted = Wanted { open: None, keep };
             let any = (run.trace, run.ending, 0);
-            let best = best(&mut witnesses, wanted, problem.options, watch);
-            let (trace, ending, _) = chosen(any, best, &mut message);
+            let (trace, ending, _) = best_instead(any, &mut witnesses, wanted, problem, watch);
             let shows = Shows::Stays(Stays { from: None, keep });
             witnesses.add(trace, Some(ending), shows)
         }
-        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
-        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, trace)) => {
-            witnesses.add(trace, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
+        Err(verdict) => verdict,
     };
-    Answer {
-        message,
-        evidence: witnesses.into_evidence(),
-        ..Answer::new(verdict, search.counters())
-    }
+    witnesses.into_answer(verdict, search.counters())
 }
 
 /// Does every state of `open` lead out of `keep`?
@@ -96,9 +85,15 @@ pub(super) fn leads_to<'a>(
         |(.., report): &(_, _, report::Report)| matches!(report.outcome, Ok(Outcome::Found(_)));
     let (mut symbolic, mut goal, report) = settle(problem, &[open, keep], search, is_found);
     let mut witnesses = Witnesses::new(&mut symbolic, problem.options).doubting(goal.is_coarse());
-    let mut message = None;
-    let verdict = match report.outcome {
-        Ok(Outcome::Found(way)) => {
+    let outcome = report.outcome.map_err(|(failure, way)| {
+        let way = match goal.failed.take() {
+            None => way,
+            Some(run) => leads_to::joined(way, run).0,
+        };
+        (failure, way)
+    });
+    let verdict = match witnesses.found_by(outcome) {
+        Ok(way) => {
             let run = goal.run.take().expect("the search ended at a run");
             let (trace, start) = leads_to::joined(way, run.trace);
             let any = (trace, run.ending.moved(start), start);
@@ -106,76 +101,46 @@ pub(super) fn leads_to<'a>(
                 open: Some(open),
                 keep,
             };
-            let best = best(&mut witnesses, wanted, problem.options, watch);
-            let (trace, ending, start) = chosen(any, best, &mut message);
+            let (trace, ending, start) = best_instead(any, &mut witnesses, wanted, problem, watch);
             let stays = Stays {
                 from: Some((start, open)),
                 keep,
             };
             witnesses.add(trace, Some(ending), Shows::Stays(stays))
         }
-        Ok(Outcome::Exhausted) => Verdict::NotSatisfied,
-        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, way)) => {
-            let below = goal.failed.take();
-            let way = match below {
-                None => way,
-                Some(run) => leads_to::joined(way, run).0,
-            };
-            witnesses.add(way, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
+        Err(verdict) => verdict,
     };
-    let answer = Answer {
-        message,
-        evidence: witnesses.into_evidence(),
-        ..Answer::new(verdict, report.counters)
-    };
+    let answer = witnesses.into_answer(verdict, report.counters);
     answer.negated()
 }
 
 /// A trace, how it ends, and the state in which it begins to stay.
 type Endless = (Trace, RunEnding, usize);
 
-/// The best trace, or any one with a message that says why.
-fn chosen(
+/// This trace, or the one with the fewest moves in its place if that is wanted and found.
+fn best_instead(
     any: Endless,
-    best: Result<Option<Endless>, String>,
-    message: &mut Option<String>,
-) -> Endless {
-    match best {
-        Ok(best) => best.unwrap_or(any),
-        Err(reason) => {
-            *message = Some(not_the_best(&reason));
-            any
-        }
-    }
-}
-
-/// The trace with the fewest moves; `None` if any trace will do.
-fn best(
     witnesses: &mut Witnesses<'_, '_>,
     wanted: Wanted<'_>,
-    options: &Options,
+    problem: Problem<'_>,
     watch: &mut LimitWatch,
-) -> Result<Option<Endless>, String> {
-    match options.trace {
-        TraceWanted::Any => return Ok(None),
-        TraceWanted::Shortest => {}
-        TraceWanted::Fastest => {
-            return Err("a run that never ends takes no least time".to_owned());
+) -> Endless {
+    let best = match problem.options.trace {
+        TraceWanted::Any => return any,
+        TraceWanted::Fastest => Err("a run that never ends takes no least time".to_owned()),
+        TraceWanted::Shortest if witnesses.is_doubtful() => {
+            Err("where clocks stand still, what has the fewest moves may be no run".to_owned())
         }
-    }
-    if witnesses.is_doubtful() {
-        return Err("where clocks stand still, what has the fewest moves may be no run".to_owned());
-    }
-    let search = shortest_lasso::LassoSearch::new(witnesses.symbolic, wanted);
-    match cut_as_interrupted(|| search.run(watch)) {
-        Ok(Outcome::Found((run, start))) => Ok(Some((run.trace, run.ending, start))),
-        Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
-        Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
-        // The search for any run did not reach the state that fails.
-        Err(_) => Err("the model fails in a state beside it".to_owned()),
+        TraceWanted::Shortest => {
+            let search = shortest_lasso::LassoSearch::new(witnesses.symbolic, wanted);
+            found_best(watch, |watch| search.run(watch))
+        }
+    };
+    match best {
+        Ok((run, start)) => (run.trace, run.ending, start),
+        Err(reason) => {
+            witnesses.message = Some(not_the_best(&reason));
+            any
+        }
     }
 }

@@ -12,6 +12,7 @@ use crate::zones::Bound;
 
 use super::problem::{Problem, symbolic};
 use super::time_clock::with_time;
+use super::witnesses::Witnesses;
 use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
 use crate::engine::options::TraceWanted;
 
@@ -29,9 +30,41 @@ pub(super) fn not_the_best(reason: &str) -> String {
     format!("the trace is not the one wanted: {reason}")
 }
 
+/// What a search for the best finds, or why there is nothing better than what was found before.
+pub(super) fn found_best<T>(
+    watch: &mut LimitWatch,
+    search: impl FnOnce(&mut LimitWatch) -> Result<Outcome<T>, Failure>,
+) -> Result<T, String> {
+    match cut_as_interrupted(|| search(watch)) {
+        Ok(Outcome::Found(best)) => Ok(best),
+        Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
+        Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
+        Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
+        // The search for any trace did not reach the state that fails.
+        Err(_) => Err("the model fails in a state beside it".to_owned()),
+    }
+}
+
+/// This trace, or in its place the best one with its time, if that is wanted and found. The zones
+/// of the witnesses keep the comparisons of what is sought.
+pub(super) fn best_instead(
+    any: Trace,
+    witnesses: &mut Witnesses<'_, '_>,
+    problem: Problem<'_>,
+    sought: Sought<'_>,
+    watch: &mut LimitWatch,
+) -> (Trace, Option<best_first::Cost>) {
+    match best(problem, witnesses.symbolic, sought, watch) {
+        Ok(best) => best.unwrap_or((any, None)),
+        Err(reason) => {
+            witnesses.message = Some(not_the_best(&reason));
+            (any, None)
+        }
+    }
+}
+
 /// The trace with the fewest moves or the least time, and its time; `None` if any trace will do.
-/// `zones` keeps the comparisons of what is sought.
-pub(super) fn best(
+fn best(
     problem: Problem<'_>,
     zones: &mut Symbolic<'_>,
     sought: Sought<'_>,
@@ -48,7 +81,7 @@ pub(super) fn best(
         TraceWanted::Shortest => {
             let mut search =
                 best_first::BestFirst::new(zones, &*target, best_first::Measure::Moves, none);
-            cut_as_interrupted(|| search.run(watch))
+            found_best(watch, |watch| search.run(watch))?
         }
         TraceWanted::Fastest if problem.under.is_some() => {
             return Err("there is none for fastest traces under a strategy".to_owned());
@@ -63,20 +96,11 @@ pub(super) fn best(
             let mut zones = symbolic(problem, &[predicate], &atoms, Abstraction::LowerUpper);
             let measure = best_first::Measure::Time(clock);
             let mut search = best_first::BestFirst::new(&mut zones, &*target, measure, none);
-            cut_as_interrupted(|| search.run(watch))
+            found_best(watch, |watch| search.run(watch))?
         }
     };
-    match way {
-        Ok(Outcome::Found(way)) => {
-            let deadline = (problem.options.trace == TraceWanted::Fastest).then_some(way.cost);
-            Ok(Some((way.trace(zones, target), deadline)))
-        }
-        Ok(Outcome::Exhausted) => Err("a search for it finds none".to_owned()),
-        Ok(Outcome::Stopped(reason)) => Err(stop_text(reason).to_owned()),
-        Err(Failure::Interrupted) => Err(stop_text(watch.stop()).to_owned()),
-        // The search for any trace did not reach the state that fails.
-        Err(_) => Err("the model fails in a state beside it".to_owned()),
-    }
+    let deadline = (problem.options.trace == TraceWanted::Fastest).then_some(way.cost);
+    Ok(Some((way.trace(zones, target), deadline)))
 }
 
 /// A comparison that keeps the lower bounds of the clock apart, up to the longest time for which

@@ -12,10 +12,10 @@ use crate::search::reachability::search;
 use crate::search::{Outcome, Trace};
 
 use super::attempts::{Accuracy, first_of_use};
-use super::optimal_trace::{Sought, best, not_the_best};
+use super::optimal_trace::{Sought, best_instead};
 use super::problem::{Problem, can_be_coarse, coarse, live_variables, symbolic};
 use super::witnesses::Witnesses;
-use crate::engine::answer::{Answer, Evidence, Verdict, Wanted};
+use crate::engine::answer::{Answer, Verdict, Wanted};
 use crate::engine::evidence::certificate;
 use crate::engine::evidence::timed_run::Shows;
 use crate::engine::limits::LimitWatch;
@@ -92,70 +92,55 @@ fn conclude(
     searched: Searched<'_>,
     watch: &mut LimitWatch,
 ) -> Answer {
-    let options = problem.options;
     let Searched {
         mut symbolic,
         report,
     } = searched;
     let counters = report.counters;
-    let mut witnesses = Witnesses::new(&mut symbolic, options);
-    let (mut certificate, mut stop) = (None, None);
-    let mut message = None;
-    let verdict = match report.outcome {
-        Ok(Outcome::Found(trace)) => {
-            let symbolic = &mut *witnesses.symbolic;
+    let mut witnesses = Witnesses::new(&mut symbolic, problem.options);
+    let verdict = match witnesses.found_by(report.outcome) {
+        Ok(trace) => {
             let sought = Sought {
                 target: &mut &*goal,
                 predicate: goal,
                 atoms: Vec::new(),
             };
-            let (trace, deadline) = match best(problem, symbolic, sought, watch) {
-                Ok(None) => (trace, None),
-                Ok(Some((best, deadline))) => (best, deadline),
-                Err(reason) => {
-                    message = Some(not_the_best(&reason));
-                    (trace, None)
-                }
-            };
+            let (trace, deadline) = best_instead(trace, &mut witnesses, problem, sought, watch);
             witnesses.add(trace, None, Shows::Reaches(goal, deadline))
         }
-        Ok(Outcome::Exhausted) => {
-            if options.certificate && problem.under.is_some() {
-                message = Some("no certificate: it would be about the model alone".to_owned());
-            } else if options.certificate {
-                let whole = certificate::with_all_words(problem.network);
-                let problem = Problem {
-                    network: &whole,
-                    ..problem
-                };
-                let mut zones = self::symbolic(problem, &[goal], &[], Abstraction::LowerUpper);
-                match certificate::reached(&mut zones, goal, counters, watch) {
-                    Ok(reached) => certificate = Some(reached),
-                    Err((why, reason)) => {
-                        message = Some(format!("no certificate: {why}"));
-                        stop = reason;
-                    }
-                }
-            }
-            Verdict::NotSatisfied
-        }
-        Ok(Outcome::Stopped(reason)) => Verdict::Unknown(reason),
-        Err((failure, trace)) => {
-            witnesses.add(trace, None, Shows::Possible);
-            Verdict::Error(failure)
-        }
+        Err(verdict) => verdict,
     };
-    let evidence = Evidence {
-        certificate,
-        ..witnesses.into_evidence()
-    };
-    let mut answer = Answer {
-        message,
-        evidence,
-        ..Answer::new(verdict, counters)
-    };
-    if let Some(reason) = stop {
-        answer.lacks(Wanted::Certificate, reason);
+    let mut answer = witnesses.into_answer(verdict, counters);
+    if verdict == Verdict::NotSatisfied && problem.options.certificate {
+        add_certificate(&mut answer, problem, goal, watch);
     }
     answer
+}
+
+/// Adds the states that are reached, none of which satisfies the goal, or why there are none.
+fn add_certificate(
+    answer: &mut Answer,
+    problem: Problem<'_>,
+    goal: &Predicate,
+    watch: &mut LimitWatch,
+) {
+    if problem.under.is_some() {
+        answer.remark("no certificate: it would be about the model alone");
+        return;
+    }
+    let whole = certificate::with_all_words(problem.network);
+    let problem = Problem {
+        network: &whole,
+        ..problem
+    };
+    let mut zones = symbolic(problem, &[goal], &[], Abstraction::LowerUpper);
+    match certificate::reached(&mut zones, goal, answer.counters, watch) {
+        Ok(reached) => answer.evidence.certificate = Some(reached),
+        Err((why, reason)) => {
+            answer.remark(format!("no certificate: {why}"));
+            if let Some(reason) = reason {
+                answer.lacks(Wanted::Certificate, reason);
+            }
+        }
+    }
 }

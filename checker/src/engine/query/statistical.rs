@@ -62,7 +62,7 @@ impl LoadedModel {
             Ok(Err(failure)) => self.after_failure(&failure, query, &watch)?,
             Ok(Ok(answer)) => concluded(answer, asked, &watch),
         };
-        watch.measure(&mut answer);
+        answer.measure(&watch);
         Ok(answer)
     }
 

@@ -39,8 +39,8 @@ use super::game;
 use super::game_zones::{self, add_check, objective_atoms, zones_of};
 use super::problem::{Problem, has_differences};
 use super::time_clock::{TIME, with_time};
-use crate::engine::answer::{Answer, Values, Verdict, Wanted};
-use crate::engine::limits::{LimitWatch, cut_as_interrupted, stop_text};
+use crate::engine::answer::{Answer, Values, Verdict};
+use crate::engine::limits::{LimitWatch, cut_as_interrupted};
 use crate::engine::options::Options;
 
 /// The limit to start from if the query has none.
@@ -285,10 +285,8 @@ impl ClockedGame<'_> {
     ) {
         let strategy = match cut_as_interrupted(|| self.strategy(limit, watch)) {
             Ok(Ok(strategy)) => strategy,
-            Ok(Err(reason)) => {
-                return Self::lacks_strategy(answer, reason);
-            }
-            Err(Failure::Interrupted) => return Self::lacks_strategy(answer, watch.stop()),
+            Ok(Err(reason)) => return answer.lacks_strategy(reason),
+            Err(Failure::Interrupted) => return answer.lacks_strategy(watch.stop()),
             Err(failure) => {
                 answer.verdict = Verdict::Error(failure);
                 return;
@@ -304,11 +302,6 @@ impl ClockedGame<'_> {
             }
         });
         answer.evidence.strategy = Some(Arc::new(strategy));
-    }
-
-    fn lacks_strategy(answer: &mut Answer, reason: StopReason) {
-        answer.lacks(Wanted::Strategy, reason);
-        answer.remark(format!("no strategy: {}", stop_text(reason)));
     }
 
     /// The strategy of the player who wins with this limit.

@@ -1,12 +1,13 @@
 //! Collects what backs an answer: traces, with their runs in exact times.
 
 use crate::cancellation;
-use crate::network::Symbolic;
 use crate::network::symbolic::predicate;
-use crate::search::Trace;
+use crate::network::{Failure, Symbolic};
+use crate::search::limits::Counters;
 use crate::search::liveness::ending::RunEnding;
+use crate::search::{Outcome, Trace};
 
-use crate::engine::answer::{Evidence, Verdict};
+use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::evidence::timed_run::{self, Shows, Takes, ToProve};
 use crate::engine::evidence::witness::{Missing, Proof, Witness, WitnessKind};
 use crate::engine::options::Options;
@@ -29,6 +30,8 @@ pub(super) struct Witnesses<'w, 'a> {
     /// Whether the runs follow a strategy.
     is_restricted: bool,
     found: Vec<Witness>,
+    /// A remark for the user.
+    pub(super) message: Option<String>,
 }
 
 impl<'w, 'a> Witnesses<'w, 'a> {
@@ -39,6 +42,7 @@ impl<'w, 'a> Witnesses<'w, 'a> {
             is_restricted: symbolic.is_restricted(),
             symbolic,
             found: Vec::new(),
+            message: None,
         }
     }
 
@@ -99,10 +103,35 @@ impl<'w, 'a> Witnesses<'w, 'a> {
         found(self.is_doubtful && !is_replayed)
     }
 
-    pub(super) fn into_evidence(self) -> Evidence {
-        Evidence {
+    /// What a search has found, or the verdict without it; with the way to a failure.
+    pub(super) fn found_by<T>(
+        &mut self,
+        outcome: Result<Outcome<T>, (Failure, Trace)>,
+    ) -> Result<T, Verdict> {
+        match outcome {
+            Ok(Outcome::Found(found)) => Ok(found),
+            Ok(Outcome::Exhausted) => Err(Verdict::NotSatisfied),
+            Ok(Outcome::Stopped(reason)) => Err(Verdict::Unknown(reason)),
+            Err((failure, trace)) => {
+                self.add(trace, None, Shows::Possible);
+                Err(Verdict::Error(failure))
+            }
+        }
+    }
+
+    pub(super) fn into_witnesses(self) -> Vec<Witness> {
+        self.found
+    }
+
+    pub(super) fn into_answer(self, verdict: Verdict, counters: Counters) -> Answer {
+        let evidence = Evidence {
             witnesses: self.found,
             ..Evidence::default()
+        };
+        Answer {
+            message: self.message,
+            evidence,
+            ..Answer::new(verdict, counters)
         }
     }
 }

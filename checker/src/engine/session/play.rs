@@ -19,10 +19,11 @@ use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
-use crate::verify::strategy::{Outcome, Owner};
+use crate::verify::strategy::Owner;
 use crate::verify::timed::{Timed, least_multiple};
 use crate::verify::{self, Effort, Part, Semantics};
 
+use crate::engine::evidence::checked::Checked;
 use crate::engine::evidence::strategy_check::{self, Played};
 use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::{json, strategy_json};
@@ -100,14 +101,9 @@ impl Follower {
         }
     }
 
-    /// How many states it has.
-    pub fn len(&self) -> usize {
+    /// How many discrete states it has.
+    pub fn state_count(&self) -> usize {
         self.by_words.len()
-    }
-
-    /// Whether it has none.
-    pub fn is_empty(&self) -> bool {
-        self.by_words.is_empty()
     }
 
     /// The part of the strategy for some words; without a state if it has none for them.
@@ -198,25 +194,18 @@ impl Follower {
         Ok(json!({ "over": false, "now": described(&advice.now), "waiting": waiting }))
     }
 
-    /// Checks in closed loop that the owner wins. Returns whether this is so (`None` if the check
-    /// does not cover it), and what was checked.
+    /// Checks in closed loop that the owner wins.
     pub fn verify(
         &self,
         model: &mut LoadedModel,
         rules: Rules,
         effort: &mut Effort<'_>,
-    ) -> Result<(Option<bool>, Vec<String>), Rejection> {
+    ) -> Result<Checked, Rejection> {
         let text = model.add_query(&self.query);
         let decisions = strategy_check::decisions(model.network(), &self.strategy);
         let played = Played::new(&self.strategy, &decisions);
         let result = model.verify_strategy(&text, played, rules, effort)?;
-        let holds = match &result {
-            Ok(Outcome::Verified(_)) => Some(true),
-            Ok(Outcome::Violated(..)) => Some(false),
-            Ok(Outcome::GivenUp(..)) | Err(_) => None,
-        };
-        let lines = strategy_check::describe(model.network(), &result, None);
-        Ok((holds, lines))
+        Ok(Checked::of_strategy(model.network(), &result))
     }
 }
 
