@@ -19,6 +19,7 @@ use crate::engine::session::play::{
 };
 use crate::engine::{LoadedModel, NamedStrategy};
 use crate::game::strategy::{self, Selection};
+use crate::ir::Network;
 use crate::verify::{self, Effort};
 
 /// A strategy of one of the players.
@@ -34,6 +35,16 @@ impl Strategy {
         let inner = Arc::new(model.get().with(follower));
         Strategy { model, inner }
     }
+}
+
+/// What the network of a model answers; `refused` makes the exception if it does not.
+fn asked<T, E>(
+    model: &Py<Model>,
+    ask: impl FnOnce(&Network) -> Result<T, E>,
+    refused: fn(&LoadedModel, E) -> PyErr,
+) -> PyResult<T> {
+    let answer = |model: &mut LoadedModel| ask(model.network()).map_err(|why| refused(model, why));
+    model.get().with(answer)
 }
 
 fn unadvised(model: &LoadedModel, why: Unadvised) -> PyErr {
@@ -156,11 +167,8 @@ impl Strategy {
     /// Where play begins, as JSON: "initial", "anywhere" or the run that leads there.
     fn start_json(&self, priorities: &str) -> PyResult<String> {
         let priorities = priority_rule(priorities)?;
-        self.model.get().with(|model| {
-            let start = self.inner.start(model.network(), priorities);
-            let start = start.map_err(|error| failed(model, error))?;
-            Ok(start.to_string())
-        })
+        let start = |network: &Network| self.inner.start(network, priorities);
+        Ok(asked(&self.model, start, failed)?.to_string())
     }
 
     /// The time limit that it is for; `None` without one.
@@ -180,21 +188,15 @@ impl Strategy {
     /// The entry of its file for a state, given as JSON with `locations` and `variables`.
     fn state_json(&self, state: &str) -> PyResult<String> {
         let state = object(state)?;
-        self.model.get().with(|model| {
-            let entry = self.inner.state(model.network(), &state);
-            let entry = entry.map_err(|why| unadvised(model, why))?;
-            Ok(entry.to_string())
-        })
+        let entry = |network: &Network| self.inner.state(network, &state);
+        Ok(asked(&self.model, entry, unadvised)?.to_string())
     }
 
     /// What it says in a state, given as JSON with `clocks` too; see `engine::play`.
     fn advice_json(&self, state: &str) -> PyResult<String> {
         let state = object(state)?;
-        self.model.get().with(|model| {
-            let advice = self.inner.advice(model.network(), &state);
-            let advice = advice.map_err(|why| unadvised(model, why))?;
-            Ok(advice.to_string())
-        })
+        let advice = |network: &Network| self.inner.advice(network, &state);
+        Ok(asked(&self.model, advice, unadvised)?.to_string())
     }
 
     /// Checks it in closed loop: whether its owner wins (`None` if the check does not cover it),
@@ -283,11 +285,8 @@ impl Play {
 
     /// What can happen, as JSON; see `engine::play`.
     fn situation_json(&self) -> PyResult<String> {
-        self.model.get().with(|model| {
-            let situation = self.inner.situation(model.network());
-            let situation = situation.map_err(|error| failed(model, error))?;
-            Ok(situation.to_string())
-        })
+        let situation = |network: &Network| self.inner.situation(network);
+        Ok(asked(&self.model, situation, failed)?.to_string())
     }
 
     /// Lets a fraction of the unit pass, and then a move be made: the reply of the opponent with an
@@ -309,22 +308,22 @@ impl Play {
             (None, Some(index)) => Done::Allowed(index),
             (None, None) => Done::Nothing,
         };
-        self.model.get().with(|model| {
-            let wait = Wait {
-                numerator,
-                denominator,
-            };
-            let made = self.inner.pass(model.network(), wait, done);
-            made.map_err(|why| refused(model, why))
-        })
+        let wait = Wait {
+            numerator,
+            denominator,
+        };
+        let inner = &mut self.inner;
+        asked(
+            &self.model,
+            |network| inner.pass(network, wait, done),
+            refused,
+        )
     }
 
     /// Time passes until the strategy acts, and it does.
     fn follow(&mut self) -> PyResult<()> {
-        self.model.get().with(|model| {
-            let made = self.inner.follow(model.network());
-            made.map_err(|why| refused(model, why))
-        })
+        let inner = &mut self.inner;
+        asked(&self.model, |network| inner.follow(network), refused)
     }
 
     /// Takes back steps until only this number is left.
@@ -334,10 +333,7 @@ impl Play {
 
     /// The play as a trace; `None` if its times have no common resolution.
     fn trace_json(&self) -> PyResult<Option<String>> {
-        self.model.get().with(|model| {
-            let trace = self.inner.trace(model.network());
-            let trace = trace.map_err(|error| failed(model, error))?;
-            Ok(trace.map(|trace| trace.to_string()))
-        })
+        let trace = asked(&self.model, |network| self.inner.trace(network), failed)?;
+        Ok(trace.map(|trace| trace.to_string()))
     }
 }

@@ -9,6 +9,7 @@ use super::model::{Model, failed};
 use crate::engine::LoadedModel;
 use crate::engine::format::{json, text};
 use crate::engine::session::walk::{Point, SIMULATED_TICKS_PER_UNIT};
+use crate::network::Failure;
 use crate::verify::timed::{Timed, least_multiple};
 
 /// A walk through a model.
@@ -30,6 +31,17 @@ pub(super) fn simulate(model: &Bound<'_, Model>, engine: &str) -> PyResult<Simul
         model: model.clone().unbind(),
         point,
     })
+}
+
+impl Simulation {
+    /// What the model gives, unless it fails.
+    fn with_model<T>(
+        &self,
+        action: impl FnOnce(&LoadedModel) -> Result<T, Failure>,
+    ) -> PyResult<T> {
+        let model = self.model.get();
+        model.with(|model| action(model).map_err(|failure| failed(model, failure)))
+    }
 }
 
 #[pymethods]
@@ -71,41 +83,28 @@ impl Simulation {
 
     /// The moves: of each, process, edge, branch and select values of the edges that are taken.
     fn moves(&self) -> PyResult<Vec<StepEntry>> {
-        self.model.get().with(|model| {
-            let successors = model
-                .successors(&self.point)
-                .map_err(|failure| failed(model, failure))?;
-            let entries = successors
-                .iter()
-                .map(|(parts, _)| step_entry(model.network(), parts));
+        self.with_model(|model| {
+            let successors = model.successors(&self.point)?.into_iter();
+            let entries = successors.map(|(parts, _)| step_entry(model.network(), &parts));
             Ok(entries.collect())
         })
     }
 
     /// Takes the move with this index.
     fn take(&mut self, index: usize) -> PyResult<()> {
-        let point = self.model.get().with(|model| {
-            let successors = model
-                .successors(&self.point)
-                .map_err(|failure| failed(model, failure))?;
-            let count = successors.len();
-            let chosen = successors.into_iter().nth(index);
-            chosen.map(|(_, point)| point).ok_or_else(|| {
-                PyIndexError::new_err(format!("there is no move {index}; the state has {count}"))
-            })
-        })?;
+        let successors = self.with_model(|model| model.successors(&self.point))?;
+        let count = successors.len();
+        let Some((_, point)) = successors.into_iter().nth(index) else {
+            let message = format!("there is no move {index}; the state has {count}");
+            return Err(PyIndexError::new_err(message));
+        };
         self.point = point;
         Ok(())
     }
 
     /// Follows moves as long as time cannot pass and there is exactly one.
     fn settle(&mut self) -> PyResult<()> {
-        let point = self.model.get().with(|model| {
-            model
-                .settle(self.point.clone())
-                .map_err(|failure| failed(model, failure))
-        })?;
-        self.point = point;
+        self.point = self.with_model(|model| model.settle(self.point.clone()))?;
         Ok(())
     }
 }

@@ -24,9 +24,9 @@ pub struct Rule {
     pub zones: Federation,
 }
 
-/// A discrete state.
+/// What is done in a discrete state.
 #[derive(Clone, Debug)]
-pub struct Entry<'s> {
+pub struct StateRules<'s> {
     /// The words.
     pub words: &'s [i32],
     /// Whether play has ended here, won, whatever the clocks say.
@@ -41,7 +41,7 @@ pub struct Entry<'s> {
 
 /// The table of a strategy of this network, which has the clock that measures time if the strategy
 /// looks at it: the states about which it says something, in its order.
-pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> {
+pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<StateRules<'s>> {
     let dimension = network.clocks.len().max(1);
     let joined = closed_loop::joined(network, strategy).into_iter();
     let entries = joined.map(|joined| {
@@ -71,7 +71,7 @@ pub fn entries<'s>(network: &Network, strategy: &'s Strategy) -> Vec<Entry<'s>> 
                 zones,
             }
         });
-        Entry {
+        StateRules {
             words,
             is_goal,
             rules,

@@ -20,7 +20,7 @@ use crate::network::Part;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, minimal};
 
-use super::decision_table::{self, Entry, Rule};
+use super::decision_table::{self, Rule, StateRules};
 use super::{strategy_text, text};
 use crate::engine::query::time_clock;
 
@@ -174,7 +174,7 @@ impl Tables {
     }
 
     /// The number of the row of an entry.
-    fn row(&mut self, entry: Entry<'_>) -> usize {
+    fn row(&mut self, entry: StateRules<'_>) -> usize {
         if entry.is_goal {
             return 0;
         }
