@@ -22,4 +22,12 @@ impl Rejection {
             rendered,
         }
     }
+
+    /// A rejection of something that has no place in the model or in a query.
+    pub(crate) fn without_place(text: String) -> Rejection {
+        Rejection {
+            diagnostics: Vec::new(),
+            rendered: vec![text],
+        }
+    }
 }

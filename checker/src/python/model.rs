@@ -283,11 +283,9 @@ impl Model {
         let rules = rules(forced, priorities)?;
         let model = slf.clone().unbind();
         let verify = move || {
-            let text = str::from_utf8(&data).map_err(|_| Rejection {
-                diagnostics: Vec::new(),
-                rendered: vec![format!(
-                    "error: {path}: this is not text in UTF-8\n{EVIDENCE}"
-                )],
+            let text = str::from_utf8(&data).map_err(|_| {
+                let message = format!("error: {path}: this is not text in UTF-8\n{EVIDENCE}");
+                Rejection::without_place(message)
             })?;
             let verify = |model: &mut LoadedModel| model.verify_evidence(&path, text, rules);
             model.get().with(verify)

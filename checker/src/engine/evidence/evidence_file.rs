@@ -31,10 +31,8 @@ impl LoadedModel {
         rules: Rules,
     ) -> Result<Checked, Rejection> {
         self.expect_symbolic()?;
-        let unreadable = |why: Unreadable| Rejection {
-            diagnostics: Vec::new(),
-            rendered: vec![format!("error: {path}: {why}\n{HINT}")],
-        };
+        let unreadable =
+            |why: Unreadable| Rejection::without_place(format!("error: {path}: {why}\n{HINT}"));
         let header = text.lines().next().unwrap_or_default();
         let header: Json = serde_json::from_str(header)
             .or_else(|_| serde_json::from_str(text))

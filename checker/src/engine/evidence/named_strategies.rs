@@ -172,13 +172,8 @@ impl LoadedModel {
         strategy_json::read(self.network(), bytes).map_err(|mismatch| {
             let code = codes::STRATEGY_FILE.code;
             let help = mismatch.help.map(|help| format!("\n  hint: {help}"));
-            Rejection {
-                diagnostics: Vec::new(),
-                rendered: vec![format!(
-                    "{path}: error[{code}]: {mismatch}{}",
-                    help.unwrap_or_default()
-                )],
-            }
+            let help = help.unwrap_or_default();
+            Rejection::without_place(format!("{path}: error[{code}]: {mismatch}{help}"))
         })
     }
 

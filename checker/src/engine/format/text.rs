@@ -15,6 +15,7 @@ use crate::search::Trace;
 use crate::search::liveness::ending::RunEnding;
 use crate::verify::replay::{Defect, End, Run};
 use crate::verify::{self, State};
+use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Zone, minimal};
 
 /// Calls `visit` with the name and the value of every scalar part of every variable.
@@ -105,7 +106,6 @@ pub fn location_name<'n>(network: &'n Network, process: usize, words: &[i32]) ->
 /// The constraints of a zone that say something, as `x-y <= 3` and its kin; differences that follow
 /// from bounds of the clocks alone are left out.
 pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
-    let name = |clock: usize| network.clocks[clock].name.as_str();
     let mut constraints = Vec::new();
     let dimension = zone.dimension();
     for left in 0..dimension {
@@ -118,31 +118,35 @@ pub fn zone_constraints(network: &Network, zone: &Zone) -> Vec<String> {
             {
                 continue;
             }
-            let strict = bound.is_strict();
-            constraints.push(match (left, right) {
-                (0, _) => format!(
-                    "{} {} {}",
-                    name(right),
-                    if strict { ">" } else { ">=" },
-                    -bound.value()
-                ),
-                (_, 0) => format!(
-                    "{} {} {}",
-                    name(left),
-                    if strict { "<" } else { "<=" },
-                    bound.value()
-                ),
-                _ => format!(
-                    "{}-{} {} {}",
-                    name(left),
-                    name(right),
-                    if strict { "<" } else { "<=" },
-                    bound.value()
-                ),
-            });
+            let one = Constraint { left, right, bound };
+            constraints.push(comparison(network, one, left == 0));
         }
     }
     constraints
+}
+
+/// A constraint as `x <= 3` or `x-y <= 3`, or with both sides exchanged, as `x >= -3`.
+fn comparison(network: &Network, one: Constraint, is_swapped: bool) -> String {
+    let relation = match (one.bound.is_strict(), is_swapped) {
+        (false, false) => "<=",
+        (true, false) => "<",
+        (false, true) => ">=",
+        (true, true) => ">",
+    };
+    compared(network, one, relation, is_swapped)
+}
+
+fn compared(network: &Network, one: Constraint, relation: &str, is_swapped: bool) -> String {
+    let name = |clock: usize| network.clocks[clock].name.as_str();
+    let (left, right, value) = if is_swapped {
+        (one.right, one.left, -one.bound.value())
+    } else {
+        (one.left, one.right, one.bound.value())
+    };
+    match right {
+        0 => format!("{} {relation} {value}", name(left)),
+        _ => format!("{}-{} {relation} {value}", name(left), name(right)),
+    }
 }
 
 /// The fewest constraints that make a zone: first the equalities, as `x == 3` and `x-y == 2`, then
@@ -151,35 +155,19 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
     let ties = |left: usize, right: usize| {
         zone.bound(left, right) + zone.bound(right, left) == Bound::LE_ZERO
     };
-    let name = |clock: usize| network.clocks[clock].name.as_str();
-    let compared = |left: usize, right: usize, relation: &str, value: i32| {
-        // Differences are written so that they are not negative.
-        let is_swapped = left == 0 || (right != 0 && value < 0);
-        let (left, right, value) = if is_swapped {
-            (right, left, -value)
-        } else {
-            (left, right, value)
-        };
-        let relation = match relation {
-            "<=" if is_swapped => ">=",
-            "<" if is_swapped => ">",
-            same => same,
-        };
-        match right {
-            0 => format!("{} {relation} {value}", name(left)),
-            _ => format!("{}-{} {relation} {value}", name(left), name(right)),
-        }
-    };
+    // Differences are written so that they are not negative.
+    let is_swapped = |one: Constraint| one.left == 0 || (one.right != 0 && one.bound.value() < 0);
     let mut texts = Vec::new();
     for left in 1..zone.dimension() {
         if let Some(right) = (0..left).find(|&right| ties(left, right)) {
-            texts.push(compared(left, right, "==", zone.bound(left, right).value()));
+            let bound = zone.bound(left, right);
+            let one = Constraint { left, right, bound };
+            texts.push(compared(network, one, "==", is_swapped(one)));
         }
     }
     minimal::for_each_minimal(zone.bounds(), zone.dimension(), |one| {
         if !ties(one.left, one.right) {
-            let relation = if one.bound.is_strict() { "<" } else { "<=" };
-            texts.push(compared(one.left, one.right, relation, one.bound.value()));
+            texts.push(comparison(network, one, is_swapped(one)));
         }
     });
     texts

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::analysis::Abstraction;
 use crate::game::partial_observation::{Outcome, Question, Solver};
 use crate::game::strategy::Selection;
 use crate::game::{Player, Priorities};
@@ -12,7 +11,7 @@ use crate::verify::Effort;
 use crate::verify::observed::{self, MachineState};
 
 use super::game_zones::{IGNORED_PRIORITIES, add_check_by, objective_atoms, zones_of};
-use super::problem::{Problem, has_differences};
+use super::problem::{Problem, safe_abstraction};
 use crate::engine::answer::{Answer, Verdict, Verification};
 use crate::engine::evidence::strategy_check;
 use crate::engine::format::machine_json;
@@ -34,11 +33,7 @@ pub(super) fn game(
         .into_iter()
         .chain(observed)
         .collect();
-    let abstraction = if has_differences(network, &atoms) {
-        Abstraction::Differences
-    } else {
-        Abstraction::Maximum
-    };
+    let abstraction = safe_abstraction(network, &atoms);
     let mut symbolic = zones_of(problem, &atoms, abstraction);
     let question = Question {
         observations,

@@ -67,6 +67,15 @@ pub(crate) fn has_differences(network: &Network, atoms: &[ClockAtom]) -> bool {
     network.features.diagonals || atoms.iter().any(ClockAtom::is_difference)
 }
 
+/// The abstraction that is sound for the network and these comparisons in any case.
+pub(crate) fn safe_abstraction(network: &Network, atoms: &[ClockAtom]) -> Abstraction {
+    if has_differences(network, atoms) {
+        Abstraction::Differences
+    } else {
+        Abstraction::Maximum
+    }
+}
+
 /// Zones for searches, with an abstraction that is sound for the network and these predicates, and
 /// keeps what further comparisons tell.
 pub(crate) fn symbolic<'a>(

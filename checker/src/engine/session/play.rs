@@ -340,12 +340,8 @@ impl LoadedModel {
     ) -> Result<Result<Play, verify::Error>, Rejection> {
         let text = self.add_query(query);
         let (query, _) = self.compile(text.span)?;
-        let rejection = |message: String| Rejection {
-            diagnostics: Vec::new(),
-            rendered: vec![message],
-        };
         let Some(control) = query.kind.full_game() else {
-            return Err(rejection(format!(
+            return Err(Rejection::without_place(format!(
                 "error: {} is no game: it does not begin with control:",
                 text.text
             )));
@@ -354,7 +350,7 @@ impl LoadedModel {
         match strategy_check::is_for(self.network(), control, &Played::new(strategy, &[])) {
             Ok(true) => {}
             Ok(false) => {
-                return Err(rejection(format!(
+                return Err(Rejection::without_place(format!(
                     "error: the strategy is for another start or time limit than {}",
                     text.text
                 )));
@@ -366,7 +362,7 @@ impl LoadedModel {
             Ok(Some(beginning)) => beginning,
             Ok(None) => {
                 let message = "error: the way to where the strategy begins is not possible";
-                return Err(rejection(message.to_owned()));
+                return Err(Rejection::without_place(message.to_owned()));
             }
             Err(error) => return Ok(Err(error)),
         };

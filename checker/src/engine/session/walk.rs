@@ -21,7 +21,7 @@ use crate::zones::{Zone, wide};
 use crate::engine::limits::{LimitWatch, Limits};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::CodeEngine;
-use crate::engine::query::problem::has_differences;
+use crate::engine::query::problem::safe_abstraction;
 use crate::engine::rejection::Rejection;
 
 /// How finely the times of simulated runs are chosen, unless finer ones are asked for.
@@ -105,11 +105,7 @@ impl LoadedModel {
     /// all moves between these states.
     pub fn reached(&self, limits: Limits, has_links: bool) -> Result<Space, Failure> {
         let network = self.network();
-        let abstraction = if has_differences(network, &[]) {
-            Abstraction::Differences
-        } else {
-            Abstraction::Maximum
-        };
+        let abstraction = safe_abstraction(network, &[]);
         let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
         let mut symbolic = Symbolic::new(Stepper::new(network, self.executor()), bounds);
         wide::start();
