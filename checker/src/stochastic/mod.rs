@@ -29,14 +29,13 @@ mod rare;
 mod readers;
 mod repeatable;
 mod restriction;
+mod rules;
 mod run;
 mod run_watch;
 mod samples;
-mod span;
 mod splitting;
 pub mod statistics;
 mod values_of_runs;
-mod windows;
 
 pub use behaviour::Behaviour;
 pub use blocks::{RunSource, Runs, block};

@@ -21,15 +21,14 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
 use crate::stochastic::program::{Instance, Program};
 use crate::stochastic::restriction::Entry;
-use crate::stochastic::windows::Windows;
 
 /// Where a move is to be made as soon as possible, and there is no first moment, it is made this
 /// part, or this long, after the beginning.
 const SOON: f64 = 5.0 * TOLERANCE;
 
-impl<'a> Race<'a> {
+impl Race<'_> {
     /// Lets the strategy look at the state before anybody plans.
-    pub(super) fn take_advice(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(super) fn take_advice(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         let Some(advice) = &mut self.advice else {
             return Ok(());
         };
@@ -68,7 +67,7 @@ impl<'a> Race<'a> {
     /// What comes before a delay, and before time has to stop, because of the strategy.
     pub(super) fn next_by_advice(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         delay: f64,
         least: f64,
     ) -> Result<Option<Next>, Failure> {
@@ -114,7 +113,7 @@ impl<'a> Race<'a> {
 
     /// Whether the process of the movers waits instead, where the strategy leaves it both and time
     /// can pass.
-    pub(super) fn waits_instead(&mut self, program: &Program<'a>) -> Result<bool, Failure> {
+    pub(super) fn waits_instead(&mut self, program: &Program<'_>) -> Result<bool, Failure> {
         let may_wait = self.has_decisions()
             && self.advice.as_ref().is_some_and(Advice::may_wait)
             && self.committed == 0
@@ -142,10 +141,9 @@ impl<'a> Race<'a> {
     /// delay for it is drawn; returns the first at which it is made without.
     pub(super) fn advised_windows(
         &mut self,
-        program: &Program<'a>,
-        instance: &Instance<'a>,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
         bound: f64,
-        windows: &mut Windows,
     ) -> Result<f64, Failure> {
         let view = View::Drawn(self.longest_stay);
         let mut urgent = self.demanded(program, instance, bound)?;
@@ -165,7 +163,7 @@ impl<'a> Race<'a> {
                 urgent = urgent.min(if mask.now { first } else { first + soon });
             }
         } else {
-            self.instance_windows(program, instance, (bound, view), Some(windows))?;
+            self.instance_windows(program, instance, (bound, view), false)?;
         }
         Ok(urgent)
     }
@@ -173,18 +171,18 @@ impl<'a> Race<'a> {
     /// The first time at which an instance is enabled.
     fn first(
         &mut self,
-        program: &Program<'a>,
-        instance: &Instance<'a>,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
         asked: (f64, View),
     ) -> Result<f64, Failure> {
-        self.instance_windows(program, instance, asked, None)
+        self.instance_windows(program, instance, asked, true)
     }
 
     /// When the strategy demands a move that this instance can make; infinity if it cannot.
     fn demanded(
         &mut self,
-        program: &Program<'a>,
-        instance: &Instance<'a>,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
         bound: f64,
     ) -> Result<f64, Failure> {
         let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
@@ -198,8 +196,8 @@ impl<'a> Race<'a> {
     /// When the strategy allows a controllable output together with those who can receive.
     pub(super) fn partners(
         &mut self,
-        program: &Program<'a>,
-        sender: &Instance<'a>,
+        program: &Program<'_>,
+        sender: &Instance<'_>,
         ahead: f64,
         view: View,
     ) -> Result<Mask, Failure> {
@@ -253,7 +251,7 @@ impl<'a> Race<'a> {
     }
 
     /// Whether the strategy allows the movers to move now.
-    pub(super) fn allows_move(&self, program: &Program<'a>) -> bool {
+    pub(super) fn allows_move(&self, program: &Program<'_>) -> bool {
         let Some(advice) = self.advice.as_ref().filter(|one| one.has_decisions()) else {
             return true;
         };

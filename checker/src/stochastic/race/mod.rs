@@ -25,6 +25,7 @@
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
 mod advised;
+mod direct;
 mod outputs;
 mod planning;
 mod transition;
@@ -39,7 +40,6 @@ use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
 use super::program::Program;
-use super::windows::Windows;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
 /// The changes of a condition that are followed within one delay.
@@ -67,13 +67,16 @@ pub(in crate::stochastic) struct Race<'a> {
     /// The processes that plan anew before anything else happens.
     stale: Vec<u32>,
     is_stale: Vec<bool>,
-    /// By process: its enabled outputs, as found when it planned; only where the spot is plain.
-    enabled: Vec<Vec<u32>>,
     /// By process: where it is.
     locations: Vec<LocationId>,
     /// How many processes are in committed locations.
     committed: usize,
-    windows: Windows,
+    /// The windows of the plan that is being made.
+    windows: Vec<(f64, f64)>,
+    /// How many exits of rules are open.
+    exits: u32,
+    /// The clocks that are rated in some location, ascending.
+    rated_clocks: Vec<u32>,
     pub(in crate::stochastic) motion: Motion,
     /// By process: whether its plan was found by looking along the motion of clocks. It reaches
     /// only until somebody moves.
@@ -122,10 +125,11 @@ impl<'a> Race<'a> {
             bounds: vec![f64::INFINITY; processes],
             stale: Vec::with_capacity(processes),
             is_stale: vec![false; processes],
-            enabled: vec![Vec::new(); processes],
             locations: vec![LocationId(0); processes],
             committed: 0,
-            windows: Windows::default(),
+            windows: Vec::new(),
+            exits: 0,
+            rated_clocks: rated_clocks(network),
             motion: Motion::new(fixed_step),
             is_stepped: vec![false; processes],
             rest: f64::INFINITY,
@@ -148,7 +152,7 @@ impl<'a> Race<'a> {
     /// Goes back to the initial state.
     pub(in crate::stochastic) fn start(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         (seed, run): (u64, u64),
     ) -> Result<(), Failure> {
         self.machine.start(seed, run);
@@ -158,7 +162,7 @@ impl<'a> Race<'a> {
     }
 
     /// Plans for the state that the words of the machine hold now.
-    pub(in crate::stochastic) fn resume(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(in crate::stochastic) fn resume(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         self.since = (self.time, 0);
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
@@ -188,7 +192,7 @@ impl<'a> Race<'a> {
     }
 
     /// Finds which clocks flow in the present locations.
-    fn find_flows(&mut self, program: &Program<'a>) {
+    fn find_flows(&mut self, program: &Program<'_>) {
         if !program.has_flows {
             return;
         }
@@ -236,7 +240,7 @@ impl<'a> Race<'a> {
     /// Draws what comes next, if it comes before the end of the run, `rest` from now.
     pub(in crate::stochastic) fn next(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         rest: f64,
     ) -> Result<Next, Failure> {
         self.rest = rest;
@@ -289,7 +293,7 @@ impl<'a> Race<'a> {
 
     /// What comes when time cannot pass as long as anybody has drawn: who can move then does; if
     /// nobody can, time is locked.
-    fn next_at_the_latest(&mut self, program: &Program<'a>, least: f64) -> Result<Next, Failure> {
+    fn next_at_the_latest(&mut self, program: &Program<'_>, least: f64) -> Result<Next, Failure> {
         let stopped_by = self.bounds.iter().position(|&bound| bound <= least);
         let mut winner = None;
         if least <= TOLERANCE {
@@ -303,7 +307,7 @@ impl<'a> Race<'a> {
     }
 
     /// What comes next where a committed location must be left.
-    fn next_committed(&mut self, program: &Program<'a>) -> Result<Next, Failure> {
+    fn next_committed(&mut self, program: &Program<'_>) -> Result<Next, Failure> {
         let mut winner = self.one_with_outputs(program, true)?;
         if winner.is_none() {
             // Somebody else may send to a committed location.
@@ -320,7 +324,7 @@ impl<'a> Race<'a> {
     /// One of the processes with an output that is enabled now, or of those in committed locations.
     fn one_with_outputs(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         only_committed: bool,
     ) -> Result<Option<usize>, Failure> {
         let (mut winner, mut ties) = (None, 0);
@@ -370,7 +374,7 @@ impl<'a> Race<'a> {
     /// Lets a process move, if it can after all.
     pub(in crate::stochastic) fn take(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         process: usize,
     ) -> Result<(), Failure> {
         self.motion.end();
@@ -473,4 +477,14 @@ impl Race<'_> {
             self.machine.look_ahead(time, look)
         }
     }
+}
+
+/// The clocks that are rated in some location, ascending.
+fn rated_clocks(network: &Network) -> Vec<u32> {
+    let locations = network.processes.iter().flat_map(|one| &one.locations);
+    let clocks = locations.flat_map(|one| &one.chances.rated_clocks);
+    let mut clocks: Vec<u32> = clocks.copied().collect();
+    clocks.sort_unstable();
+    clocks.dedup();
+    clocks
 }

@@ -1,5 +1,7 @@
 //! Which outputs and receivers are enabled, now and later.
 
+use std::cell::Cell;
+
 use super::{MOST_CHANGES, Race};
 use crate::ir::Urgency;
 use crate::stochastic::advice::View;
@@ -9,62 +11,54 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::machine::Mask;
 use crate::stochastic::motion::Followed;
 use crate::stochastic::program::{Channel, Instance, Program, Spot};
-use crate::stochastic::span::Span;
-use crate::stochastic::windows::Windows;
+use crate::stochastic::rules::{self, Backend};
 
-impl<'a> Race<'a> {
+impl Race<'_> {
     /// Adds the times until `bound` at which an output of the process is enabled that is not on an
     /// urgent channel; returns the first at which one on an urgent channel is.
     pub(super) fn output_windows(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         spot: &Spot,
         bound: f64,
-        windows: &mut Windows,
     ) -> Result<f64, Failure> {
         let mut urgent = f64::INFINITY;
         let view = View::Drawn(self.longest_stay);
         for instance in program.range(spot.outputs) {
             if self.is_advised(instance) {
-                urgent = urgent.min(self.advised_windows(program, instance, bound, windows)?);
+                urgent = urgent.min(self.advised_windows(program, instance, bound)?);
             } else if instance.may_be_urgent && self.is_urgent(instance)? {
                 // It is taken as soon as it can be, so no time is drawn for it.
                 let asked = (bound, view);
-                let first = self.instance_windows(program, instance, asked, None)?;
+                let first = self.instance_windows(program, instance, asked, true)?;
                 urgent = urgent.min(first);
             } else {
-                self.instance_windows(program, instance, (bound, view), Some(windows))?;
+                self.instance_windows(program, instance, (bound, view), false)?;
             }
         }
         Ok(urgent)
     }
 
-    /// Adds the times until `bound` at which an instance is enabled; returns the first.
+    /// Adds the times until `bound` at which an instance is enabled; returns the first, or looks for
+    /// that alone.
     pub(super) fn instance_windows(
         &mut self,
-        program: &Program<'a>,
-        instance: &Instance<'a>,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
         (bound, view): (f64, View),
-        mut windows: Option<&mut Windows>,
+        only_first: bool,
     ) -> Result<f64, Failure> {
-        let only_first = windows.is_none();
-        let mut add = |low: f64, high: f64| {
-            if let Some(windows) = &mut windows {
-                windows.add(low, high);
-            }
-        };
         let steps = self.steps(program, instance.guard);
         self.is_stepped[instance.process as usize] |= steps;
         let is_span = !matches!(instance.guard, Condition::Timed(_) | Condition::Curved(_));
-        let is_alone = !instance.is_binary && !self.is_advised(instance);
-        if is_span && is_alone && !steps {
-            let span = self.span(program, instance.guard, &instance.values)?;
-            let latest = bound * (1.0 + TOLERANCE) + TOLERANCE;
-            let Some(span) = span.filter(|span| span.low <= latest) else {
+        if is_span && !instance.is_binary && !self.is_advised(instance) && !steps {
+            let Some((low, high)) = self.known_window(program, instance, bound)? else {
                 return Ok(f64::INFINITY);
             };
-            add(span.low, span.high.min(bound).max(span.low));
-            return Ok(span.low);
+            if !only_first {
+                self.windows.push((low, high));
+            }
+            return Ok(low);
         }
         let (mut ahead, mut before) = (0.0, false);
         let mut first = f64::INFINITY;
@@ -72,10 +66,14 @@ impl<'a> Race<'a> {
             let mask = self.output(program, instance, ahead, view)?;
             let end = (ahead + mask.horizon).min(bound);
             if mask.behind && ahead < bound {
-                add(ahead, end);
+                if !only_first {
+                    self.windows.push((ahead, end));
+                }
                 first = first.min(ahead);
             } else if mask.now && !before {
-                add(ahead, ahead);
+                if !only_first {
+                    self.windows.push((ahead, ahead));
+                }
                 first = first.min(ahead);
             }
             if only_first && first.is_finite() {
@@ -94,12 +92,35 @@ impl<'a> Race<'a> {
         Err(Failure::NoProgress(self.stand(instance.process as usize)))
     }
 
+    /// The one window of an instance until `bound`, if it has any.
+    fn known_window(
+        &mut self,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
+        bound: f64,
+    ) -> Result<Option<(f64, f64)>, Failure> {
+        let found = Cell::new(None);
+        self.within(
+            |race, none| {
+                let window = rules::span(race, program, instance.guard, &instance.values, none)?;
+                let low = window.low.unwrap_or(0.0);
+                if low <= rules::tolerant(race, bound) {
+                    let high = window.high.unwrap_or(f64::INFINITY).min(bound).max(low);
+                    found.set(Some((low, high)));
+                }
+                Ok(())
+            },
+            |_| Ok(()),
+        )?;
+        Ok(found.get())
+    }
+
     /// Whether an instance is enabled after this time; a sender on a binary channel needs a
     /// receiver.
     pub(super) fn output(
         &mut self,
-        program: &Program<'a>,
-        instance: &Instance<'a>,
+        program: &Program<'_>,
+        instance: &Instance<'_>,
         ahead: f64,
         view: View,
     ) -> Result<Mask, Failure> {
@@ -134,7 +155,7 @@ impl<'a> Race<'a> {
         Ok(guard.and(ready))
     }
 
-    pub(super) fn channel(&mut self, instance: &Instance<'a>) -> Result<Option<u32>, Failure> {
+    pub(super) fn channel(&mut self, instance: &Instance<'_>) -> Result<Option<u32>, Failure> {
         Ok(match instance.channel {
             Channel::None => None,
             Channel::Known(channel) => Some(channel),
@@ -144,50 +165,35 @@ impl<'a> Race<'a> {
         })
     }
 
-    pub(super) fn is_urgent(&mut self, instance: &Instance<'a>) -> Result<bool, Failure> {
+    pub(super) fn is_urgent(&mut self, instance: &Instance<'_>) -> Result<bool, Failure> {
         let channel = self.channel(instance)?;
         Ok(channel.is_some_and(|channel| self.network().channels[channel as usize].urgent))
-    }
-
-    /// When a condition holds that does so in one interval; `None` if never.
-    #[inline]
-    pub(super) fn span(
-        &mut self,
-        program: &Program<'a>,
-        condition: Condition,
-        values: &[i32],
-    ) -> Result<Option<Span>, Failure> {
-        let Condition::Compared(place) = condition else {
-            let holds = self.machine.holds(condition, values)?;
-            return Ok(holds.then_some(Span::ALL));
-        };
-        let comparisons = program.comparisons(place);
-        if !self.machine.holds(comparisons.on_words, values)? {
-            return Ok(None);
-        }
-        self.machine.span(comparisons, values)
     }
 
     /// Whether a condition holds now.
     #[inline]
     pub(super) fn holds(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         condition: Condition,
         values: &[i32],
     ) -> Result<bool, Failure> {
-        if let Condition::Compared(place) = condition {
-            let comparisons = program.comparisons(place);
-            return Ok(self.machine.holds(comparisons.on_words, values)?
-                && self.machine.compare(comparisons, values)?);
-        }
-        self.machine.holds(condition, values)
+        let holds = Cell::new(false);
+        self.within(
+            |race, not| {
+                rules::require(race, program, condition, values, not)?;
+                holds.set(true);
+                Ok(())
+            },
+            |_| Ok(()),
+        )?;
+        Ok(holds.get())
     }
 
     /// A condition after this time, if nothing happens until then.
     pub(super) fn mask_of(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         condition: Condition,
         values: &[i32],
         ahead: f64,
@@ -214,22 +220,13 @@ impl<'a> Race<'a> {
     /// committed location if there is one. Returns whether there are any.
     pub(super) fn find_outputs(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         process: usize,
     ) -> Result<bool, Failure> {
         self.choices.clear();
         let spot = program.spot(process, self.locations[process]);
         let leaves_committed = self.committed == 0 || spot.urgency == Urgency::Committed;
         let is_advised = spot.is_controllable && self.advice.is_some();
-        if spot.is_plain && !is_advised && !self.is_stale[process] {
-            for index in 0..self.enabled[process].len() {
-                let number = self.enabled[process][index];
-                if leaves_committed || self.partner_commits(program, program.instance(number))? {
-                    self.choices.push(number);
-                }
-            }
-            return Ok(!self.choices.is_empty());
-        }
         for number in spot.outputs.0..spot.outputs.1 {
             let instance = program.instance(number);
             let is_enabled = if instance.is_binary || is_advised {
@@ -250,8 +247,8 @@ impl<'a> Race<'a> {
     /// Whether somebody who can receive from a sender is in a committed location.
     pub(super) fn partner_commits(
         &mut self,
-        program: &Program<'a>,
-        sender: &Instance<'a>,
+        program: &Program<'_>,
+        sender: &Instance<'_>,
     ) -> Result<bool, Failure> {
         let Some(channel) = self.channel(sender)? else {
             return Ok(false);
@@ -273,7 +270,7 @@ impl<'a> Race<'a> {
     /// Adds the receiving instances of a process on a channel that are enabled now to `movers`.
     pub(super) fn add_ready(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         process: u32,
         channel: u32,
     ) -> Result<(), Failure> {

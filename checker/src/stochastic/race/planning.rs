@@ -1,21 +1,21 @@
 //! What processes plan: how long they may stay, and when they try to move.
 
+use std::cell::Cell;
+
 use super::{FAR_BEYOND, MOST_CHANGES, Race};
 use crate::cancellation;
-use crate::ir::{FunctionId, Urgency};
-use crate::stochastic::advice::View;
-use crate::stochastic::condition::{Condition, Number};
+use crate::ir::FunctionId;
+use crate::stochastic::condition::Condition;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Program, Spot, clocks_of};
-use crate::stochastic::span::Span;
-use crate::stochastic::windows::Windows;
+use crate::stochastic::rules::{self, Backend};
 
 /// What a plan takes: see [`cancellation::work`].
 const UNITS_FOR_PLAN: usize = 128;
 
-impl<'a> Race<'a> {
+impl Race<'_> {
     /// Lets all processes plan whose plans may have changed.
-    pub(super) fn plan_anew(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(super) fn plan_anew(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         // Random numbers are drawn first for those that have moved, and then in the order of
         // processes. Those who look along the motion of clocks come last, so that they need not
         // look farther than to the first attempt.
@@ -56,96 +56,68 @@ impl<'a> Race<'a> {
     }
 
     /// Where time stands still, no process plans that may have to, but the invariants hold.
-    pub(super) fn put_plans_off(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(super) fn put_plans_off(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         if self.until_renewal == 0 {
             self.renew(program);
         }
         self.until = 0.0;
         for index in 0..self.stale.len() {
             let process = self.stale[index] as usize;
-            let invariant = program.spot(process, self.locations[process]).invariant;
-            let is_kept = match invariant {
-                Condition::Compared(_) if !self.steps(program, invariant) => {
-                    self.holds(program, invariant, &[])?
-                }
-                _ => self.mask_of(program, invariant, &[], 0.0)?.now,
-            };
-            if !is_kept {
-                return Err(Failure::InvariantBroken(self.stand(process)));
-            }
+            let spot = program.spot(process, self.locations[process]);
+            rules::require_invariant(self, program, process, spot)?;
         }
         Ok(())
     }
 
-    fn plan(&mut self, program: &Program<'a>, process: usize) -> Result<(), Failure> {
+    fn plan(&mut self, program: &Program<'_>, process: usize) -> Result<(), Failure> {
         let spot = program.spot(process, self.locations[process]);
-        let bound = self.invariant_bound(program, spot, process)?;
-        let is_urgent = spot.urgency != Urgency::Normal;
-        self.bounds[process] = if is_urgent { 0.0 } else { bound };
-        let is_advised = spot.is_controllable && self.has_decisions();
-        self.attempts[process] = if spot.is_plain && !is_advised {
-            self.find_plain_outputs(program, spot, process)?;
-            if self.enabled[process].is_empty() {
-                f64::INFINITY
-            } else if is_urgent {
-                0.0
-            } else if bound.is_finite() {
-                bound * self.machine.stream().uniform()
-            } else {
-                let rate = self.exponential_rate(spot, process)?;
-                if rate == 0.0 {
-                    f64::INFINITY
-                } else {
-                    self.machine.stream().exponential(rate)
-                }
-            }
-        } else if is_urgent {
-            let mut is_enabled = false;
-            for output in program.range(spot.outputs) {
-                is_enabled = is_enabled || self.output(program, output, 0.0, View::Allowed)?.now;
-            }
-            if is_enabled { 0.0 } else { f64::INFINITY }
-        } else {
-            self.draw(program, spot, process, bound)?
-        };
-        Ok(())
+        Ok(rules::plan(self, program, process, spot)?)
     }
 
-    /// The outputs of a process whose guards do not change as time passes.
-    pub(super) fn find_plain_outputs(
-        &mut self,
-        program: &Program<'a>,
-        spot: &Spot,
-        process: usize,
-    ) -> Result<(), Failure> {
-        self.enabled[process].clear();
-        for number in spot.outputs.0..spot.outputs.1 {
-            let output = program.instance(number);
-            if self.holds(program, output.guard, &output.values)? {
-                self.enabled[process].push(number);
-            }
+    /// Whether the rules know when the outputs of a process are enabled: each has one window, which
+    /// neither a receiver nor a strategy nor the motion of clocks changes.
+    pub(super) fn is_known(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
+        if spot.is_controllable && self.has_decisions() {
+            return false;
         }
-        Ok(())
+        spot.is_plain
+            || program.range(spot.outputs).iter().all(|output| {
+                let is_span = !matches!(output.guard, Condition::Timed(_) | Condition::Curved(_));
+                is_span && !output.is_binary && !self.steps(program, output.guard)
+            })
     }
 
     /// How long a process may stay where it is.
     pub(super) fn invariant_bound(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         spot: &Spot,
         process: usize,
     ) -> Result<f64, Failure> {
+        Ok(rules::stay(self, program, process, spot)?.unwrap_or(f64::INFINITY))
+    }
+
+    /// How long a process may stay where it is, if its invariant must be looked at again and again;
+    /// `None` if not.
+    pub(super) fn stay_by_looking(
+        &mut self,
+        program: &Program<'_>,
+        process: usize,
+        spot: &Spot,
+    ) -> Option<Result<f64, Failure>> {
         if self.steps(program, spot.invariant) {
-            return self.stepped_bound(program, spot, process);
+            return Some(self.stepped_bound(program, spot, process));
         }
-        if let Condition::Compared(_) = spot.invariant {
-            let span = self.span(program, spot.invariant, &[])?;
-            let is_broken = |span: Option<Span>| span.is_none_or(|span| span.low > 0.0);
-            if is_broken(span) {
-                return Err(Failure::InvariantBroken(self.stand(process)));
-            }
-            return Ok(span.map_or(0.0, |span| span.high));
-        }
+        let is_looked_at = matches!(spot.invariant, Condition::Timed(_) | Condition::Curved(_));
+        is_looked_at.then(|| self.looked_bound(program, spot, process))
+    }
+
+    fn looked_bound(
+        &mut self,
+        program: &Program<'_>,
+        spot: &Spot,
+        process: usize,
+    ) -> Result<f64, Failure> {
         let mut ahead = 0.0;
         for _ in 0..MOST_CHANGES {
             let mask = self.mask_of(program, spot.invariant, &[], ahead)?;
@@ -171,7 +143,7 @@ impl<'a> Race<'a> {
     /// needs to know.
     pub(super) fn stepped_bound(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         spot: &Spot,
         process: usize,
     ) -> Result<f64, Failure> {
@@ -202,7 +174,7 @@ impl<'a> Race<'a> {
     }
 
     /// Whether a condition is looked at along the motion of clocks.
-    pub(super) fn steps(&mut self, program: &Program<'a>, condition: Condition) -> bool {
+    pub(super) fn steps(&mut self, program: &Program<'_>, condition: Condition) -> bool {
         match condition {
             Condition::Curved(_) => true,
             Condition::Always | Condition::Never | Condition::Words(_) => false,
@@ -228,71 +200,37 @@ impl<'a> Race<'a> {
     /// The delay of a process that may stay until `bound`.
     pub(super) fn draw(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         spot: &Spot,
         process: usize,
         bound: f64,
     ) -> Result<f64, Failure> {
-        let mut windows = std::mem::take(&mut self.windows);
-        windows.clear();
+        self.windows.clear();
         if bound.is_finite() {
             // A uniform delay is drawn from all of its windows.
             self.until = bound;
         }
-        let urgent = self.output_windows(program, spot, bound, &mut windows);
-        let delay =
-            urgent.and_then(|urgent| Ok(self.drawn(spot, process, bound, &windows)?.min(urgent)));
-        self.windows = windows;
-        delay
-    }
-
-    pub(super) fn drawn(
-        &mut self,
-        spot: &Spot,
-        process: usize,
-        bound: f64,
-        windows: &Windows,
-    ) -> Result<f64, Failure> {
-        let Some(first) = windows.first() else {
-            return Ok(f64::INFINITY);
-        };
-        let length = windows.length();
-        let is_demanded = self.demand().is_some() && length.is_finite();
-        if bound.is_finite() || spot.exponential_rate.is_none() && is_demanded {
-            let mut stream = self.machine.stream();
-            if length > 0.0 {
-                let part = stream.uniform();
-                return Ok(windows.after(part * length));
-            }
-            let moments = windows.count() as u32;
-            let chosen = if moments == 1 {
-                0
-            } else {
-                stream.below(moments)
-            };
-            return Ok(windows.start_of(chosen as usize));
-        }
-        let rate = self.exponential_rate(spot, process)?;
-        if rate == 0.0 {
-            return Ok(f64::INFINITY);
-        }
-        if length == 0.0 {
-            return Ok(first);
-        }
-        let passed = self.machine.stream().exponential(rate);
-        Ok(windows.after(passed))
-    }
-
-    pub(super) fn exponential_rate(&mut self, spot: &Spot, process: usize) -> Result<f64, Failure> {
-        let rate = match spot.exponential_rate {
-            None => return Err(Failure::NoRate(self.stand(process))),
-            Some(Number::Known(rate)) => rate,
-            Some(Number::Computed(rate)) => self.machine.real(rate, &[])?,
-        };
-        if rate >= 0.0 && rate.is_finite() {
-            Ok(rate)
-        } else {
-            Err(Failure::Rate(self.stand(process), rate))
-        }
+        let urgent = self.output_windows(program, spot, bound)?;
+        let drawn = Cell::new(f64::INFINITY);
+        self.within(
+            |race, never| {
+                if race.windows.is_empty() {
+                    return Ok(());
+                }
+                let is_demanded =
+                    race.demand().is_some() && race.windows.iter().all(|one| one.1.is_finite());
+                let is_uniform =
+                    bound.is_finite() || spot.exponential_rate.is_none() && is_demanded;
+                let rate = if is_uniform {
+                    None
+                } else {
+                    rules::exponential_rate(race, process, spot, never)?
+                };
+                drawn.set(race.delay_in_windows(rate)?);
+                Ok(())
+            },
+            |_| Ok(()),
+        )?;
+        Ok(drawn.get().min(urgent))
     }
 }

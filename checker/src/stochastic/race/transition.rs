@@ -9,9 +9,9 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 use crate::stochastic::readers::Reader;
 
-impl<'a> Race<'a> {
+impl Race<'_> {
     /// Makes plans stale that wait for a clock.
-    pub(super) fn renew(&mut self, program: &Program<'a>) {
+    pub(super) fn renew(&mut self, program: &Program<'_>) {
         self.until_renewal = MOVES_OF_A_PLAN;
         for process in 0..self.locations.len() {
             let spot = program.spot(process, self.locations[process]);
@@ -23,8 +23,8 @@ impl<'a> Race<'a> {
 
     pub(super) fn add_receivers(
         &mut self,
-        program: &Program<'a>,
-        sender: &Instance<'a>,
+        program: &Program<'_>,
+        sender: &Instance<'_>,
         channel: u32,
     ) -> Result<(), Failure> {
         let is_broadcast = self.network().channels[channel as usize].broadcast;
@@ -51,7 +51,7 @@ impl<'a> Race<'a> {
     }
 
     /// Keeps one of the movers from this place on.
-    pub(super) fn keep_one(&mut self, program: &Program<'a>, first: usize) -> Result<(), Failure> {
+    pub(super) fn keep_one(&mut self, program: &Program<'_>, first: usize) -> Result<(), Failure> {
         let many = self.movers.len() - first;
         if program.has_legs && many > 0 {
             let inputs = self.movers.drain(first..).map(|mover| mover.0).collect();
@@ -69,7 +69,7 @@ impl<'a> Race<'a> {
     /// others, and of the legs that an entry has among them one is taken by weight.
     pub(super) fn by_entry(
         &mut self,
-        program: &Program<'a>,
+        program: &Program<'_>,
         mut instances: Vec<u32>,
     ) -> Result<u32, Failure> {
         let entry = |number: &u32| program.instance(*number).entry;
@@ -99,7 +99,7 @@ impl<'a> Race<'a> {
     }
 
     /// Runs the updates of those who move, the sender first, and lets them enter their locations.
-    pub(super) fn carry_out(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(super) fn carry_out(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         let network = self.network();
         for index in 0..self.movers.len() {
             let mover = program.instance(self.movers[index].0);
@@ -142,7 +142,7 @@ impl<'a> Race<'a> {
     }
 
     /// Lets a mover enter the target of its branch, and finds who plans anew.
-    pub(super) fn enter(&mut self, program: &Program<'a>, mover: &Instance<'a>, branch: usize) {
+    pub(super) fn enter(&mut self, program: &Program<'_>, mover: &Instance<'_>, branch: usize) {
         self.make_stale(mover.process);
         self.make_readers_stale(program.concerned(mover, branch));
         for &placed in program.placed(mover, branch) {
@@ -165,7 +165,7 @@ impl<'a> Race<'a> {
     }
 
     /// Notes where a process is now.
-    fn place(&mut self, program: &Program<'a>, process: u32, location: LocationId) {
+    fn place(&mut self, program: &Program<'_>, process: u32, location: LocationId) {
         let before = self.locations[process as usize];
         if location == before {
             return;
@@ -186,8 +186,8 @@ impl<'a> Race<'a> {
     /// The branch that a mover takes: by weight.
     pub(super) fn branch(
         &mut self,
-        program: &Program<'a>,
-        mover: &Instance<'a>,
+        program: &Program<'_>,
+        mover: &Instance<'_>,
     ) -> Result<u32, Failure> {
         let mut weights = Vec::with_capacity(mover.edge.branches.len());
         for branch in 0..mover.edge.branches.len() {
@@ -203,8 +203,8 @@ impl<'a> Race<'a> {
     /// The weight of a branch.
     fn weight(
         &mut self,
-        program: &Program<'a>,
-        mover: &Instance<'a>,
+        program: &Program<'_>,
+        mover: &Instance<'_>,
         branch: usize,
     ) -> Result<f64, Failure> {
         let weight = match program.weight(mover, branch) {
@@ -241,7 +241,7 @@ impl<'a> Race<'a> {
 
     /// Gives the clocks their rates anew of which a stale process sets some, and finds whose plans
     /// that concerns.
-    pub(super) fn renew_rates(&mut self, program: &Program<'a>) -> Result<(), Failure> {
+    pub(super) fn renew_rates(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         let network = self.network();
         let clocks = &network.chances.clocks;
         let before: Vec<f64> = clocks

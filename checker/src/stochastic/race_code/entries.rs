@@ -8,6 +8,7 @@ use super::writer::Writer;
 use crate::ir::{BlockId, Distribution, Register, Relation};
 use crate::stochastic::condition::Number;
 use crate::stochastic::program::Instance;
+use crate::stochastic::rules::{self, Backend};
 
 /// An instance that may be enabled.
 pub(super) struct Candidate<'i, 'a> {
@@ -22,7 +23,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// The number of one of the instances that are enabled; goes elsewhere if there are none.
     pub(super) fn by_entry(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         candidates: &[Candidate<'_, 'a>],
         otherwise: BlockId,
     ) -> Register {
@@ -66,7 +67,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Sets `chosen` to the number of one of the legs that are enabled.
-    fn leg(&self, w: &mut Writer, legs: &[&Candidate<'_, 'a>], chosen: Register) {
+    fn leg(&self, w: &mut Writer<'_>, legs: &[&Candidate<'_, 'a>], chosen: Register) {
         if let [only] = legs
             && only.instance.edge.leg.is_none()
         {
@@ -77,7 +78,7 @@ impl<'a> RaceWriter<'_, 'a> {
         let wrong = w.block();
         let mut weights = Vec::new();
         for leg in legs {
-            let weight = w.double(0.0);
+            let weight = w.real(0.0);
             w.when(leg.flag, |w| {
                 let given = self.weight(w, leg.instance, 0, wrong);
                 w.copy(weight, given);
@@ -97,18 +98,18 @@ impl<'a> RaceWriter<'_, 'a> {
     /// The weight of a branch; goes elsewhere if it is none.
     pub(super) fn weight(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         mover: &Instance<'_>,
         branch: usize,
         wrong: BlockId,
     ) -> Register {
         let number = self.program.weight(mover, branch);
-        let weight = self.conditions.number(w, number, &mover.values);
+        let Ok(weight) = rules::number(w, number, &mover.values);
         if !matches!(number, Number::Known(one) if one >= 0.0 && one.is_finite()) {
-            let (zero, infinity) = (w.double(0.0), w.double(f64::INFINITY));
-            let is_weight = w.compare_doubles(weight, Relation::GreaterEqual, zero);
+            let (zero, infinity) = (w.real(0.0), w.real(f64::INFINITY));
+            let is_weight = w.compare_reals(weight, Relation::GreaterEqual, zero);
             w.unless(is_weight, wrong);
-            let is_finite = w.compare_doubles(weight, Relation::Less, infinity);
+            let is_finite = w.compare_reals(weight, Relation::Less, infinity);
             w.unless(is_finite, wrong);
         }
         weight
@@ -116,9 +117,9 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// The place of one of some weights, as likely as it says. Where all are 0, and `wrong`, the
     /// run is given up.
-    pub(super) fn weighted(w: &mut Writer, weights: &[Register], wrong: BlockId) -> Register {
-        let (chosen, zero) = (w.integer(0), w.double(0.0));
-        let mut total = w.double(0.0);
+    pub(super) fn weighted(w: &mut Writer<'_>, weights: &[Register], wrong: BlockId) -> Register {
+        let (chosen, zero) = (w.integer(0), w.real(0.0));
+        let mut total = w.real(0.0);
         for &weight in weights {
             total = w.add(total, weight);
         }
@@ -127,11 +128,11 @@ impl<'a> RaceWriter<'_, 'a> {
         w.copy(chosen, none);
         for (place, &weight) in (0..).zip(weights) {
             let next = w.block();
-            let is_possible = w.compare_doubles(weight, Relation::Greater, zero);
+            let is_possible = w.compare_reals(weight, Relation::Greater, zero);
             w.unless(is_possible, next);
             let this = w.integer(place);
             w.copy(chosen, this);
-            let is_beyond = w.compare_doubles(rest, Relation::GreaterEqual, weight);
+            let is_beyond = w.compare_reals(rest, Relation::GreaterEqual, weight);
             w.unless(is_beyond, found);
             let less = w.subtract(rest, weight);
             w.copy(rest, less);
@@ -150,7 +151,7 @@ impl<'a> RaceWriter<'_, 'a> {
 /// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
 /// `rest` says, which counts down. A number without a flag counts always.
 pub(super) fn take_one_of(
-    w: &mut Writer,
+    w: &mut Writer<'_>,
     numbers: impl Iterator<Item = (Register, Option<Register>)>,
     rest: Register,
     chosen: Register,

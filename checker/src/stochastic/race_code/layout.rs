@@ -1,6 +1,6 @@
 //! Where the code of a race keeps what it knows: in words behind those of the state.
 
-use crate::ir::Urgency;
+use crate::ir::{FunctionId, Urgency};
 use crate::stochastic::condition::Condition;
 use crate::stochastic::program::Program;
 
@@ -40,6 +40,12 @@ pub(super) struct Layout {
     pub(super) rate: u32,
     /// The most windows of a plan.
     pub(super) most_windows: u32,
+    /// Where runs draw their random numbers.
+    pub(super) stream: u32,
+    /// Where functions leave doubles.
+    pub(super) result: u32,
+    /// The function that draws a delay in windows: the first behind those of the network.
+    pub(super) in_windows: FunctionId,
     /// The clocks whose rates are set, with the double that keeps what a rate was.
     pub(super) rates: Vec<(u32, u32)>,
     /// All words, those of the state included.
@@ -98,6 +104,9 @@ impl Layout {
             highs: take(2 * most_windows),
             rate: take(2),
             most_windows,
+            stream: network.chances.stream,
+            result: network.chances.result,
+            in_windows: FunctionId(network.functions.len() as u32),
             rates: rated.iter().map(|&(_, clock)| (clock, take(2))).collect(),
             words,
         }

@@ -11,7 +11,7 @@
 //!   product of senders and receivers: beyond a limit there is no code.
 
 mod asked;
-mod conditions;
+mod backend;
 mod entries;
 mod inline;
 mod layout;

@@ -13,6 +13,7 @@ use crate::ir::{
 use crate::stochastic::condition::Condition;
 use crate::stochastic::program::{Channel, Instance};
 use crate::stochastic::readers::Reader;
+use crate::stochastic::rules::{self, Backend};
 
 /// More channels are not told apart.
 const MOST_CHANNELS: usize = 32;
@@ -57,7 +58,7 @@ impl<'a> RaceWriter<'_, 'a> {
             && only.edge.leg.is_none()
         {
             if !spot.is_plain {
-                self.conditions.require(w, only.guard, &only.values, missed);
+                let Ok(()) = rules::require(w, self.program, only.guard, &only.values, missed);
             }
             self.carry_out(w, only, ids);
         } else {
@@ -82,7 +83,12 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Chooses one of the instances that are enabled, and returns its number; goes elsewhere if
     /// there are none.
-    fn choose(&self, w: &mut Writer, instances: &[Instance<'a>], otherwise: BlockId) -> Register {
+    fn choose(
+        &self,
+        w: &mut Writer<'_>,
+        instances: &[Instance<'a>],
+        otherwise: BlockId,
+    ) -> Register {
         if instances.iter().any(|instance| instance.edge.leg.is_some()) {
             let candidates = (0..).zip(instances).map(|(number, instance)| {
                 let flag = w.integer(0);
@@ -135,8 +141,22 @@ impl<'a> RaceWriter<'_, 'a> {
         chosen
     }
 
+    /// Writes what is done only if the guard of an instance holds.
+    fn when_enabled(
+        &self,
+        w: &mut Writer<'_>,
+        instance: &Instance<'a>,
+        write: impl FnOnce(&mut Writer<'_>),
+    ) {
+        let next = w.block();
+        let Ok(()) = rules::require(w, self.program, instance.guard, &instance.values, next);
+        write(w);
+        w.jump(next);
+        w.at(next);
+    }
+
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer, sender: &Instance<'a>, ids: &Ids) {
+    fn carry_out(&self, w: &mut Writer<'_>, sender: &Instance<'a>, ids: &Ids) {
         let channels = match sender.channel {
             Channel::None => None,
             Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
@@ -176,7 +196,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Lets a process take an output on one of these channels; the register says which.
     fn carry_out_on(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         sender: &Instance<'a>,
         channels: Option<(Register, Range<u32>)>,
         ids: &Ids,
@@ -264,7 +284,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// looked at that may not hold any more.
     fn put_plans_off(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (sender, branch): (&Instance<'a>, Register),
         receivers: &[Receiver<'_, 'a>],
         ids: &Ids,
@@ -273,7 +293,7 @@ impl<'a> RaceWriter<'_, 'a> {
         Self::for_branch(w, sender, branch, |w, number| {
             let target = sender.edge.branches[number].target;
             let spot = self.program.spot(sender.process as usize, target);
-            self.conditions.require(w, spot.invariant, &[], broken);
+            let Ok(()) = rules::require(w, self.program, spot.invariant, &[], broken);
         });
         self.mark_processes(w, [sender.process]);
         let invariant_of = |process: u32| ids.invariants[process as usize];
@@ -299,7 +319,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Lets those plan that have moved, the sender first; the others do so later.
     fn plan_movers(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (sender, branch): (&Instance<'a>, Register),
         receivers: &[Receiver<'_, 'a>],
         ids: &Ids,
@@ -321,11 +341,7 @@ impl<'a> RaceWriter<'_, 'a> {
                 w.give_up();
                 return;
             }
-            let (broken, done) = (w.block(), w.block());
-            self.plan_at(w, (process, spot), (broken, done));
-            w.at(broken);
-            w.give_up();
-            w.at(done);
+            let Ok(()) = rules::plan(w, self.program, process, spot);
         });
         for receiver in receivers {
             let done = w.block();
@@ -346,7 +362,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Lets a process choose what it receives on one of some channels.
     fn receiver<'p>(
         &'p self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         process: u32,
         (channel, channels): (Register, &Range<u32>),
     ) -> Option<Receiver<'p, 'a>> {
@@ -401,7 +417,7 @@ impl<'a> RaceWriter<'_, 'a> {
     /// Chooses one of the inputs of a location that are enabled, if there are any.
     fn choose_input(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         inputs: &[&Instance<'a>],
         (channel, channels): (Register, &Range<u32>),
         (chosen, first): (Register, i32),
@@ -424,8 +440,7 @@ impl<'a> RaceWriter<'_, 'a> {
                     w.unless(is_it, otherwise);
                 }
             }
-            self.conditions
-                .require(w, input.guard, &input.values, otherwise);
+            let Ok(()) = rules::require(w, self.program, input.guard, &input.values, otherwise);
             let one = w.integer(1);
             w.copy(flag, one);
             let number = w.integer(number);
@@ -461,10 +476,10 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Writes what is done for each input that a receiver may have chosen, and goes on at `done`.
     fn for_chosen(
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         receiver: &Receiver<'_, 'a>,
         done: BlockId,
-        write: impl Fn(&mut Writer, &Instance<'a>),
+        write: impl Fn(&mut Writer<'_>, &Instance<'a>),
     ) {
         let start = w.block();
         w.jump(start);
@@ -482,7 +497,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w.at(done);
     }
 
-    fn branch_of_receiver(&self, w: &mut Writer, receiver: &Receiver<'_, 'a>) {
+    fn branch_of_receiver(&self, w: &mut Writer<'_>, receiver: &Receiver<'_, 'a>) {
         let mut inputs = receiver.inputs.iter().flat_map(|(_, inputs)| inputs);
         if inputs.any(|input| input.edge.branches.len() > 1) {
             let done = w.block();
@@ -494,7 +509,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// The branch that a mover takes: by weight.
-    fn branch(&self, w: &mut Writer, mover: &Instance<'_>) -> Register {
+    fn branch(&self, w: &mut Writer<'_>, mover: &Instance<'_>) -> Register {
         let branches = mover.edge.branches.len();
         if branches < 2 {
             return w.integer(0);
@@ -507,17 +522,17 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Runs the updates of a mover, and lets it enter the target of its branch.
-    fn apply(&self, w: &mut Writer, mover: &Instance<'a>, branch: Register) {
+    fn apply(&self, w: &mut Writer<'_>, mover: &Instance<'a>, branch: Register) {
         update(w, &mover.edge.update, &mover.values);
         Self::for_branch(w, mover, branch, |w, number| self.enter(w, mover, number));
     }
 
     /// Writes what is done for each branch that a mover may have taken.
     fn for_branch(
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         mover: &Instance<'a>,
         branch: Register,
-        write: impl Fn(&mut Writer, usize),
+        write: impl Fn(&mut Writer<'_>, usize),
     ) {
         let branches = mover.edge.branches.len();
         if branches == 1 {
@@ -539,7 +554,7 @@ impl<'a> RaceWriter<'_, 'a> {
         w.at(done);
     }
 
-    fn enter(&self, w: &mut Writer, mover: &Instance<'a>, number: usize) {
+    fn enter(&self, w: &mut Writer<'_>, mover: &Instance<'a>, number: usize) {
         let branch = &mover.edge.branches[number];
         update(w, &branch.update, &mover.values);
         // Who has moved plans anyway, but who sets rates is looked at before.
@@ -564,7 +579,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets processes plan anew.
-    fn mark_processes(&self, w: &mut Writer, processes: impl IntoIterator<Item = u32>) {
+    fn mark_processes(&self, w: &mut Writer<'_>, processes: impl IntoIterator<Item = u32>) {
         let mut masks = vec![0; self.layout.stale_words as usize];
         for process in processes {
             let (word, bit) = self.layout.stale_bit(process as usize);
@@ -578,7 +593,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process not plan anew.
-    fn unmark(&self, w: &mut Writer, process: u32) {
+    fn unmark(&self, w: &mut Writer<'_>, process: u32) {
         let (word, bit) = self.layout.stale_bit(process as usize);
         let (before, others) = (w.load(word), w.integer(!bit));
         let after = w.arithmetic(IntegerOperator::And, before, others);
@@ -587,7 +602,7 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Lets those plan anew who are where their plans depend on what has changed; `but` does so
     /// anyway.
-    pub(super) fn mark_readers(&self, w: &mut Writer, readers: &[Reader], but: Option<u32>) {
+    pub(super) fn mark_readers(&self, w: &mut Writer<'_>, readers: &[Reader], but: Option<u32>) {
         let everywhere = readers.iter().filter(|reader| reader.location.is_none());
         self.mark_processes(w, everywhere.map(|reader| reader.process));
         for reader in readers {
@@ -648,7 +663,7 @@ impl<'a> RaceWriter<'_, 'a> {
 
 /// The number of the channel of an instance that computes it.
 fn computed_channel(
-    w: &mut Writer,
+    w: &mut Writer<'_>,
     instance: &Instance<'_>,
     (first, index): (u32, FunctionId),
 ) -> Register {
@@ -659,14 +674,14 @@ fn computed_channel(
     w.add_integers(first, offset)
 }
 
-fn update(w: &mut Writer, update: &Update, values: &[i32]) {
+fn update(w: &mut Writer<'_>, update: &Update, values: &[i32]) {
     if let Some(function) = update.function {
         w.call(function, values);
     }
 }
 
 /// Sets bits of a word.
-pub(super) fn mark(w: &mut Writer, word: u32, bits: i32) {
+pub(super) fn mark(w: &mut Writer<'_>, word: u32, bits: i32) {
     let (before, bits) = (w.load(word), w.integer(bits));
     let after = w.arithmetic(IntegerOperator::Or, before, bits);
     w.store(word, after);

@@ -1,6 +1,5 @@
 //! What all that write the code of a race share.
 
-use super::conditions::Conditions;
 use super::layout::Layout;
 use super::writer::Writer;
 use crate::ir::{FunctionId, Network, RegisterType};
@@ -35,9 +34,6 @@ impl Ids {
 pub(super) struct RaceWriter<'p, 'a> {
     pub(super) program: &'p Program<'a>,
     pub(super) layout: &'p Layout,
-    pub(super) conditions: Conditions<'p, 'a>,
-    /// Draws a delay in windows.
-    pub(super) in_windows: FunctionId,
     /// Sets the rates of clocks, if some location does.
     pub(super) renewal_of_rates: Option<FunctionId>,
     /// The processes that can be in committed locations.
@@ -49,7 +45,7 @@ impl<'a> RaceWriter<'_, 'a> {
         self.program.network
     }
 
-    pub(super) fn writer(&self, name: &str, signature: (u32, Option<RegisterType>)) -> Writer {
-        Writer::new(name, signature, self.network().chances.stream)
+    pub(super) fn writer(&self, name: &str, signature: (u32, Option<RegisterType>)) -> Writer<'_> {
+        Writer::new(name, signature, self.layout)
     }
 }

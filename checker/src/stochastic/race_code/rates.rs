@@ -7,6 +7,7 @@ use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{BlockId, Function, IntegerOperator, Relation};
 use crate::stochastic::program::Program;
+use crate::stochastic::rules::Backend;
 
 /// The clocks whose rates some location of a process sets.
 fn clocks_of(program: &Program<'_>, process: u32) -> BTreeSet<u32> {
@@ -42,12 +43,12 @@ impl RaceWriter<'_, '_> {
         writer.finish()
     }
 
-    fn set_rates(&self, w: &mut Writer, process: u32) {
+    fn set_rates(&self, w: &mut Writer<'_>, process: u32) {
         let clocks = clocks_of(self.program, process);
         for &clock in &clocks {
-            let before = w.load_double(clock + 2);
+            let before = w.load_real(clock + 2);
             w.store_double(self.layout.rate_before(clock), before);
-            let one = w.double(1.0);
+            let one = w.real(1.0);
             w.store_double(clock + 2, one);
         }
         let (start, done) = (w.block(), w.block());
@@ -65,11 +66,11 @@ impl RaceWriter<'_, '_> {
             w.at(block);
             w.call(rates, &[]);
             for &clock in &location.chances.rated_clocks {
-                let rate = w.load_double(clock + 2);
+                let rate = w.load_real(clock + 2);
                 let negative = w.negate(rate);
                 let size = w.greatest(rate, negative);
-                let infinity = w.double(f64::INFINITY);
-                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
+                let infinity = w.real(f64::INFINITY);
+                let is_finite = w.compare_reals(size, Relation::Less, infinity);
                 w.unless(is_finite, wrong);
             }
             w.jump(done);

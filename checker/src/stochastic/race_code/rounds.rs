@@ -3,7 +3,6 @@
 use super::asked::Watched;
 use super::entries::take_one_of;
 use super::moves::MISSED;
-use super::plans::tolerant;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};
 use super::writer::Writer;
@@ -11,6 +10,7 @@ use crate::ir::{
     BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Urgency,
 };
 use crate::stochastic::constants::TOLERANCE;
+use crate::stochastic::rules::{self, Backend};
 
 /// Who wins, in registers.
 #[derive(Clone, Copy)]
@@ -27,13 +27,13 @@ struct First {
 impl First {
     /// Who wins among some of which everyone is first alone. No branches: they would be
     /// mispredicted every other time.
-    fn of(w: &mut Writer, all: &[First]) -> First {
+    fn of(w: &mut Writer<'_>, all: &[First]) -> First {
         if let [only] = *all {
             return only;
         }
         let (left, right) = all.split_at(all.len() / 2);
         let (left, right) = (First::of(w, left), First::of(w, right));
-        let is_left = w.compare_doubles(left.attempt, Relation::Less, right.attempt);
+        let is_left = w.compare_reals(left.attempt, Relation::Less, right.attempt);
         let cell = w.either(is_left, left.cell, right.cell);
         let attempt = w.least(left.attempt, right.attempt);
         let mut second = w.greatest(left.attempt, right.attempt);
@@ -61,7 +61,7 @@ impl RaceWriter<'_, '_> {
         w.at(round);
         // Where the winner moves, from the location that the cell says; the delay before it has
         // passed.
-        let (cell, delay) = (w.integer(0), w.double(0.0));
+        let (cell, delay) = (w.integer(0), w.real(0.0));
         if self.committing.is_empty() {
             w.jump(racing);
         } else {
@@ -73,7 +73,7 @@ impl RaceWriter<'_, '_> {
         w.at(racing);
         self.plan_anew(w, ids);
         let all = self.attempts(w, ids);
-        let infinity = w.double(f64::INFINITY);
+        let infinity = w.real(f64::INFINITY);
         let first = (!all.is_empty()).then(|| First::of(w, &all));
         w.copy(delay, first.map_or(infinity, |first| first.attempt));
         let (bounded, free) = (w.block(), w.block());
@@ -93,8 +93,8 @@ impl RaceWriter<'_, '_> {
             self.wait(w, passing, &attempts);
             w.copy(cell, first.cell);
             if let Some(second) = first.second {
-                let latest = tolerant(w, delay);
-                let are_many = w.compare_doubles(second, Relation::LessEqual, latest);
+                let latest = rules::tolerant(w, delay);
+                let are_many = w.compare_reals(second, Relation::LessEqual, latest);
                 let tied = w.block();
                 w.branch(are_many, tied, moving);
                 w.at(tied);
@@ -112,7 +112,7 @@ impl RaceWriter<'_, '_> {
     }
 
     /// What comes before the first move of a run, or before the next one of so many.
-    fn begin_run(&self, w: &mut Writer, ids: &Ids) {
+    fn begin_run(&self, w: &mut Writer<'_>, ids: &Ids) {
         if let Some(renewal) = self.renewal_of_rates {
             w.call(renewal, &[]);
         }
@@ -129,10 +129,10 @@ impl RaceWriter<'_, '_> {
 
     /// When each process that can move tries to. Where it is is read before it is known who wins:
     /// the jump that follows then waits for nothing but the attempts.
-    fn attempts(&self, w: &mut Writer, ids: &Ids) -> Vec<First> {
+    fn attempts(&self, w: &mut Writer<'_>, ids: &Ids) -> Vec<First> {
         let words = self.layout.attempts.iter().enumerate();
         let attempts: Vec<(usize, Register)> = words
-            .filter_map(|(process, word)| Some((process, w.load_double((*word)?))))
+            .filter_map(|(process, word)| Some((process, w.load_real((*word)?))))
             .collect();
         let all = attempts.into_iter().map(|(process, attempt)| First {
             cell: Self::cell(w, ids, process),
@@ -147,17 +147,17 @@ impl RaceWriter<'_, '_> {
     /// if that lies beyond the bound by no more than rounding.
     fn watch_delay(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         watched: &Watched,
         delay: Register,
         over: BlockId,
     ) -> Register {
         let layout = self.layout;
         let (inside, beyond, in_time) = (w.block(), w.block(), w.block());
-        let passing = w.double(0.0);
-        let (bound, time) = (w.load_double(layout.bound), w.load_double(layout.time));
+        let passing = w.real(0.0);
+        let (bound, time) = (w.load_real(layout.bound), w.load_real(layout.time));
         let rest = w.subtract(bound, time);
-        let is_inside = w.compare_doubles(delay, Relation::LessEqual, rest);
+        let is_inside = w.compare_reals(delay, Relation::LessEqual, rest);
         w.branch(is_inside, inside, beyond);
         w.at(beyond);
         // But for rounding, the run is over before anybody moves.
@@ -166,7 +166,7 @@ impl RaceWriter<'_, '_> {
         w.copy(passing, first_end);
         self.watch(w, watched, Some(passing));
         let latest_end = w.add(rest, slack);
-        let is_late = w.compare_doubles(latest_end, Relation::Less, delay);
+        let is_late = w.compare_reals(latest_end, Relation::Less, delay);
         let late = w.block();
         w.branch(is_late, late, in_time);
         w.at(late);
@@ -184,7 +184,7 @@ impl RaceWriter<'_, '_> {
     /// says whether somebody is in a committed location now.
     fn let_winner_move(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         ids: &Ids,
         cell: Register,
         [round, racing, settling]: [BlockId; 3],
@@ -206,8 +206,8 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Ends a run at its bound, after so much more time.
-    fn end_run(&self, w: &mut Writer, watched: &Watched, delay: Register) {
-        let zero = w.double(0.0);
+    fn end_run(&self, w: &mut Writer<'_>, watched: &Watched, delay: Register) {
+        let zero = w.real(0.0);
         let passing = w.greatest(delay, zero);
         self.wait_until_the_end(w, passing);
         if let Watched::Extreme(..) = watched {
@@ -218,12 +218,12 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Sets the cell to one of those whose attempts come until then, all with the same chance.
-    fn choose_among(w: &mut Writer, all: &[First], latest: Register, cell: Register) {
+    fn choose_among(w: &mut Writer<'_>, all: &[First], latest: Register, cell: Register) {
         let count = w.integer(0);
         let flags: Vec<Register> = all
             .iter()
             .map(|one| {
-                let is_first = w.compare_doubles(one.attempt, Relation::LessEqual, latest);
+                let is_first = w.compare_reals(one.attempt, Relation::LessEqual, latest);
                 let more = w.add_integers(count, is_first);
                 w.copy(count, more);
                 is_first
@@ -235,7 +235,7 @@ impl RaceWriter<'_, '_> {
     }
 
     /// The cell of a process that is where it is.
-    fn cell(w: &mut Writer, ids: &Ids, process: usize) -> Register {
+    fn cell(w: &mut Writer<'_>, ids: &Ids, process: usize) -> Register {
         let location = w.load(process as u32);
         let first = w.integer(ids.first_location(process) as i32);
         w.add_integers(location, first)
@@ -243,7 +243,7 @@ impl RaceWriter<'_, '_> {
 
     /// Lets the winner move from where it is, as its cell says; goes where what the function of the
     /// move returns leads.
-    fn let_move(&self, w: &mut Writer, ids: &Ids, cell: Register, next: [BlockId; 3]) {
+    fn let_move(&self, w: &mut Writer<'_>, ids: &Ids, cell: Register, next: [BlockId; 3]) {
         let wrong = w.block();
         let cells = ids.moves.iter().enumerate().flat_map(|(process, moves)| {
             let functions = moves.iter().enumerate();
@@ -272,7 +272,7 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Lets all processes plan whose plans may have changed.
-    fn plan_anew(&self, w: &mut Writer, ids: &Ids) {
+    fn plan_anew(&self, w: &mut Writer<'_>, ids: &Ids) {
         let layout = self.layout;
         for word in layout.stale..layout.stale + layout.stale_words {
             let mask = w.load(word);
@@ -293,7 +293,7 @@ impl RaceWriter<'_, '_> {
     /// Chooses who leaves one of the committed locations.
     fn settle_committed(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (ids, watched): (&Ids, &Watched),
         (cell, moving): (Register, BlockId),
     ) {
@@ -312,7 +312,7 @@ impl RaceWriter<'_, '_> {
     /// Chooses one of those who can move now as the winner, all with the same chance.
     fn let_one_move(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (ids, watched): (&Ids, &Watched),
         (processes, only_committed): (Vec<usize>, bool),
         (cell, moving): (Register, BlockId),
@@ -351,30 +351,30 @@ impl RaceWriter<'_, '_> {
     /// is over by then.
     fn settle_stays(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (ids, watched): (&Ids, &Watched),
         delay: Register,
         (cell, moving): (Register, BlockId),
         (free, over): (BlockId, BlockId),
     ) {
-        let infinity = w.double(f64::INFINITY);
+        let infinity = w.real(f64::INFINITY);
         let mut least = infinity;
         for &word in self.layout.stays.iter().flatten() {
-            let stay = w.load_double(word);
+            let stay = w.load_real(word);
             least = w.least(least, stay);
         }
-        let has_end = w.compare_doubles(least, Relation::Less, infinity);
+        let has_end = w.compare_reals(least, Relation::Less, infinity);
         w.when(has_end, |w| {
-            let latest = tolerant(w, least);
-            let is_beyond = w.compare_doubles(delay, Relation::Greater, latest);
+            let latest = rules::tolerant(w, least);
+            let is_beyond = w.compare_reals(delay, Relation::Greater, latest);
             w.unless(is_beyond, free);
-            let tolerance = w.double(TOLERANCE);
-            let is_now = w.compare_doubles(least, Relation::LessEqual, tolerance);
+            let tolerance = w.real(TOLERANCE);
+            let is_now = w.compare_reals(least, Relation::LessEqual, tolerance);
             let (now, later, stuck) = (w.block(), w.block(), w.block());
             w.branch(is_now, now, later);
             w.at(now);
-            let zero = w.double(0.0);
-            let is_zero = w.compare_doubles(least, Relation::LessEqual, zero);
+            let zero = w.real(0.0);
+            let is_zero = w.compare_reals(least, Relation::LessEqual, zero);
             w.unless(is_zero, stuck);
             let all = (0..ids.moves.len()).collect();
             self.let_one_move(w, (ids, watched), (all, false), (cell, moving));
@@ -383,7 +383,7 @@ impl RaceWriter<'_, '_> {
             let passing = w.least(least, rest);
             self.watch(w, watched, Some(passing));
             let end = w.add(rest, slack);
-            let is_over = w.compare_doubles(end, Relation::Less, least);
+            let is_over = w.compare_reals(end, Relation::Less, least);
             w.unless(is_over, stuck);
             w.copy(delay, rest);
             w.jump(over);
@@ -395,17 +395,17 @@ impl RaceWriter<'_, '_> {
     }
 
     /// How much time the run still has, and how much later a move may come.
-    fn rest(&self, w: &mut Writer) -> (Register, Register) {
+    fn rest(&self, w: &mut Writer<'_>) -> (Register, Register) {
         let (bound, time) = (
-            w.load_double(self.layout.bound),
-            w.load_double(self.layout.time),
+            w.load_real(self.layout.bound),
+            w.load_real(self.layout.time),
         );
-        let (zero, one) = (w.double(0.0), w.double(1.0));
+        let (zero, one) = (w.real(0.0), w.real(1.0));
         let rest = w.subtract(bound, time);
         let rest = w.greatest(rest, zero);
-        let tolerance = w.double(TOLERANCE);
-        let slack = w.double(TOLERANCE);
-        let has_rest = w.compare_doubles(rest, Relation::Greater, zero);
+        let tolerance = w.real(TOLERANCE);
+        let slack = w.real(TOLERANCE);
+        let has_rest = w.compare_reals(rest, Relation::Greater, zero);
         w.when(has_rest, |w| {
             let size = w.greatest(bound, one);
             let size = w.multiply(tolerance, size);
@@ -415,9 +415,9 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Lets time pass, if it is more than none.
-    fn wait(&self, w: &mut Writer, delay: Register, attempts: &[(u32, Register)]) {
-        let zero = w.double(0.0);
-        let passes = w.compare_doubles(delay, Relation::Greater, zero);
+    fn wait(&self, w: &mut Writer<'_>, delay: Register, attempts: &[(u32, Register)]) {
+        let zero = w.real(0.0);
+        let passes = w.compare_reals(delay, Relation::Greater, zero);
         w.when(passes, |w| {
             self.advance(w, delay);
             for &(word, attempt) in attempts {
@@ -427,7 +427,7 @@ impl RaceWriter<'_, '_> {
             let has_stays = w.load(self.layout.has_stays);
             w.when(has_stays, |w| {
                 for &word in self.layout.stays.iter().flatten() {
-                    let stay = w.load_double(word);
+                    let stay = w.load_real(word);
                     let rest = w.subtract(stay, delay);
                     w.store_double(word, rest);
                 }
@@ -435,17 +435,17 @@ impl RaceWriter<'_, '_> {
         });
     }
 
-    fn wait_until_the_end(&self, w: &mut Writer, delay: Register) {
-        let zero = w.double(0.0);
-        let passes = w.compare_doubles(delay, Relation::Greater, zero);
+    fn wait_until_the_end(&self, w: &mut Writer<'_>, delay: Register) {
+        let zero = w.real(0.0);
+        let passes = w.compare_reals(delay, Relation::Greater, zero);
         w.when(passes, |w| self.advance(w, delay));
     }
 
-    fn advance(&self, w: &mut Writer, delay: Register) {
+    fn advance(&self, w: &mut Writer<'_>, delay: Register) {
         for &clock in &self.network().chances.clocks {
-            let value = w.load_double(clock);
+            let value = w.load_real(clock);
             let passed = if self.layout.is_rated(clock) {
-                let rate = w.load_double(clock + 2);
+                let rate = w.load_real(clock + 2);
                 w.multiply(rate, delay)
             } else {
                 delay
@@ -453,7 +453,7 @@ impl RaceWriter<'_, '_> {
             let value = w.add(value, passed);
             w.store_double(clock, value);
         }
-        let time = w.load_double(self.layout.time);
+        let time = w.load_real(self.layout.time);
         let time = w.add(time, delay);
         w.store_double(self.layout.time, time);
     }

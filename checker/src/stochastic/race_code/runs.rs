@@ -1,7 +1,6 @@
 //! The code of a race as a whole: whether there can be one, and runs that it makes.
 
 use super::asked::{End, Watched};
-use super::conditions::Conditions;
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, Plans, RaceWriter};
@@ -14,6 +13,7 @@ use crate::exec::{Context, Executor, simplified};
 use crate::ir::{
     Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
 };
+use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
 use crate::stochastic::program::{Program, Spot};
 
@@ -44,12 +44,7 @@ impl WrittenRace {
         let network = program.network;
         let rated = rated_clocks(program)?;
         let layout = Layout::of(program, &rated);
-        let conditions = Conditions {
-            program,
-            layout: &layout,
-            result: network.chances.result,
-        };
-        if !watched.is_known(program) || !is_known(program, &conditions) {
+        if !watched.is_known(program) || !is_known(program) {
             return None;
         }
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
@@ -62,8 +57,6 @@ impl WrittenRace {
         let writer = RaceWriter {
             program,
             layout: &layout,
-            conditions,
-            in_windows: FunctionId(first),
             renewal_of_rates: (!rated.is_empty()).then_some(FunctionId(first + 1)),
             committing,
         };
@@ -170,7 +163,7 @@ impl WrittenRace {
 }
 
 /// Whether the code knows all that a network has.
-fn is_known(program: &Program<'_>, conditions: &Conditions<'_, '_>) -> bool {
+fn is_known(program: &Program<'_>) -> bool {
     let network = program.network;
     let processes = network.processes.len() as u32;
     let reads_places = |function: FunctionId| {
@@ -190,8 +183,17 @@ fn is_known(program: &Program<'_>, conditions: &Conditions<'_, '_>) -> bool {
         && network.before_update.is_none()
         && network.after_update.is_none()
         && network.externals.is_empty()
-        && spots.all(|spot| conditions.can_write(spot))
+        && spots.all(|spot| can_write(program, spot))
         && !updates.any(reads_places)
+}
+
+/// Whether all conditions of a spot can be written.
+fn can_write(program: &Program<'_>, spot: &Spot) -> bool {
+    let is_known = |condition| !matches!(condition, Condition::Timed(_) | Condition::Curved(_));
+    let mut instances = [spot.outputs, spot.inputs]
+        .into_iter()
+        .flat_map(|range| program.range(range));
+    is_known(spot.invariant) && instances.all(|one| is_known(one.guard) && !one.is_binary)
 }
 
 /// The code of a race, ready to make runs one after the other.

@@ -6,6 +6,7 @@ use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{BlockId, IntegerOperator, Register, Relation};
 use crate::stochastic::condition::Condition;
+use crate::stochastic::rules::Backend;
 
 /// What the code of a run returns: it goes on if it is called again;
 pub(super) const GOES_ON: i32 = 0;
@@ -27,22 +28,22 @@ struct Mask {
 impl RaceWriter<'_, '_> {
     /// Ends the run if what was asked is decided by the state, or within the delay that follows, if
     /// there is one.
-    pub(super) fn watch(&self, w: &mut Writer, watched: &Watched, delay: Option<Register>) {
+    pub(super) fn watch(&self, w: &mut Writer<'_>, watched: &Watched, delay: Option<Register>) {
         match *watched {
             Watched::Eventually(goal) => self.watch_for(w, (Condition::Always, goal), delay),
             Watched::Always(keep) => self.watch_for(w, (keep, Condition::Never), delay),
             Watched::Until(keep, goal) => self.watch_for(w, (keep, goal), delay),
             Watched::Extreme(value, sign) => {
                 w.call(value, &[]);
-                let value = w.load_double(self.network().chances.result);
-                let sign = w.double(sign);
+                let value = w.load_real(self.network().chances.result);
+                let sign = w.real(sign);
                 let value = w.multiply(sign, value);
-                let infinity = w.double(f64::INFINITY);
+                let infinity = w.real(f64::INFINITY);
                 let negative = w.negate(value);
                 let size = w.greatest(value, negative);
-                let is_finite = w.compare_doubles(size, Relation::Less, infinity);
+                let is_finite = w.compare_reals(size, Relation::Less, infinity);
                 w.insist(is_finite);
-                let best = w.load_double(self.layout.best);
+                let best = w.load_real(self.layout.best);
                 let best = w.greatest(value, best);
                 w.store_double(self.layout.best, best);
             }
@@ -52,7 +53,7 @@ impl RaceWriter<'_, '_> {
     /// Ends the run if the goal is reached, or what must be kept until then does not hold.
     fn watch_for(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (keep, goal): (Condition, Condition),
         delay: Option<Register>,
     ) {
@@ -76,12 +77,12 @@ impl RaceWriter<'_, '_> {
     /// Looks at all moments of a delay at which a condition may change.
     fn watch_through(
         &self,
-        w: &mut Writer,
+        w: &mut Writer<'_>,
         (keep, goal): (Condition, Condition),
         delay: Option<Register>,
         (reached, missed, next): (BlockId, BlockId, BlockId),
     ) {
-        let ahead = w.double(0.0);
+        let ahead = w.real(0.0);
         let head = w.block();
         w.jump(head);
         w.at(head);
@@ -89,7 +90,7 @@ impl RaceWriter<'_, '_> {
         w.store_double(self.layout.decided_after, ahead);
         let keep = self.mask(w, keep, ahead);
         let goal = self.mask(w, goal, ahead);
-        let end_unless_open = |w: &mut Writer, goal: Register, keep: Register| {
+        let end_unless_open = |w: &mut Writer<'_>, goal: Register, keep: Register| {
             let open = w.block();
             w.branch(goal, reached, open);
             w.at(open);
@@ -98,17 +99,17 @@ impl RaceWriter<'_, '_> {
         end_unless_open(w, goal.now, keep.now);
         let after = w.block();
         if let Some(delay) = delay {
-            let is_inside = w.compare_doubles(ahead, Relation::Less, delay);
+            let is_inside = w.compare_reals(ahead, Relation::Less, delay);
             w.unless(is_inside, after);
             end_unless_open(w, goal.behind, keep.behind);
             let horizon = w.least(goal.horizon, keep.horizon);
             let later = w.add(ahead, horizon);
-            let is_inside = w.compare_doubles(later, Relation::LessEqual, delay);
+            let is_inside = w.compare_reals(later, Relation::LessEqual, delay);
             w.unless(is_inside, after);
-            let infinity = w.double(f64::INFINITY);
-            let is_finite = w.compare_doubles(later, Relation::Less, infinity);
+            let infinity = w.real(f64::INFINITY);
+            let is_finite = w.compare_reals(later, Relation::Less, infinity);
             w.unless(is_finite, after);
-            let gets_on = w.compare_doubles(later, Relation::Greater, ahead);
+            let gets_on = w.compare_reals(later, Relation::Greater, ahead);
             w.unless(gets_on, after);
             w.copy(ahead, later);
             w.jump(head);
@@ -116,13 +117,13 @@ impl RaceWriter<'_, '_> {
             w.jump(after);
         }
         w.at(after);
-        let none = w.double(0.0);
+        let none = w.real(0.0);
         w.store_double(self.layout.decided_after, none);
         w.jump(next);
     }
 
     /// What a condition says of the state after this time, if nothing happens until then.
-    fn mask(&self, w: &mut Writer, condition: Condition, ahead: Register) -> Mask {
+    fn mask(&self, w: &mut Writer<'_>, condition: Condition, ahead: Register) -> Mask {
         let chances = &self.network().chances;
         if let Condition::Timed(function) = condition {
             w.store_double(chances.ahead, ahead);
@@ -131,7 +132,7 @@ impl RaceWriter<'_, '_> {
             return Mask {
                 now: w.arithmetic(IntegerOperator::And, mask, first),
                 behind: w.arithmetic(IntegerOperator::And, mask, second),
-                horizon: w.load_double(chances.result),
+                horizon: w.load_real(chances.result),
             };
         }
         let holds = match condition {
@@ -142,13 +143,13 @@ impl RaceWriter<'_, '_> {
         Mask {
             now: holds,
             behind: holds,
-            horizon: w.double(f64::INFINITY),
+            horizon: w.real(f64::INFINITY),
         }
     }
 }
 
 /// Goes on if it is so that a condition on words holds, or that it does not; else elsewhere.
-fn require(w: &mut Writer, condition: Condition, holds: bool, otherwise: BlockId) {
+fn require(w: &mut Writer<'_>, condition: Condition, holds: bool, otherwise: BlockId) {
     match condition {
         Condition::Words(function) => {
             let next = w.block();

@@ -2,10 +2,12 @@
 
 use std::collections::BTreeSet;
 
+use super::layout::Layout;
 use crate::ir::{
-    Address, Base, Block, BlockId, Distribution, DoubleOperator, Function, FunctionId, Instruction,
+    Address, Base, Block, BlockId, Distribution, Function, FunctionId, Instruction,
     IntegerOperator, Register, RegisterType, Relation, RunTimeErrorKind, SiteId, Terminator,
 };
+use crate::stochastic::rules::Backend;
 
 /// Code that is written here fails nowhere but where it gives up, which needs no place.
 const NOWHERE: SiteId = SiteId(0);
@@ -15,23 +17,25 @@ const WORTH_A_TABLE: usize = 4;
 
 /// A function that is being written. What is written goes to the end of the current block; behind
 /// its terminator nothing is reached, and nothing is kept.
-pub(super) struct Writer {
+pub(super) struct Writer<'l> {
+    pub(super) layout: &'l Layout,
     function: Function,
     current: usize,
     /// Whether the current block has its terminator.
     is_ended: bool,
-    /// The double at which runs draw their random numbers begin.
-    stream: u32,
+    /// By block: whether something leads to it.
+    is_reached: Vec<bool>,
 }
 
-impl Writer {
+impl<'l> Writer<'l> {
     /// A function of integers; its parameters are the first registers.
     pub(super) fn new(
         name: &str,
         (parameters, result): (u32, Option<RegisterType>),
-        stream: u32,
-    ) -> Writer {
+        layout: &'l Layout,
+    ) -> Writer<'l> {
         Writer {
+            layout,
             function: Function {
                 name: name.into(),
                 registers: vec![RegisterType::Integer; parameters as usize],
@@ -42,7 +46,7 @@ impl Writer {
             },
             current: 0,
             is_ended: false,
-            stream,
+            is_reached: vec![true],
         }
     }
 
@@ -63,7 +67,7 @@ impl Writer {
     }
 
     /// Writes an instruction that has a result.
-    fn result(
+    pub(super) fn result(
         &mut self,
         kind: RegisterType,
         instruction: impl FnOnce(Register) -> Instruction,
@@ -76,6 +80,7 @@ impl Writer {
     /// A block that nothing leads to yet.
     pub(super) fn block(&mut self) -> BlockId {
         self.function.blocks.push(empty_block());
+        self.is_reached.push(false);
         BlockId(self.function.blocks.len() as u32 - 1)
     }
 
@@ -85,8 +90,16 @@ impl Writer {
         self.is_ended = false;
     }
 
+    /// Whether something leads to a block so far.
+    pub(super) fn is_reached(&self, BlockId(block): BlockId) -> bool {
+        self.is_reached[block as usize]
+    }
+
     fn end(&mut self, terminator: Terminator) {
         if !self.is_ended {
+            for block in terminator.successors() {
+                self.is_reached[block.0 as usize] = true;
+            }
             self.function.blocks[self.current].terminator = terminator;
             self.is_ended = true;
         }
@@ -113,7 +126,7 @@ impl Writer {
     }
 
     /// Writes what is done only if a condition holds.
-    pub(super) fn when(&mut self, condition: Register, write: impl FnOnce(&mut Writer)) {
+    pub(super) fn when(&mut self, condition: Register, write: impl FnOnce(&mut Self)) {
         let (then, next) = (self.block(), self.block());
         self.branch(condition, then, next);
         self.at(then);
@@ -134,8 +147,8 @@ impl Writer {
     /// Writes what is done as long as a condition holds.
     pub(super) fn repeat(
         &mut self,
-        condition: impl FnOnce(&mut Writer) -> Register,
-        write: impl FnOnce(&mut Writer),
+        condition: impl FnOnce(&mut Self) -> Register,
+        write: impl FnOnce(&mut Self),
     ) {
         let (head, body, next) = (self.block(), self.block(), self.block());
         self.jump(head);
@@ -160,20 +173,6 @@ impl Writer {
     /// Gives the run up: it is made in another way.
     pub(super) fn give_up(&mut self) {
         self.end(Terminator::Fail(RunTimeErrorKind::Interrupted, NOWHERE));
-    }
-
-    pub(super) fn integer(&mut self, value: i32) -> Register {
-        self.result(RegisterType::Integer, |target| Instruction::Integer {
-            target,
-            value,
-        })
-    }
-
-    pub(super) fn double(&mut self, value: f64) -> Register {
-        let target = self.register(RegisterType::Double);
-        let value = value.into();
-        self.push(Instruction::Double { target, value });
-        target
     }
 
     pub(super) fn copy(&mut self, target: Register, source: Register) {
@@ -249,68 +248,6 @@ impl Writer {
         })
     }
 
-    pub(super) fn doubles(
-        &mut self,
-        operator: DoubleOperator,
-        left: Register,
-        right: Register,
-    ) -> Register {
-        self.result(RegisterType::Double, |target| {
-            Instruction::DoubleArithmetic {
-                operator,
-                target,
-                left,
-                right,
-            }
-        })
-    }
-
-    pub(super) fn add(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Add, left, right)
-    }
-
-    pub(super) fn subtract(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Subtract, left, right)
-    }
-
-    pub(super) fn multiply(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Multiply, left, right)
-    }
-
-    pub(super) fn divide(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Divide, left, right)
-    }
-
-    pub(super) fn least(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Minimum, left, right)
-    }
-
-    pub(super) fn greatest(&mut self, left: Register, right: Register) -> Register {
-        self.doubles(DoubleOperator::Maximum, left, right)
-    }
-
-    /// `0 - value`
-    pub(super) fn negate(&mut self, value: Register) -> Register {
-        let zero = self.double(0.0);
-        self.subtract(zero, value)
-    }
-
-    pub(super) fn compare(
-        &mut self,
-        left: Register,
-        relation: Relation,
-        right: Register,
-    ) -> Register {
-        self.result(RegisterType::Integer, |target| {
-            Instruction::CompareIntegers {
-                relation,
-                target,
-                left,
-                right,
-            }
-        })
-    }
-
     pub(super) fn compare_to(
         &mut self,
         left: Register,
@@ -321,25 +258,20 @@ impl Writer {
         self.compare(left, relation, right)
     }
 
-    pub(super) fn compare_doubles(
-        &mut self,
-        left: Register,
-        relation: Relation,
-        right: Register,
-    ) -> Register {
-        self.result(RegisterType::Integer, |target| {
-            Instruction::CompareDoubles {
-                relation,
-                target,
-                left,
-                right,
-            }
-        })
-    }
-
     pub(super) fn double_of(&mut self, source: Register) -> Register {
         self.result(RegisterType::Double, |target| {
             Instruction::IntegerToDouble { target, source }
+        })
+    }
+
+    /// A double that is an integer.
+    pub(super) fn integer_of(&mut self, source: Register) -> Register {
+        self.result(RegisterType::Integer, |target| {
+            Instruction::DoubleToInteger {
+                target,
+                source,
+                site: NOWHERE,
+            }
         })
     }
 
@@ -381,7 +313,7 @@ impl Writer {
     }
 
     pub(super) fn draw(&mut self, distribution: Distribution, argument: Register) -> Register {
-        let stream = word_of_state(self.stream, None);
+        let stream = word_of_state(self.layout.stream, None);
         self.result(RegisterType::Double, |target| Instruction::Random {
             distribution,
             target,
@@ -425,19 +357,6 @@ impl Writer {
             length,
             stride: 2,
             site: NOWHERE,
-        })
-    }
-
-    /// An integer less than `count`, each with the same probability.
-    pub(super) fn draw_below(&mut self, count: Register) -> Register {
-        let count = self.double_of(count);
-        let drawn = self.draw(Distribution::Below, count);
-        self.result(RegisterType::Integer, |target| {
-            Instruction::DoubleToInteger {
-                target,
-                source: drawn,
-                site: NOWHERE,
-            }
         })
     }
 

@@ -1,0 +1,202 @@
+//! The operations that rules consist of.
+
+use std::cell::Cell;
+
+use crate::ir::{DoubleOperator, FunctionId, Relation};
+use crate::stochastic::condition::Condition;
+use crate::stochastic::failure::{Failure, Stand};
+use crate::stochastic::program::{Program, Spot};
+
+/// What comes of a rule, if it does not end early.
+pub(in crate::stochastic) type Flow<B, T = ()> = Result<T, <B as Backend>::End>;
+
+/// What carries out rules: at once, or as code.
+pub(in crate::stochastic) trait Backend: Sized {
+    type Integer: Copy;
+    type Real: Copy;
+    /// Where a rule goes on that does not go on here.
+    type Exit: Copy;
+    /// How a rule ends early. Code is written to its end.
+    type End;
+
+    fn integer(&mut self, value: i32) -> Self::Integer;
+    fn real(&mut self, value: f64) -> Self::Real;
+
+    /// Gives a variable another value. A variable begins with a value of its own.
+    fn set(&mut self, variable: &Cell<Self::Integer>, value: Self::Integer);
+    fn set_real(&mut self, variable: &Cell<Self::Real>, value: Self::Real);
+
+    /// The sum of small integers: nobody looks whether it fits.
+    fn plus(&mut self, left: Self::Integer, right: i32) -> Self::Integer;
+    fn doubles(
+        &mut self,
+        operator: DoubleOperator,
+        left: Self::Real,
+        right: Self::Real,
+    ) -> Self::Real;
+
+    fn add(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Add, left, right)
+    }
+
+    fn subtract(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Subtract, left, right)
+    }
+
+    fn multiply(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Multiply, left, right)
+    }
+
+    fn divide(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Divide, left, right)
+    }
+
+    fn least(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Minimum, left, right)
+    }
+
+    fn greatest(&mut self, left: Self::Real, right: Self::Real) -> Self::Real {
+        self.doubles(DoubleOperator::Maximum, left, right)
+    }
+
+    /// `0 - value`
+    fn negate(&mut self, value: Self::Real) -> Self::Real {
+        let zero = self.real(0.0);
+        self.subtract(zero, value)
+    }
+
+    /// Whether a relation holds: 0 or 1.
+    fn compare(
+        &mut self,
+        left: Self::Integer,
+        relation: Relation,
+        right: Self::Integer,
+    ) -> Self::Integer;
+    fn compare_reals(
+        &mut self,
+        left: Self::Real,
+        relation: Relation,
+        right: Self::Real,
+    ) -> Self::Integer;
+
+    /// Does something only if a condition holds.
+    fn when(
+        &mut self,
+        condition: Self::Integer,
+        then: impl FnOnce(&mut Self) -> Flow<Self>,
+    ) -> Flow<Self>;
+
+    /// Does one of two things.
+    fn choose(
+        &mut self,
+        condition: Self::Integer,
+        then: impl FnOnce(&mut Self) -> Flow<Self>,
+        otherwise: impl FnOnce(&mut Self) -> Flow<Self>,
+    ) -> Flow<Self>;
+
+    /// Does something again and again as long as a condition holds.
+    fn repeat(
+        &mut self,
+        condition: impl FnMut(&mut Self) -> Self::Integer,
+        body: impl FnMut(&mut Self) -> Flow<Self>,
+    ) -> Flow<Self>;
+
+    /// Does something that may leave by the exit, and then something else.
+    fn within(
+        &mut self,
+        body: impl FnOnce(&mut Self, Self::Exit) -> Flow<Self>,
+        left: impl FnOnce(&mut Self) -> Flow<Self>,
+    ) -> Flow<Self>;
+
+    /// Leaves by an exit.
+    fn leave(&mut self, exit: Self::Exit) -> Flow<Self>;
+
+    /// Ends the run, which has no result.
+    fn fail(&mut self, why: impl FnOnce(&Self) -> Failure) -> Flow<Self>;
+
+    /// Goes on if a condition holds, else leaves by an exit.
+    fn unless(&mut self, condition: Self::Integer, exit: Self::Exit) -> Flow<Self> {
+        self.choose(condition, |_| Ok(()), |b| b.leave(exit))
+    }
+
+    /// Goes on if a condition holds, else ends the run.
+    fn insist(
+        &mut self,
+        condition: Self::Integer,
+        why: impl FnOnce(&Self) -> Failure,
+    ) -> Flow<Self> {
+        self.choose(condition, |_| Ok(()), |b| b.fail(why))
+    }
+
+    /// A number from 0 to a maximum, or one with a mean delay, or one of so many integers.
+    fn draw_uniform(&mut self, maximum: Self::Real) -> Self::Real;
+    fn draw_exponential(&mut self, rate: Self::Real) -> Self::Real;
+    fn draw_below(&mut self, count: Self::Integer) -> Self::Integer;
+
+    fn load_real(&mut self, word: u32) -> Self::Real;
+
+    /// Calls a function of the network.
+    fn call(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, Self::Integer>;
+    /// Calls one that leaves a number.
+    fn call_for_real(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, Self::Real>;
+
+    /// Whether the rate of a clock may differ from 1.
+    fn is_rated(&self, clock: u32) -> bool;
+
+    /// Where a process is, and a number, for what is said of a failure.
+    fn stand(&self, process: usize) -> Stand;
+    fn shown(&self, value: Self::Real) -> f64;
+
+    /// Notes in how long a process tries to move, and how long it may stay; nothing if never, or
+    /// for ever. `is_late` says whether it may have to leave before it tries to.
+    fn set_plan(
+        &mut self,
+        process: usize,
+        attempt: Option<Self::Real>,
+        stay: Option<Self::Real>,
+        is_late: bool,
+    );
+
+    /// The windows of the plan that is being made; their ends are in order.
+    fn set_window_count(&mut self, count: Self::Integer);
+    fn window_count(&mut self) -> Self::Integer;
+    fn window(&mut self, number: Self::Integer) -> (Self::Real, Self::Real);
+    fn set_window(&mut self, number: Self::Integer, low: Self::Real, high: Self::Real);
+
+    /// See [`super::delay_in_windows`].
+    fn delay_in_windows(&mut self, rate: Option<Self::Real>) -> Flow<Self, Self::Real>;
+
+    /// Whether a condition holds now that is no conjunction of comparisons.
+    fn holds(&mut self, condition: Condition, values: &[i32]) -> Flow<Self, Self::Integer>;
+
+    /// How long a process may stay by an invariant that the rules do not know.
+    fn other_stay(
+        &mut self,
+        _: &Program<'_>,
+        _: usize,
+        _: &Spot,
+    ) -> Option<Flow<Self, Self::Real>> {
+        None
+    }
+
+    /// Whether a process can move, whose outputs the rules do not know.
+    fn other_ability(
+        &mut self,
+        _: &Program<'_>,
+        _: usize,
+        _: &Spot,
+    ) -> Option<Flow<Self, Self::Integer>> {
+        None
+    }
+
+    /// In how long a process tries to move whose outputs the rules do not know.
+    fn other_attempt(
+        &mut self,
+        _: &Program<'_>,
+        _: usize,
+        _: &Spot,
+        _: Option<Self::Real>,
+    ) -> Option<Flow<Self, Self::Real>> {
+        None
+    }
+}

@@ -1,0 +1,461 @@
+//! What processes plan: how long they may stay, and when they try to move.
+
+use std::cell::Cell;
+
+use super::conditions::{Span, require, span};
+use super::{Backend, Flow, number};
+use crate::ir::{Relation, Urgency};
+use crate::stochastic::condition::{Condition, Number};
+use crate::stochastic::constants::TOLERANCE;
+use crate::stochastic::failure::Failure;
+use crate::stochastic::program::{Instance, Program, Spot};
+
+/// How long a process may stay where it is.
+#[derive(Clone, Copy)]
+struct Bound<R> {
+    end: R,
+    /// Whether it is known to be finite.
+    is_finite: bool,
+}
+
+impl<R: Copy> Bound<R> {
+    /// Whether the process may not stay for ever.
+    fn has_end<B: Backend<Real = R>>(self, b: &mut B) -> B::Integer {
+        let infinity = b.real(f64::INFINITY);
+        b.compare_reals(self.end, Relation::Less, infinity)
+    }
+}
+
+/// Lets a process plan in a location.
+pub(in crate::stochastic) fn plan<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    process: usize,
+    spot: &Spot,
+) -> Flow<B> {
+    let bound = bound(b, program, process, spot)?;
+    if spot.urgency != Urgency::Normal {
+        let now = b.real(0.0);
+        return b.within(
+            |b, never| {
+                require_some_output(b, program, process, spot, never)?;
+                b.set_plan(process, Some(now), Some(now), false);
+                Ok(())
+            },
+            |b| {
+                b.set_plan(process, None, Some(now), true);
+                Ok(())
+            },
+        );
+    }
+    let stay = bound.map(|bound| bound.end);
+    if let Some(attempt) = b.other_attempt(program, process, spot, stay) {
+        let attempt = attempt?;
+        b.set_plan(process, Some(attempt), stay, true);
+        return Ok(());
+    }
+    let planning = Planning {
+        program,
+        process,
+        spot,
+        bound,
+    };
+    b.within(
+        |b, never| {
+            if spot.is_plain {
+                require_some_output(b, program, process, spot, never)?;
+                planning.in_window(b, Span::ALL, never)
+            } else {
+                planning.in_windows(b, never)
+            }
+        },
+        |b| {
+            b.set_plan(process, None, stay, true);
+            Ok(())
+        },
+    )
+}
+
+/// How long a process may stay by its invariant; `None` if for ever.
+pub(in crate::stochastic) fn stay<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    process: usize,
+    spot: &Spot,
+) -> Flow<B, Option<B::Real>> {
+    Ok(bound(b, program, process, spot)?.map(|bound| bound.end))
+}
+
+fn bound<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    process: usize,
+    spot: &Spot,
+) -> Flow<B, Option<Bound<B::Real>>> {
+    if let Some(stay) = b.other_stay(program, process, spot) {
+        let (end, is_finite) = (stay?, false);
+        return Ok(Some(Bound { end, is_finite }));
+    }
+    let (low, high) = (Cell::new(None), Cell::new(None));
+    let stand = b.stand(process);
+    b.within(
+        |b, broken| {
+            let span = span(b, program, spot.invariant, &[], broken)?;
+            if let Some(low) = span.low {
+                let zero = b.real(0.0);
+                let holds_now = b.compare_reals(low, Relation::LessEqual, zero);
+                b.unless(holds_now, broken)?;
+            }
+            low.set(span.low);
+            high.set(span.high);
+            Ok(())
+        },
+        |b| b.fail(|_| Failure::InvariantBroken(stand)),
+    )?;
+    let (Some(end), Condition::Compared(place)) = (high.get(), spot.invariant) else {
+        return Ok(None);
+    };
+    let bounds = &program.comparisons(place).bounds;
+    // A clock with another rate may stand still.
+    let mut plain = bounds.iter().filter(|(clock, _, _)| !b.is_rated(*clock));
+    let is_finite = plain.any(|(_, relation, number)| {
+        let is_upper = matches!(
+            relation,
+            Relation::Less | Relation::LessEqual | Relation::Equal
+        );
+        is_upper && matches!(number, Number::Known(number) if number.is_finite())
+    });
+    Ok(Some(Bound { end, is_finite }))
+}
+
+/// Ends the run unless the invariant of a process holds.
+pub(in crate::stochastic) fn require_invariant<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    process: usize,
+    spot: &Spot,
+) -> Flow<B> {
+    let stand = b.stand(process);
+    b.within(
+        |b, broken| require(b, program, spot.invariant, &[], broken),
+        |b| b.fail(|_| Failure::InvariantBroken(stand)),
+    )
+}
+
+/// Goes on if an output of a process is enabled, else leaves. All guards are computed, for each may
+/// fail.
+fn require_some_output<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    process: usize,
+    spot: &Spot,
+    never: B::Exit,
+) -> Flow<B> {
+    if let Some(is_able) = b.other_ability(program, process, spot) {
+        let is_able = is_able?;
+        return b.unless(is_able, never);
+    }
+    let outputs = program.range(spot.outputs);
+    let is_certain = outputs.iter().any(|one| one.guard == Condition::Always);
+    if let [only] = outputs {
+        return require(b, program, only.guard, &only.values, never);
+    }
+    let some = Cell::new(b.integer(0));
+    for output in outputs {
+        when_enabled(b, program, output, |b| {
+            let one = b.integer(1);
+            b.set(&some, one);
+            Ok(())
+        })?;
+    }
+    if is_certain {
+        return Ok(());
+    }
+    b.unless(some.get(), never)
+}
+
+/// Does something only if the guard of an instance holds.
+fn when_enabled<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    instance: &Instance<'_>,
+    then: impl FnOnce(&mut B) -> Flow<B>,
+) -> Flow<B> {
+    b.within(
+        |b, next| {
+            require(b, program, instance.guard, &instance.values, next)?;
+            then(b)
+        },
+        |_| Ok(()),
+    )
+}
+
+/// A process that plans in a location where time may pass.
+struct Planning<'p, 'a, R> {
+    program: &'p Program<'a>,
+    process: usize,
+    spot: &'p Spot,
+    bound: Option<Bound<R>>,
+}
+
+impl<R: Copy> Planning<'_, '_, R> {
+    /// Ends a plan: the process tries to move at a moment that it may stay until.
+    fn end_in_time<B: Backend<Real = R>>(&self, b: &mut B, moment: R) {
+        let stay = self.bound.map(|bound| bound.end);
+        b.set_plan(self.process, Some(moment), stay, false);
+    }
+
+    /// Goes on if a moment comes while the process may stay, but for rounding, else leaves.
+    fn require_in_time<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        moment: R,
+        otherwise: B::Exit,
+    ) -> Flow<B> {
+        let Some(Bound { end, .. }) = self.bound else {
+            return Ok(());
+        };
+        let latest = tolerant(b, end);
+        let is_in_time = b.compare_reals(moment, Relation::LessEqual, latest);
+        b.unless(is_in_time, otherwise)
+    }
+
+    /// The end of a window, cut where the process may stay no longer.
+    fn cut<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>) -> Option<R> {
+        let mut high = window.high;
+        if let Some(Bound { end, .. }) = self.bound {
+            high = Some(high.map_or(end, |high| b.least(high, end)));
+        }
+        match (high, window.low) {
+            (Some(high), Some(low)) => Some(b.greatest(high, low)),
+            (high, _) => high,
+        }
+    }
+
+    /// Draws the delay in one window, and ends the plan.
+    fn in_window<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        window: Span<R>,
+        never: B::Exit,
+    ) -> Flow<B> {
+        if let Some(low) = window.low {
+            self.require_in_time(b, low, never)?;
+        }
+        let end = self.cut(b, window);
+        let length = end.map(|end| match window.low {
+            None => end,
+            Some(low) => b.subtract(end, low),
+        });
+        if let (Some(bound), Some(length)) = (self.bound, length) {
+            if bound.is_finite {
+                return self.uniformly(b, window, length);
+            }
+            let is_bounded = bound.has_end(b);
+            return b.choose(
+                is_bounded,
+                |b| self.uniformly(b, window, length),
+                |b| self.by_rate(b, window, Some(length), never),
+            );
+        }
+        self.by_rate(b, window, length, never)
+    }
+
+    fn uniformly<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, length: R) -> Flow<B> {
+        if self.spot.is_plain {
+            // A moment of no length is drawn as any other.
+            let moment = b.draw_uniform(length);
+            self.end_in_time(b, moment);
+            return Ok(());
+        }
+        let moment = Cell::new(b.real(0.0));
+        if let Some(low) = window.low {
+            b.set_real(&moment, low);
+        }
+        let zero = b.real(0.0);
+        let has_length = b.compare_reals(length, Relation::Greater, zero);
+        b.when(has_length, |b| {
+            let passed = b.draw_uniform(length);
+            let at = window.low.map_or(passed, |low| b.add(low, passed));
+            b.set_real(&moment, at);
+            Ok(())
+        })?;
+        self.end_in_time(b, moment.get());
+        Ok(())
+    }
+
+    fn by_rate<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        window: Span<R>,
+        length: Option<R>,
+        never: B::Exit,
+    ) -> Flow<B> {
+        let Some(rate) = exponential_rate(b, self.process, self.spot, never)? else {
+            return Ok(());
+        };
+        let Some(length) = length.filter(|_| !self.spot.is_plain) else {
+            let passed = b.draw_exponential(rate);
+            let moment = window.low.map_or(passed, |low| b.add(low, passed));
+            self.end_in_time(b, moment);
+            return Ok(());
+        };
+        let zero = b.real(0.0);
+        let has_length = b.compare_reals(length, Relation::NotEqual, zero);
+        let moment = Cell::new(b.real(0.0));
+        if let Some(low) = window.low {
+            b.set_real(&moment, low);
+        }
+        b.when(has_length, |b| {
+            let passed = b.draw_exponential(rate);
+            let is_inside = b.compare_reals(passed, Relation::LessEqual, length);
+            b.unless(is_inside, never)?;
+            let at = window.low.map_or(passed, |low| b.add(low, passed));
+            b.set_real(&moment, at);
+            Ok(())
+        })?;
+        self.end_in_time(b, moment.get());
+        Ok(())
+    }
+
+    /// Draws the delay in the windows of the outputs, and ends the plan.
+    fn in_windows<B: Backend<Real = R>>(&self, b: &mut B, never: B::Exit) -> Flow<B> {
+        let outputs = self.program.range(self.spot.outputs);
+        if let [only] = outputs
+            && !only.may_be_urgent
+        {
+            let window = span(b, self.program, only.guard, &only.values, never)?;
+            return self.in_window(b, window, never);
+        }
+        let moment = Cell::new(b.real(f64::INFINITY));
+        let is_drawn = outputs.iter().any(|output| !output.may_be_urgent);
+        if is_drawn {
+            let none = b.integer(0);
+            b.set_window_count(none);
+        }
+        for output in outputs {
+            b.within(
+                |b, next| self.add_window(b, output, &moment, next),
+                |_| Ok(()),
+            )?;
+        }
+        if is_drawn {
+            let windows = b.window_count();
+            b.when(windows, |b| self.draw_in_windows(b, &moment))?;
+        }
+        let infinity = b.real(f64::INFINITY);
+        let comes = b.compare_reals(moment.get(), Relation::Less, infinity);
+        b.unless(comes, never)?;
+        let Some(bound) = self.bound else {
+            self.end_in_time(b, moment.get());
+            return Ok(());
+        };
+        let is_in_time = b.compare_reals(moment.get(), Relation::LessEqual, bound.end);
+        b.choose(
+            is_in_time,
+            |b| {
+                self.end_in_time(b, moment.get());
+                Ok(())
+            },
+            |b| {
+                b.set_plan(self.process, Some(moment.get()), Some(bound.end), true);
+                Ok(())
+            },
+        )
+    }
+
+    /// Adds the window of an output, or lets the moment come not later than its begin if it is
+    /// taken as soon as it can be; leaves if it has none.
+    fn add_window<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        output: &Instance<'_>,
+        moment: &Cell<R>,
+        next: B::Exit,
+    ) -> Flow<B> {
+        let window = span(b, self.program, output.guard, &output.values, next)?;
+        let low = match window.low {
+            None => b.real(0.0),
+            Some(low) => {
+                self.require_in_time(b, low, next)?;
+                low
+            }
+        };
+        if output.may_be_urgent {
+            let first = b.least(moment.get(), low);
+            b.set_real(moment, first);
+            return Ok(());
+        }
+        let end = self.cut(b, window);
+        let end = end.unwrap_or_else(|| b.real(f64::INFINITY));
+        let number = b.window_count();
+        b.set_window(number, low, end);
+        let count = b.plus(number, 1);
+        b.set_window_count(count);
+        Ok(())
+    }
+
+    /// Lets the moment come not later than a delay that is drawn in the windows.
+    fn draw_in_windows<B: Backend<Real = R>>(&self, b: &mut B, moment: &Cell<R>) -> Flow<B> {
+        let draw = |b: &mut B, rate: Option<R>| {
+            let drawn = b.delay_in_windows(rate)?;
+            let first = b.least(drawn, moment.get());
+            b.set_real(moment, first);
+            Ok(())
+        };
+        let by_rate = |b: &mut B| {
+            b.within(
+                |b, never| match exponential_rate(b, self.process, self.spot, never)? {
+                    None => Ok(()),
+                    rate => draw(b, rate),
+                },
+                |_| Ok(()),
+            )
+        };
+        match self.bound {
+            None => by_rate(b),
+            Some(bound) if bound.is_finite => draw(b, None),
+            Some(bound) => {
+                let is_bounded = bound.has_end(b);
+                b.choose(is_bounded, |b| draw(b, None), by_rate)
+            }
+        }
+    }
+}
+
+/// The rate of the exponential delay, which is greater than 0; leaves if it is 0. None if there is
+/// none, which has ended the run or left.
+pub(in crate::stochastic) fn exponential_rate<B: Backend>(
+    b: &mut B,
+    process: usize,
+    spot: &Spot,
+    never: B::Exit,
+) -> Flow<B, Option<B::Real>> {
+    let stand = b.stand(process);
+    let Some(known) = spot.exponential_rate else {
+        b.fail(|_| Failure::NoRate(stand))?;
+        return Ok(None);
+    };
+    if known == Number::Known(0.0) {
+        b.leave(never)?;
+        return Ok(None);
+    }
+    let rate = number(b, known, &[])?;
+    if !matches!(known, Number::Known(rate) if rate > 0.0 && rate.is_finite()) {
+        let (zero, infinity) = (b.real(0.0), b.real(f64::INFINITY));
+        for (relation, limit) in [(Relation::GreaterEqual, zero), (Relation::Less, infinity)] {
+            let is_rate = b.compare_reals(rate, relation, limit);
+            b.insist(is_rate, |b| Failure::Rate(stand, b.shown(rate)))?;
+        }
+        let is_positive = b.compare_reals(rate, Relation::Greater, zero);
+        b.unless(is_positive, never)?;
+    }
+    Ok(Some(rate))
+}
+
+/// A number, as much greater as counts as equal.
+pub(in crate::stochastic) fn tolerant<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
+    let (part, tolerance) = (b.real(1.0 + TOLERANCE), b.real(TOLERANCE));
+    let value = b.multiply(value, part);
+    b.add(value, tolerance)
+}
