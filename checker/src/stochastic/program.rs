@@ -104,8 +104,6 @@ pub(super) struct Program<'a> {
     pub(super) rated: Vec<u32>,
     /// Whether the rate of some clock may change as time passes.
     pub(super) has_flows: bool,
-    /// Whether legs of branch points are edges, so that several instances may have one entry.
-    pub(super) has_legs: bool,
 }
 
 impl<'a> Program<'a> {
@@ -126,7 +124,6 @@ impl<'a> Program<'a> {
             followers: Vec::new(),
             rated: Vec::new(),
             has_flows: false,
-            has_legs: network.features.legs,
         };
         for process in 0..network.processes.len() {
             program.add_process(process, &mut machine);

@@ -76,6 +76,11 @@ impl Backend for Race<'_> {
     }
 
     #[inline]
+    fn sum(&mut self, left: i32, right: i32) -> i32 {
+        left + right
+    }
+
+    #[inline]
     fn doubles(&mut self, operator: DoubleOperator, left: f64, right: f64) -> f64 {
         double(operator, left, right)
     }
@@ -107,6 +112,16 @@ impl Backend for Race<'_> {
         } else {
             then(self)
         }
+    }
+
+    #[inline]
+    fn cases(
+        &mut self,
+        number: i32,
+        _: usize,
+        mut each: impl FnMut(&mut Self, usize) -> Flow<Self>,
+    ) -> Flow<Self> {
+        each(self, number as usize)
     }
 
     #[inline]

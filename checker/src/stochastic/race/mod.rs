@@ -391,11 +391,10 @@ impl<'a> Race<'a> {
             self.make_stale(process as u32);
             return self.count_move(process, false);
         }
-        let chosen = match self.choices[..] {
-            ref several if program.has_legs => self.by_entry(program, several.to_vec())?,
-            [only] => only,
-            ref many => many[self.machine.stream().below(many.len() as u32) as usize],
-        };
+        let choices = std::mem::take(&mut self.choices);
+        let chosen = self.one_of(program, &choices);
+        self.choices = choices;
+        let chosen = chosen?;
         self.movers.clear();
         self.movers.push((chosen, 0));
         let sender = program.instance(chosen);

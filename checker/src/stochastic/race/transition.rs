@@ -1,13 +1,15 @@
 //! What a move does: receivers and branches are chosen, updates run, locations are entered, rates
 //! set, and those found who plan anew.
 
+use std::cell::Cell;
+
 use super::Race;
 use crate::ir::{Branch, LocationId, ProcessId, Update, Urgency};
-use crate::stochastic::condition::Number;
 use crate::stochastic::constants::MOVES_OF_A_PLAN;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 use crate::stochastic::readers::Reader;
+use crate::stochastic::rules::{self, Backend, Candidate};
 
 impl Race<'_> {
     /// Makes plans stale that wait for a clock.
@@ -52,50 +54,35 @@ impl Race<'_> {
 
     /// Keeps one of the movers from this place on.
     pub(super) fn keep_one(&mut self, program: &Program<'_>, first: usize) -> Result<(), Failure> {
-        let many = self.movers.len() - first;
-        if program.has_legs && many > 0 {
-            let inputs = self.movers.drain(first..).map(|mover| mover.0).collect();
-            let chosen = self.by_entry(program, inputs)?;
+        if self.movers.len() > first {
+            let inputs: Vec<u32> = self.movers.drain(first..).map(|mover| mover.0).collect();
+            let chosen = self.one_of(program, &inputs)?;
             self.movers.push((chosen, 0));
-        } else if many > 1 {
-            let chosen = self.machine.stream().below(many as u32) as usize;
-            self.movers.swap(first, first + chosen);
-            self.movers.truncate(first + 1);
         }
         Ok(())
     }
 
-    /// One of some enabled instances, of which there are any: each entry is as likely as the
-    /// others, and of the legs that an entry has among them one is taken by weight.
-    pub(super) fn by_entry(
+    /// One of some enabled instances, of which there are any.
+    pub(super) fn one_of(
         &mut self,
         program: &Program<'_>,
-        mut instances: Vec<u32>,
+        instances: &[u32],
     ) -> Result<u32, Failure> {
-        let entry = |number: &u32| program.instance(*number).entry;
-        let mut entries: Vec<u32> = instances.iter().map(entry).collect();
-        entries.sort_unstable();
-        entries.dedup();
-        let chosen = match entries[..] {
-            [only] => only,
-            ref many => many[self.machine.stream().below(many.len() as u32) as usize],
-        };
-        instances.retain(|number| entry(number) == chosen);
-        let first = program.instance(instances[0]);
-        if first.edge.leg.is_none() {
-            return Ok(instances[0]);
-        }
-        let mut weights = Vec::with_capacity(instances.len());
-        for &number in &instances {
-            weights.push(self.weight(program, program.instance(number), 0)?);
-        }
-        match self.weighted(&weights) {
-            Some(place) => Ok(instances[place]),
-            None => Err(Failure::NoWeight(
-                self.stand(first.process as usize),
-                first.id,
-            )),
-        }
+        let candidates = instances.iter().map(|&number| Candidate {
+            instance: program.instance(number),
+            number: number as i32,
+            flag: None,
+        });
+        let candidates: Vec<_> = candidates.collect();
+        let chosen = Cell::new(0);
+        self.within(
+            |race, none| {
+                chosen.set(rules::one_of(race, program, &candidates, none)?);
+                Ok(())
+            },
+            |_| Ok(()),
+        )?;
+        Ok(chosen.get() as u32)
     }
 
     /// Runs the updates of those who move, the sender first, and lets them enter their locations.
@@ -104,7 +91,7 @@ impl Race<'_> {
         for index in 0..self.movers.len() {
             let mover = program.instance(self.movers[index].0);
             if mover.edge.branches.len() > 1 {
-                self.movers[index].1 = self.branch(program, mover)?;
+                self.movers[index].1 = rules::branch(self, program, mover)? as u32;
             }
         }
         if let Some(update) = &network.before_update {
@@ -181,62 +168,6 @@ impl Race<'_> {
         for &follower in program.followers(ProcessId(process)) {
             self.make_stale(follower);
         }
-    }
-
-    /// The branch that a mover takes: by weight.
-    pub(super) fn branch(
-        &mut self,
-        program: &Program<'_>,
-        mover: &Instance<'_>,
-    ) -> Result<u32, Failure> {
-        let mut weights = Vec::with_capacity(mover.edge.branches.len());
-        for branch in 0..mover.edge.branches.len() {
-            weights.push(self.weight(program, mover, branch)?);
-        }
-        let chosen = self.weighted(&weights).map(|branch| branch as u32);
-        chosen.ok_or(Failure::NoWeight(
-            self.stand(mover.process as usize),
-            mover.id,
-        ))
-    }
-
-    /// The weight of a branch.
-    fn weight(
-        &mut self,
-        program: &Program<'_>,
-        mover: &Instance<'_>,
-        branch: usize,
-    ) -> Result<f64, Failure> {
-        let weight = match program.weight(mover, branch) {
-            Number::Known(weight) => weight,
-            Number::Computed(weight) => self.machine.real(weight, &mover.values)?,
-        };
-        if weight >= 0.0 && weight.is_finite() {
-            Ok(weight)
-        } else {
-            Err(Failure::Weight(
-                self.stand(mover.process as usize),
-                mover.id,
-            ))
-        }
-    }
-
-    /// The place of one of some weights, as likely as it says; `None` if all are 0.
-    fn weighted(&mut self, weights: &[f64]) -> Option<usize> {
-        let total: f64 = weights.iter().sum();
-        let mut rest = self.machine.stream().uniform() * total;
-        let mut chosen = None;
-        for (place, &weight) in weights.iter().enumerate() {
-            if weight > 0.0 {
-                // The last one takes what rounding leaves.
-                chosen = Some(place);
-                if rest < weight {
-                    break;
-                }
-                rest -= weight;
-            }
-        }
-        chosen
     }
 
     /// Gives the clocks their rates anew of which a stale process sets some, and finds whose plans

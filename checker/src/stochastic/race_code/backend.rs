@@ -46,6 +46,10 @@ impl Backend for Writer<'_> {
         self.add_integers(left, right)
     }
 
+    fn sum(&mut self, left: Register, right: Register) -> Register {
+        self.add_integers(left, right)
+    }
+
     fn doubles(&mut self, operator: DoubleOperator, left: Register, right: Register) -> Register {
         self.result(RegisterType::Double, |target| {
             Instruction::DoubleArithmetic {
@@ -104,6 +108,31 @@ impl Backend for Writer<'_> {
         self.at(fails);
         otherwise(self)?;
         self.jump(next);
+        self.at(next);
+        Ok(())
+    }
+
+    fn cases(
+        &mut self,
+        number: Register,
+        count: usize,
+        mut each: impl FnMut(&mut Self, usize) -> Flow<Self>,
+    ) -> Flow<Self> {
+        if count == 1 {
+            return each(self, 0);
+        }
+        let (start, next) = (self.block(), self.block());
+        self.jump(start);
+        let mut places = Vec::with_capacity(count);
+        for place in 0..count {
+            let block = self.block();
+            places.push((place as i32, block));
+            self.at(block);
+            each(self, place)?;
+            self.jump(next);
+        }
+        self.at(start);
+        self.select(number, &places);
         self.at(next);
         Ok(())
     }

@@ -12,7 +12,6 @@
 
 mod asked;
 mod backend;
-mod entries;
 mod inline;
 mod layout;
 mod moves;

@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::entries::{Candidate, take_one_of};
 use super::race_writer::{Ids, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
@@ -13,7 +12,7 @@ use crate::ir::{
 use crate::stochastic::condition::Condition;
 use crate::stochastic::program::{Channel, Instance};
 use crate::stochastic::readers::Reader;
-use crate::stochastic::rules::{self, Backend};
+use crate::stochastic::rules::{self, Backend, Candidate};
 
 /// More channels are not told apart.
 const MOST_CHANNELS: usize = 32;
@@ -89,55 +88,23 @@ impl<'a> RaceWriter<'_, 'a> {
         instances: &[Instance<'a>],
         otherwise: BlockId,
     ) -> Register {
-        if instances.iter().any(|instance| instance.edge.leg.is_some()) {
-            let candidates = (0..).zip(instances).map(|(number, instance)| {
+        let candidates = (0..).zip(instances).map(|(number, instance)| {
+            let flag = (instance.guard != Condition::Always).then(|| {
                 let flag = w.integer(0);
                 self.when_enabled(w, instance, |w| {
                     let one = w.integer(1);
                     w.copy(flag, one);
                 });
-                Candidate {
-                    instance,
-                    number,
-                    flag,
-                }
+                flag
             });
-            let candidates: Vec<_> = candidates.collect();
-            return self.by_entry(w, &candidates, otherwise);
-        }
-        let count = w.integer(0);
-        let flags: Vec<Option<Register>> = instances
-            .iter()
-            .map(|instance| {
-                if instance.guard == Condition::Always {
-                    let one = w.integer(1);
-                    let more = w.add_integers(count, one);
-                    w.copy(count, more);
-                    return None;
-                }
-                let flag = w.integer(0);
-                self.when_enabled(w, instance, |w| {
-                    let one = w.integer(1);
-                    w.copy(flag, one);
-                    let more = w.add_integers(count, one);
-                    w.copy(count, more);
-                });
-                Some(flag)
-            })
-            .collect();
-        w.unless(count, otherwise);
-        let rest = w.integer(0);
-        let are_many = w.compare_to(count, Relation::Greater, 1);
-        w.when(are_many, |w| {
-            let drawn = w.draw_below(count);
-            w.copy(rest, drawn);
+            Candidate {
+                instance,
+                number,
+                flag,
+            }
         });
-        if flags.iter().all(Option::is_none) {
-            return rest;
-        }
-        let chosen = w.integer(0);
-        let numbers: Vec<Register> = (0..).take(flags.len()).map(|one| w.integer(one)).collect();
-        take_one_of(w, numbers.into_iter().zip(flags), rest, chosen);
+        let candidates: Vec<_> = candidates.collect();
+        let Ok(chosen) = rules::one_of(w, self.program, &candidates, otherwise);
         chosen
     }
 
@@ -209,7 +176,7 @@ impl<'a> RaceWriter<'_, 'a> {
                 }
             }
         }
-        let branch = self.branch(w, sender);
+        let Ok(branch) = rules::branch(w, self.program, sender);
         for receiver in &receivers {
             self.branch_of_receiver(w, receiver);
         }
@@ -423,8 +390,7 @@ impl<'a> RaceWriter<'_, 'a> {
         (chosen, first): (Register, i32),
         next: BlockId,
     ) {
-        let (count, mut taken) = (w.integer(0), w.integer(0));
-        let mut flags = Vec::new();
+        let mut candidates = Vec::new();
         for (number, &input) in (first..).zip(inputs) {
             let (flag, otherwise) = (w.integer(0), w.block());
             match input.channel {
@@ -443,33 +409,15 @@ impl<'a> RaceWriter<'_, 'a> {
             let Ok(()) = rules::require(w, self.program, input.guard, &input.values, otherwise);
             let one = w.integer(1);
             w.copy(flag, one);
-            let number = w.integer(number);
-            w.copy(taken, number);
-            let more = w.add_integers(count, one);
-            w.copy(count, more);
             w.jump(otherwise);
             w.at(otherwise);
-            flags.push(flag);
-        }
-        if inputs.iter().any(|input| input.edge.leg.is_some()) {
-            let numbered = (first..).zip(inputs).zip(&flags);
-            let candidates = numbered.map(|((number, instance), &flag)| Candidate {
-                instance,
+            candidates.push(Candidate {
+                instance: input,
                 number,
-                flag,
-            });
-            let candidates: Vec<_> = candidates.collect();
-            taken = self.by_entry(w, &candidates, next);
-        } else if inputs.len() > 1 {
-            let are_many = w.compare_to(count, Relation::Greater, 1);
-            w.when(are_many, |w| {
-                let rest = w.draw_below(count);
-                let numbers = (first..).take(flags.len()).map(|one| w.integer(one));
-                let numbers: Vec<Register> = numbers.collect();
-                let flags = flags.into_iter().map(Some);
-                take_one_of(w, numbers.into_iter().zip(flags), rest, taken);
+                flag: Some(flag),
             });
         }
+        let Ok(taken) = rules::one_of(w, self.program, &candidates, next);
         w.copy(chosen, taken);
         w.jump(next);
     }
@@ -502,23 +450,10 @@ impl<'a> RaceWriter<'_, 'a> {
         if inputs.any(|input| input.edge.branches.len() > 1) {
             let done = w.block();
             Self::for_chosen(w, receiver, done, |w, input| {
-                let branch = self.branch(w, input);
+                let Ok(branch) = rules::branch(w, self.program, input);
                 w.copy(receiver.branch, branch);
             });
         }
-    }
-
-    /// The branch that a mover takes: by weight.
-    fn branch(&self, w: &mut Writer<'_>, mover: &Instance<'_>) -> Register {
-        let branches = mover.edge.branches.len();
-        if branches < 2 {
-            return w.integer(0);
-        }
-        let wrong = w.block();
-        let weights: Vec<Register> = (0..branches)
-            .map(|branch| self.weight(w, mover, branch, wrong))
-            .collect();
-        Self::weighted(w, &weights, wrong)
     }
 
     /// Runs the updates of a mover, and lets it enter the target of its branch.

@@ -1,7 +1,6 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
-use super::entries::take_one_of;
 use super::moves::MISSED;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};
@@ -457,4 +456,31 @@ impl RaceWriter<'_, '_> {
         let time = w.add(time, delay);
         w.store_double(self.layout.time, time);
     }
+}
+
+/// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
+/// `rest` says, which counts down. A number without a flag counts always.
+fn take_one_of(
+    w: &mut Writer<'_>,
+    numbers: impl Iterator<Item = (Register, Option<Register>)>,
+    rest: Register,
+    chosen: Register,
+) {
+    let (found, minus_one) = (w.block(), w.integer(-1));
+    for (number, flag) in numbers {
+        let next = w.block();
+        if let Some(flag) = flag {
+            w.unless(flag, next);
+        }
+        w.copy(chosen, number);
+        let goes_on = w.block();
+        w.branch(rest, goes_on, found);
+        w.at(goes_on);
+        let less = w.add_integers(rest, minus_one);
+        w.copy(rest, less);
+        w.jump(next);
+        w.at(next);
+    }
+    w.jump(found);
+    w.at(found);
 }

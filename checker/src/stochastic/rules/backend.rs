@@ -28,6 +28,7 @@ pub(in crate::stochastic) trait Backend: Sized {
 
     /// The sum of small integers: nobody looks whether it fits.
     fn plus(&mut self, left: Self::Integer, right: i32) -> Self::Integer;
+    fn sum(&mut self, left: Self::Integer, right: Self::Integer) -> Self::Integer;
     fn doubles(
         &mut self,
         operator: DoubleOperator,
@@ -92,6 +93,14 @@ pub(in crate::stochastic) trait Backend: Sized {
         condition: Self::Integer,
         then: impl FnOnce(&mut Self) -> Flow<Self>,
         otherwise: impl FnOnce(&mut Self) -> Flow<Self>,
+    ) -> Flow<Self>;
+
+    /// Does what a number says that is less than `count`.
+    fn cases(
+        &mut self,
+        number: Self::Integer,
+        count: usize,
+        each: impl FnMut(&mut Self, usize) -> Flow<Self>,
     ) -> Flow<Self>;
 
     /// Does something again and again as long as a condition holds.

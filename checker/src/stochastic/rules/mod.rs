@@ -9,11 +9,13 @@
 //! [`Backend::other_attempt`]: networks that need them are not written as code.
 
 mod backend;
+mod choices;
 mod conditions;
 mod plans;
 mod windows;
 
 pub(super) use backend::{Backend, Flow};
+pub(super) use choices::{Candidate, branch, one_of};
 pub(super) use conditions::{number, require, span};
 pub(super) use plans::{exponential_rate, plan, require_invariant, stay, tolerant};
 pub(super) use windows::delay_in_windows;

@@ -1,0 +1,215 @@
+//! Which of several instances moves, and which of its branches it takes.
+//!
+//! All entries that are enabled are as likely as each other. Where legs of branch points are edges,
+//! several instances have one entry, and one of its legs is taken by weight.
+
+use std::cell::Cell;
+use std::collections::BTreeMap;
+
+use super::{Backend, Flow, number};
+use crate::ir::Relation;
+use crate::stochastic::condition::Number;
+use crate::stochastic::failure::Failure;
+use crate::stochastic::program::{Instance, Program};
+
+/// An instance that may be enabled.
+pub(in crate::stochastic) struct Candidate<'i, 'a, I> {
+    pub(in crate::stochastic) instance: &'i Instance<'a>,
+    /// What stands for it.
+    pub(in crate::stochastic) number: i32,
+    /// Whether it is enabled; none if that is known.
+    pub(in crate::stochastic) flag: Option<I>,
+}
+
+/// The number of one of the instances that are enabled; leaves if there are none.
+pub(in crate::stochastic) fn one_of<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    candidates: &[Candidate<'_, '_, B::Integer>],
+    otherwise: B::Exit,
+) -> Flow<B, B::Integer> {
+    if candidates.iter().all(|one| one.instance.edge.leg.is_none()) {
+        let numbered = candidates.iter().map(|one| (one.number, one.flag));
+        let numbered: Vec<_> = numbered.collect();
+        return draw(b, &numbered, otherwise);
+    }
+    let mut entries: BTreeMap<u32, Vec<&Candidate<'_, '_, B::Integer>>> = BTreeMap::new();
+    for one in candidates {
+        entries.entry(one.instance.entry).or_default().push(one);
+    }
+    let mut flags = Vec::new();
+    for legs in entries.values() {
+        let flag = Cell::new(b.integer(0));
+        for leg in legs {
+            let one = b.integer(1);
+            b.when(leg.flag.unwrap_or(one), |b| {
+                b.set(&flag, one);
+                Ok(())
+            })?;
+        }
+        flags.push(Some(flag.get()));
+    }
+    let numbered: Vec<_> = (0..).zip(flags).collect();
+    let entry = draw(b, &numbered, otherwise)?;
+    let legs: Vec<_> = entries.into_values().collect();
+    let chosen = Cell::new(b.integer(0));
+    b.cases(entry, legs.len(), |b, place| {
+        let number = leg(b, program, &legs[place])?;
+        b.set(&chosen, number);
+        Ok(())
+    })?;
+    Ok(chosen.get())
+}
+
+/// One of some numbers whose flags are set, all with the same chance; leaves if there are none.
+fn draw<B: Backend>(
+    b: &mut B,
+    numbered: &[(i32, Option<B::Integer>)],
+    otherwise: B::Exit,
+) -> Flow<B, B::Integer> {
+    let sure = numbered.iter().filter(|one| one.1.is_none()).count();
+    let mut count = b.integer(sure as i32);
+    for flag in numbered.iter().filter_map(|one| one.1) {
+        count = b.sum(count, flag);
+    }
+    if sure == 0 {
+        b.unless(count, otherwise)?;
+    }
+    let (rest, one) = (Cell::new(b.integer(0)), b.integer(1));
+    let are_many = b.compare(count, Relation::Greater, one);
+    b.when(are_many, |b| {
+        let drawn = b.draw_below(count);
+        b.set(&rest, drawn);
+        Ok(())
+    })?;
+    let chosen = Cell::new(b.integer(0));
+    b.within(
+        |b, found| {
+            for &(number, flag) in numbered {
+                let take = |b: &mut B| {
+                    let number = b.integer(number);
+                    b.set(&chosen, number);
+                    b.unless(rest.get(), found)?;
+                    let less = b.plus(rest.get(), -1);
+                    b.set(&rest, less);
+                    Ok(())
+                };
+                match flag {
+                    None => take(b)?,
+                    Some(flag) => b.when(flag, take)?,
+                }
+            }
+            Ok(())
+        },
+        |_| Ok(()),
+    )?;
+    Ok(chosen.get())
+}
+
+/// The number of one of the legs of an entry that are enabled.
+fn leg<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    legs: &[&Candidate<'_, '_, B::Integer>],
+) -> Flow<B, B::Integer> {
+    if let [only] = legs
+        && only.instance.edge.leg.is_none()
+    {
+        return Ok(b.integer(only.number));
+    }
+    let mut weights = Vec::with_capacity(legs.len());
+    for leg in legs {
+        let flagged = Cell::new(b.real(0.0));
+        let one = b.integer(1);
+        b.when(leg.flag.unwrap_or(one), |b| {
+            let given = weight(b, program, leg.instance, 0)?;
+            b.set_real(&flagged, given);
+            Ok(())
+        })?;
+        weights.push(flagged.get());
+    }
+    let place = by_weight(b, legs[0].instance, &weights)?;
+    let chosen = Cell::new(b.integer(0));
+    b.cases(place, legs.len(), |b, place| {
+        let number = b.integer(legs[place].number);
+        b.set(&chosen, number);
+        Ok(())
+    })?;
+    Ok(chosen.get())
+}
+
+/// The branch that a mover takes: by weight.
+pub(in crate::stochastic) fn branch<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    mover: &Instance<'_>,
+) -> Flow<B, B::Integer> {
+    let branches = mover.edge.branches.len();
+    if branches < 2 {
+        return Ok(b.integer(0));
+    }
+    let mut weights = Vec::with_capacity(branches);
+    for branch in 0..branches {
+        weights.push(weight(b, program, mover, branch)?);
+    }
+    by_weight(b, mover, &weights)
+}
+
+/// The weight of a branch.
+fn weight<B: Backend>(
+    b: &mut B,
+    program: &Program<'_>,
+    mover: &Instance<'_>,
+    branch: usize,
+) -> Flow<B, B::Real> {
+    let known = program.weight(mover, branch);
+    let weight = number(b, known, &mover.values)?;
+    if matches!(known, Number::Known(one) if one >= 0.0 && one.is_finite()) {
+        return Ok(weight);
+    }
+    let stand = b.stand(mover.process as usize);
+    let (zero, infinity) = (b.real(0.0), b.real(f64::INFINITY));
+    for (relation, limit) in [(Relation::GreaterEqual, zero), (Relation::Less, infinity)] {
+        let is_weight = b.compare_reals(weight, relation, limit);
+        b.insist(is_weight, |_| Failure::Weight(stand, mover.id))?;
+    }
+    Ok(weight)
+}
+
+/// The place of one of some weights of an edge, as likely as it says. Where all are 0, the run has
+/// no result.
+fn by_weight<B: Backend>(
+    b: &mut B,
+    mover: &Instance<'_>,
+    weights: &[B::Real],
+) -> Flow<B, B::Integer> {
+    let (chosen, zero) = (Cell::new(b.integer(-1)), b.real(0.0));
+    let mut total = b.real(0.0);
+    for &weight in weights {
+        total = b.add(total, weight);
+    }
+    let rest = Cell::new(b.draw_uniform(total));
+    b.within(
+        |b, found| {
+            for (place, &weight) in (0..).zip(weights) {
+                let is_possible = b.compare_reals(weight, Relation::Greater, zero);
+                b.when(is_possible, |b| {
+                    // The last one takes what rounding leaves.
+                    let place = b.integer(place);
+                    b.set(&chosen, place);
+                    let is_beyond = b.compare_reals(rest.get(), Relation::GreaterEqual, weight);
+                    b.unless(is_beyond, found)?;
+                    let less = b.subtract(rest.get(), weight);
+                    b.set_real(&rest, less);
+                    Ok(())
+                })?;
+            }
+            Ok(())
+        },
+        |_| Ok(()),
+    )?;
+    let (stand, none) = (b.stand(mover.process as usize), b.integer(0));
+    let is_some = b.compare(chosen.get(), Relation::GreaterEqual, none);
+    b.insist(is_some, |_| Failure::NoWeight(stand, mover.id))?;
+    Ok(chosen.get())
+}
