@@ -57,7 +57,7 @@ impl Partners {
         } else {
             &mut self.receivers
         };
-        for channel in sync.channel.0..sync.channel.0 + sync.count {
+        for channel in sync.channels() {
             let all = &mut side[channel as usize * self.clocks..][..self.clocks];
             for (all, resets) in all.iter_mut().zip(&resets) {
                 *all &= resets;
@@ -70,7 +70,7 @@ impl Partners {
         let Some(sync) = edge.sync else {
             return false;
         };
-        let mut channels = sync.channel.0..sync.channel.0 + sync.count;
+        let mut channels = sync.channels();
         channels.all(|channel| {
             let channel = channel as usize;
             let entry = channel * self.clocks + clock;

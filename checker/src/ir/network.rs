@@ -1,5 +1,7 @@
 //! The network: processes with locations and edges, clocks, channels, variables.
 
+use std::ops::Range;
+
 use super::chances::{Chances, LocationChances};
 use super::code::{Function, Overflow};
 use super::constants::Constants;
@@ -251,6 +253,14 @@ pub struct Sync {
     pub count: u32,
     /// Gives the offset from `channel` (checked against the array's bounds); `None` is 0.
     pub index: Option<FunctionId>,
+}
+
+impl Sync {
+    /// The channels that it may be.
+    #[must_use]
+    pub fn channels(self) -> Range<u32> {
+        self.channel.0..self.channel.0 + self.count
+    }
 }
 
 /// A channel.

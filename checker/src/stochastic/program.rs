@@ -20,6 +20,8 @@ use crate::ir::{
     Edge, EdgeId, FunctionId, Guard, LocationId, Network, ProcessId, RealBound, Sync, Update,
     Urgency,
 };
+use crate::network::discrete::receivers::Receivers;
+use crate::network::discrete::selects::{select_count, select_values};
 
 /// What a move synchronises on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,8 +96,7 @@ pub(super) struct Program<'a> {
     /// By branch of an edge: the processes whose locations its updates may set, as those of dynamic
     /// templates do.
     placed: Vec<Box<[u32]>>,
-    /// By channel: the processes that may receive on it.
-    listeners: Vec<Vec<u32>>,
+    receivers: Receivers,
     /// By the first word of a clock: whose plans depend on its rate.
     pub(super) rate_readers: FxHashMap<u32, Arc<[Reader]>>,
     /// By process: whose plans depend on where it is, the process itself left out.
@@ -119,7 +120,7 @@ impl<'a> Program<'a> {
             weights: Vec::new(),
             concerned: Vec::new(),
             placed: Vec::new(),
-            listeners: vec![Vec::new(); network.channels.len()],
+            receivers: Receivers::new(network),
             rate_readers: FxHashMap::default(),
             followers: Vec::new(),
             rated: Vec::new(),
@@ -128,7 +129,6 @@ impl<'a> Program<'a> {
         for process in 0..network.processes.len() {
             program.add_process(process, &mut machine);
         }
-        program.find_listeners();
         program.find_dependences(&mut machine);
         program
     }
@@ -182,12 +182,14 @@ impl<'a> Program<'a> {
             if is_output != outputs || edge.guard.never_holds {
                 continue;
             }
-            let range = edge.sync.map_or(0..0, channels_of);
+            let range = edge.sync.map_or(0..0, Sync::channels);
             let channels = &network.channels[range.start as usize..range.end as usize];
             let is_binary = outputs && channels.iter().any(|channel| !channel.broadcast);
             let may_be_urgent = outputs && channels.iter().any(|channel| channel.urgent);
-            each_selection(edge, &mut |values| {
-                let guard = self.condition(&edge.guard, values, machine);
+            let mut values = Vec::new();
+            for combination in 0..select_count(edge) {
+                select_values(edge, combination, &mut values);
+                let guard = self.condition(&edge.guard, &values, machine);
                 if guard != Condition::Never {
                     let number = self.instances.len() as u32;
                     let entry = edge.leg.as_ref().map_or(number, |leg| {
@@ -198,16 +200,16 @@ impl<'a> Program<'a> {
                         process: process as u32,
                         id,
                         edge,
-                        values: values.into(),
+                        values: values.as_slice().into(),
                         guard,
-                        channel: channel_of(edge.sync, values, machine),
+                        channel: channel_of(edge.sync, &values, machine),
                         is_binary,
                         may_be_urgent,
                         branches: 0,
                         entry,
                     });
                 }
-            });
+            }
         }
         (first, self.instances.len() as u32)
     }
@@ -251,20 +253,6 @@ impl<'a> Program<'a> {
         }
     }
 
-    fn find_listeners(&mut self) {
-        for (process, known) in self.network.processes.iter().enumerate() {
-            let syncs = known.edges.iter().filter_map(|edge| edge.sync);
-            for sync in syncs.filter(|sync| !sync.send) {
-                for channel in channels_of(sync) {
-                    let listeners = &mut self.listeners[channel as usize];
-                    if listeners.last() != Some(&(process as u32)) {
-                        listeners.push(process as u32);
-                    }
-                }
-            }
-        }
-    }
-
     /// The functions on which the plans of a process in a location depend.
     fn functions_of_plans(&self, spot: &Spot) -> Vec<FunctionId> {
         let mut functions = Vec::new();
@@ -299,12 +287,8 @@ impl<'a> Program<'a> {
 
     /// Who could receive from a sender.
     pub(super) fn partners(&self, sender: &Instance<'_>) -> Vec<u32> {
-        let mut partners: Vec<u32> = Vec::new();
-        for channel in sender.edge.sync.map_or(0..0, channels_of) {
-            partners.extend(&self.listeners[channel as usize]);
-        }
-        partners.sort_unstable();
-        partners.dedup();
+        let channels = sender.edge.sync.map_or(0..0, Sync::channels);
+        let mut partners = self.receivers.on_any(channels);
         partners.retain(|&one| one != sender.process);
         partners
     }
@@ -450,8 +434,8 @@ impl<'a> Program<'a> {
     }
 
     /// The processes that may receive on a channel, ascending.
-    pub(super) fn listeners(&self, channel: u32) -> &[u32] {
-        &self.listeners[channel as usize]
+    pub(super) fn receivers(&self, channel: u32) -> &[u32] {
+        self.receivers.on(channel)
     }
 
     /// The processes whose plans depend on where a process is, beside itself.
@@ -519,32 +503,5 @@ fn channel_of(sync: Option<Sync>, values: &[i32], machine: &mut Machine<'_>) -> 
             Err(_) => Channel::Computed(first, index),
         },
         Some(index) => Channel::Computed(first, index),
-    }
-}
-
-fn channels_of(sync: Sync) -> std::ops::Range<u32> {
-    sync.channel.0..sync.channel.0 + sync.count
-}
-
-/// Hands over all combinations of the values of the `select` bindings of an edge, in order.
-fn each_selection(edge: &Edge, visit: &mut dyn FnMut(&[i32])) {
-    let mut values: Vec<i32> = edge.select.iter().map(|one| one.low).collect();
-    if edge.select.iter().any(|one| one.low > one.high) {
-        return;
-    }
-    loop {
-        visit(&values);
-        let mut place = values.len();
-        loop {
-            if place == 0 {
-                return;
-            }
-            place -= 1;
-            if values[place] < edge.select[place].high {
-                values[place] += 1;
-                break;
-            }
-            values[place] = edge.select[place].low;
-        }
     }
 }

@@ -48,8 +48,8 @@ impl Stepper<'_> {
         let mut groups = std::mem::take(&mut self.groups);
         groups.clear();
         let mut has_committed = !sender.needs_committed;
-        for index in 0..self.receivers[channel as usize].len() {
-            let receiver = self.receivers[channel as usize][index];
+        for index in 0..self.receivers.on(channel).len() {
+            let receiver = self.receivers.on(channel)[index];
             if receiver == sender.process {
                 continue;
             }

@@ -23,7 +23,7 @@ impl Stepper<'_> {
         self.audience.constraints.clone_from(&self.constraints);
         self.audience.groups.clear();
         self.audience.groups.extend_from_slice(groups);
-        let may_hear = self.receivers[channel as usize].contains(&sender);
+        let may_hear = self.receivers.on(channel).contains(&sender);
         self.audience.left_out = may_hear.then_some(sender);
     }
 

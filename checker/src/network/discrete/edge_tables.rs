@@ -1,6 +1,6 @@
 //! The edges of a network, sorted by the questions that every state asks.
 
-use crate::ir::{Edge, Guard, Location, Network, Process, Urgency};
+use crate::ir::{Edge, Guard, Location, Process, Urgency};
 
 use super::selects::select_count;
 
@@ -54,25 +54,4 @@ impl<'a> LocationTable<'a> {
     pub(super) fn is_committed(&self) -> bool {
         self.urgency == Urgency::Committed
     }
-}
-
-/// For each channel: the processes with an edge that may receive on it, ascending.
-pub(super) fn receivers(network: &Network) -> Vec<Vec<u32>> {
-    let mut receivers = vec![Vec::new(); network.channels.len()];
-    for (index, process) in network.processes.iter().enumerate() {
-        for sync in process
-            .edges
-            .iter()
-            .filter_map(|edge| edge.sync)
-            .filter(|sync| !sync.send)
-        {
-            for channel in sync.channel.0..sync.channel.0 + sync.count {
-                let list: &mut Vec<u32> = &mut receivers[channel as usize];
-                if list.last() != Some(&(index as u32)) {
-                    list.push(index as u32);
-                }
-            }
-        }
-    }
-    receivers
 }

@@ -145,10 +145,10 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
         out: &mut Moves,
     ) -> Result<(), RunTimeError> {
-        let receivers = self.receivers[channel as usize].len();
+        let receivers = self.receivers.on(channel).len();
         cancellation::work(UNITS_FOR_RECEIVER * receivers);
         for index in 0..receivers {
-            let receiver = self.receivers[channel as usize][index];
+            let receiver = self.receivers.on(channel)[index];
             if receiver == sender.process
                 || (sender.needs_committed && !self.is_process_committed(receiver, words))
             {
@@ -180,9 +180,10 @@ impl<'a> Stepper<'a> {
         let location = words[process as usize] as usize;
         for index in 0..self.tables[process as usize][location].receives.len() {
             let entry = self.tables[process as usize][location].receives[index];
-            let listens = entry.edge.sync.is_some_and(|sync| {
-                (sync.channel.0..sync.channel.0 + sync.count).contains(&channel)
-            });
+            let listens = entry
+                .edge
+                .sync
+                .is_some_and(|sync| sync.channels().contains(&channel));
             if !listens {
                 continue;
             }

@@ -10,6 +10,7 @@ pub(super) mod enabled_edges;
 pub(super) mod entry;
 pub(super) mod pairing;
 pub(super) mod partners;
+pub mod receivers;
 pub(super) mod select_cache;
 pub mod selects;
 pub mod stepper;

@@ -163,7 +163,7 @@ impl<'a> Stepper<'a> {
             return false;
         };
         let count = self.instances.set(set).instances.len();
-        let channels = sync.channel.0..sync.channel.0 + sync.count;
+        let channels = sync.channels();
         if self.network.channels[channels.start as usize].broadcast {
             return false;
         }

@@ -7,6 +7,7 @@ use rustc_hash::FxHashMap;
 use crate::ir::{ChannelId, Network};
 
 use super::edge_tables::EdgeEntry;
+use super::receivers::Receivers;
 use super::select_cache::SetId;
 
 /// A pair that synchronises.
@@ -26,7 +27,7 @@ pub(super) struct Pair<'a> {
 pub(super) type Partners = FxHashMap<(ChannelId, u32), Arc<[u32]>>;
 
 /// Finds the partners by the receivers of each channel.
-pub(super) fn partners(network: &Network, receivers: &[Vec<u32>]) -> Partners {
+pub(super) fn partners(network: &Network, receivers: &Receivers) -> Partners {
     let mut partners = Partners::default();
     let edges = network.processes.iter().flat_map(|process| &process.edges);
     for edge in edges {
@@ -38,14 +39,7 @@ pub(super) fn partners(network: &Network, receivers: &[Vec<u32>]) -> Partners {
         };
         partners
             .entry((sync.channel, sync.count))
-            .or_insert_with(|| {
-                let first = sync.channel.0 as usize;
-                let of_channels = &receivers[first..first + sync.count as usize];
-                let mut all: Vec<u32> = of_channels.iter().flatten().copied().collect();
-                all.sort_unstable();
-                all.dedup();
-                all.into()
-            });
+            .or_insert_with(|| receivers.on_any(sync.channels()).into());
     }
     partners
 }

@@ -18,8 +18,9 @@ use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, 
 
 use super::broadcast_filter::{Scope, Sieve};
 use super::candidate::{Audience, Candidate, Choice, Group};
-use super::edge_tables::{LocationTable, receivers};
+use super::edge_tables::LocationTable;
 use super::partners::{Pair, Partners, partners};
+use super::receivers::Receivers;
 use super::select_cache::Instances;
 use super::selects::select_values;
 use super::transition::{MoveRef, Moves, OfferId, Part};
@@ -35,7 +36,7 @@ pub struct Stepper<'a> {
     pub(super) executor: &'a dyn Executor,
     pub(super) tables: Vec<Vec<LocationTable<'a>>>,
     /// For each channel: the processes that may receive on it.
-    pub(super) receivers: Vec<Vec<u32>>,
+    pub(super) receivers: Receivers,
     /// Whether any channel is urgent.
     pub(super) has_urgent_channels: bool,
     pub(super) constraints: Vec<EmittedConstraint>,
@@ -91,7 +92,7 @@ impl<'a> Stepper<'a> {
                 .map(|location| LocationTable::new(process, location))
                 .collect()
         });
-        let receivers = receivers(network);
+        let receivers = Receivers::new(network);
         Stepper {
             tuning,
             instances: Instances::new(network),

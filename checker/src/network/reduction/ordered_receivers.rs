@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::analysis::function_reads::read_words;
-use crate::ir::{AssignedValue, ClockRange, Edge, Network, Process, Update};
+use crate::ir::{AssignedValue, ClockRange, Edge, Network, Process, Sync, Update};
 
 /// Receivers whose updates read more words count as reading all.
 const MOST_READ_WORDS: usize = 1 << 16;
@@ -68,9 +68,7 @@ impl Touched {
         let functions = updates.iter().filter_map(|update| update.function);
         let assignments = || updates.iter().flat_map(|update| &update.assignments);
         Touched {
-            channels: edge
-                .sync
-                .map_or(0..0, |sync| sync.channel.0..sync.channel.0 + sync.count),
+            channels: edge.sync.map_or(0..0, Sync::channels),
             reads: read_words(network, functions, MOST_READ_WORDS),
             writes: updates
                 .iter()

@@ -209,7 +209,7 @@ impl Race<'_> {
         let is_broadcast = self.network().channels[channel as usize].broadcast;
         let mut ready = Mask::constant(false);
         let mut audience = Vec::new();
-        for &process in program.listeners(channel) {
+        for &process in program.receivers(channel) {
             if process == sender.process {
                 continue;
             }

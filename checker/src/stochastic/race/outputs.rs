@@ -138,7 +138,7 @@ impl Race<'_> {
             return Ok(guard);
         }
         let mut ready = Mask::constant(false);
-        for &process in program.listeners(channel) {
+        for &process in program.receivers(channel) {
             if process == instance.process {
                 continue;
             }
@@ -253,7 +253,7 @@ impl Race<'_> {
         let Some(channel) = self.channel(sender)? else {
             return Ok(false);
         };
-        for &process in program.listeners(channel) {
+        for &process in program.receivers(channel) {
             if process != sender.process && self.urgency(process as usize) == Urgency::Committed {
                 let before = self.movers.len();
                 self.add_ready(program, process, channel)?;

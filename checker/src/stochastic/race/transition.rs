@@ -34,7 +34,7 @@ impl Race<'_> {
             && self.committed > 0
             && self.urgency(sender.process as usize) != Urgency::Committed;
         let mut first = self.movers.len();
-        for &process in program.listeners(channel) {
+        for &process in program.receivers(channel) {
             if process == sender.process
                 || (needs_commitment && self.urgency(process as usize) != Urgency::Committed)
             {

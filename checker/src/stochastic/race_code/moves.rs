@@ -154,7 +154,7 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Whether few processes receive on each of some channels, and many on all of them.
     fn is_worth_telling_apart(&self, channels: &Range<u32>) -> bool {
-        let of_channel = |channel| self.program.listeners(channel).len();
+        let of_channel = |channel| self.program.receivers(channel).len();
         let most = channels.clone().map(of_channel).max().unwrap_or(0);
         let all: usize = channels.clone().map(of_channel).sum();
         (2..=MOST_CHANNELS).contains(&channels.len()) && 2 * most < all
