@@ -50,57 +50,46 @@ impl Backend for Race<'_> {
     type Exit = Exit;
     type End = End;
 
-    #[inline]
     fn integer(&mut self, value: i32) -> i32 {
         value
     }
 
-    #[inline]
     fn real(&mut self, value: f64) -> f64 {
         value
     }
 
-    #[inline]
     fn set(&mut self, variable: &Cell<i32>, value: i32) {
         variable.set(value);
     }
 
-    #[inline]
     fn set_real(&mut self, variable: &Cell<f64>, value: f64) {
         variable.set(value);
     }
 
-    #[inline]
     fn plus(&mut self, left: i32, right: i32) -> i32 {
         left + right
     }
 
-    #[inline]
     fn sum(&mut self, left: i32, right: i32) -> i32 {
         left + right
     }
 
-    #[inline]
     fn doubles(&mut self, operator: DoubleOperator, left: f64, right: f64) -> f64 {
         double(operator, left, right)
     }
 
-    #[inline]
     fn compare(&mut self, left: i32, relation: Relation, right: i32) -> i32 {
         integers_relate(relation, left, right).into()
     }
 
-    #[inline]
     fn compare_reals(&mut self, left: f64, relation: Relation, right: f64) -> i32 {
         doubles_relate(relation, left, right).into()
     }
 
-    #[inline]
     fn when(&mut self, condition: i32, then: impl FnOnce(&mut Self) -> Flow<Self>) -> Flow<Self> {
         if condition == 0 { Ok(()) } else { then(self) }
     }
 
-    #[inline]
     fn choose(
         &mut self,
         condition: i32,
@@ -114,7 +103,6 @@ impl Backend for Race<'_> {
         }
     }
 
-    #[inline]
     fn cases(
         &mut self,
         number: i32,
@@ -124,7 +112,6 @@ impl Backend for Race<'_> {
         each(self, number as usize)
     }
 
-    #[inline]
     fn repeat(
         &mut self,
         mut condition: impl FnMut(&mut Self) -> i32,
@@ -136,7 +123,6 @@ impl Backend for Race<'_> {
         Ok(())
     }
 
-    #[inline]
     fn within(
         &mut self,
         body: impl FnOnce(&mut Self, Exit) -> Flow<Self>,
@@ -152,47 +138,38 @@ impl Backend for Race<'_> {
         }
     }
 
-    #[inline]
     fn leave(&mut self, exit: Exit) -> Flow<Self> {
         Err(End::Left(exit))
     }
 
-    #[inline]
     fn fail(&mut self, why: impl FnOnce(&Self) -> Failure) -> Flow<Self> {
         Err(why(self).into())
     }
 
-    #[inline]
     fn draw_uniform(&mut self, maximum: f64) -> f64 {
         maximum * self.machine.stream().uniform()
     }
 
-    #[inline]
     fn draw_exponential(&mut self, rate: f64) -> f64 {
         self.machine.stream().exponential(rate)
     }
 
-    #[inline]
     fn draw_below(&mut self, count: i32) -> i32 {
         self.machine.stream().below(count as u32) as i32
     }
 
-    #[inline]
     fn load_real(&mut self, word: u32) -> f64 {
         self.machine.double(word)
     }
 
-    #[inline]
     fn call(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, i32> {
         Ok(self.machine.call(function, values)?)
     }
 
-    #[inline]
     fn call_for_real(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, f64> {
         Ok(self.machine.real(function, values)?)
     }
 
-    #[inline]
     fn is_rated(&self, clock: u32) -> bool {
         self.rated_clocks.binary_search(&clock).is_ok()
     }
@@ -208,7 +185,6 @@ impl Backend for Race<'_> {
         value
     }
 
-    #[inline]
     fn set_plan(&mut self, process: usize, attempt: Option<f64>, stay: Option<f64>, _: bool) {
         self.attempts[process] = attempt.unwrap_or(f64::INFINITY);
         self.bounds[process] = stay.unwrap_or(f64::INFINITY);
@@ -236,7 +212,6 @@ impl Backend for Race<'_> {
     fn delay_in_windows(&mut self, rate: Option<f64>) -> Flow<Self, f64> {
         rules::delay_in_windows(self, rate.is_none().into(), rate.unwrap_or(f64::NAN))
     }
-    #[inline]
     fn holds(&mut self, condition: Condition, values: &[i32]) -> Flow<Self, i32> {
         Ok(self.machine.holds(condition, values)?.into())
     }

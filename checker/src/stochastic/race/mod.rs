@@ -30,6 +30,8 @@ mod outputs;
 mod planning;
 mod transition;
 
+use std::cell::Cell;
+
 use rustc_hash::FxHashMap;
 
 use super::advice::Advice;
@@ -40,6 +42,7 @@ use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
 use super::program::Program;
+use super::rules;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
 /// The changes of a condition that are followed within one delay.
@@ -327,17 +330,17 @@ impl<'a> Race<'a> {
         program: &Program<'_>,
         only_committed: bool,
     ) -> Result<Option<usize>, Failure> {
-        let (mut winner, mut ties) = (None, 0);
+        let (mut winner, competitors) = (None, Cell::new(0));
         loop {
             for process in 0..self.locations.len() {
                 let is_asked = !only_committed || self.urgency(process) == Urgency::Committed;
                 if !is_asked || !self.find_outputs(program, process)? {
                     continue;
                 }
-                ties += 1;
-                if ties == 1 || self.machine.stream().below(ties) == 0 {
+                rules::compete(self, &competitors, |_| {
                     winner = Some(process);
-                }
+                    Ok(())
+                })?;
             }
             if winner.is_some() || !self.hurry() {
                 return Ok(winner);

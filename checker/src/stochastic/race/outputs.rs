@@ -100,18 +100,15 @@ impl Race<'_> {
         bound: f64,
     ) -> Result<Option<(f64, f64)>, Failure> {
         let found = Cell::new(None);
-        self.within(
-            |race, none| {
-                let window = rules::span(race, program, instance.guard, &instance.values, none)?;
-                let low = window.low.unwrap_or(0.0);
-                if low <= rules::tolerant(race, bound) {
-                    let high = window.high.unwrap_or(f64::INFINITY).min(bound).max(low);
-                    found.set(Some((low, high)));
-                }
-                Ok(())
-            },
-            |_| Ok(()),
-        )?;
+        self.attempt(|race, none| {
+            let window = rules::span(race, program, instance.guard, &instance.values, none)?;
+            let low = window.low.unwrap_or(0.0);
+            if low <= rules::tolerant(race, bound) {
+                let high = window.high.unwrap_or(f64::INFINITY).min(bound).max(low);
+                found.set(Some((low, high)));
+            }
+            Ok(())
+        })?;
         Ok(found.get())
     }
 
@@ -179,14 +176,11 @@ impl Race<'_> {
         values: &[i32],
     ) -> Result<bool, Failure> {
         let holds = Cell::new(false);
-        self.within(
-            |race, not| {
-                rules::require(race, program, condition, values, not)?;
-                holds.set(true);
-                Ok(())
-            },
-            |_| Ok(()),
-        )?;
+        self.attempt(|race, not| {
+            rules::require(race, program, condition, values, not)?;
+            holds.set(true);
+            Ok(())
+        })?;
         Ok(holds.get())
     }
 

@@ -212,25 +212,21 @@ impl Race<'_> {
         }
         let urgent = self.output_windows(program, spot, bound)?;
         let drawn = Cell::new(f64::INFINITY);
-        self.within(
-            |race, never| {
-                if race.windows.is_empty() {
-                    return Ok(());
-                }
-                let is_demanded =
-                    race.demand().is_some() && race.windows.iter().all(|one| one.1.is_finite());
-                let is_uniform =
-                    bound.is_finite() || spot.exponential_rate.is_none() && is_demanded;
-                let rate = if is_uniform {
-                    None
-                } else {
-                    rules::exponential_rate(race, process, spot, never)?
-                };
-                drawn.set(race.delay_in_windows(rate)?);
-                Ok(())
-            },
-            |_| Ok(()),
-        )?;
+        self.attempt(|race, never| {
+            if race.windows.is_empty() {
+                return Ok(());
+            }
+            let is_demanded =
+                race.demand().is_some() && race.windows.iter().all(|one| one.1.is_finite());
+            let is_uniform = bound.is_finite() || spot.exponential_rate.is_none() && is_demanded;
+            let rate = if is_uniform {
+                None
+            } else {
+                rules::exponential_rate(race, process, spot, never)?
+            };
+            drawn.set(race.delay_in_windows(rate)?);
+            Ok(())
+        })?;
         Ok(drawn.get().min(urgent))
     }
 }

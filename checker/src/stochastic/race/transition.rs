@@ -75,13 +75,10 @@ impl Race<'_> {
         });
         let candidates: Vec<_> = candidates.collect();
         let chosen = Cell::new(0);
-        self.within(
-            |race, none| {
-                chosen.set(rules::one_of(race, program, &candidates, none)?);
-                Ok(())
-            },
-            |_| Ok(()),
-        )?;
+        self.attempt(|race, none| {
+            chosen.set(rules::one_of(race, program, &candidates, none)?);
+            Ok(())
+        })?;
         Ok(chosen.get() as u32)
     }
 

@@ -126,9 +126,10 @@ impl Backend for Writer<'_> {
         let mut places = Vec::with_capacity(count);
         for place in 0..count {
             let block = self.block();
-            places.push((place as i32, block));
             self.at(block);
             each(self, place)?;
+            let is_idle = self.is_empty(block);
+            places.push((place as i32, if is_idle { next } else { block }));
             self.jump(next);
         }
         self.at(start);

@@ -2,12 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::ops::Range;
+use std::slice;
 
 use super::race_writer::{Ids, RaceWriter};
 use super::writer::Writer;
 use crate::ir::{
     BlockId, Function, FunctionId, IntegerOperator, LocationId, ProcessId, Register, RegisterType,
-    Relation, Update, Urgency,
+    Relation, Sync, Update, Urgency,
 };
 use crate::stochastic::condition::Condition;
 use crate::stochastic::program::{Channel, Instance};
@@ -24,11 +25,17 @@ pub(super) const MOVED: i32 = 1;
 /// or somebody is, so that those who have moved do not plan yet.
 pub(super) const PUT_OFF: i32 = 2;
 
+/// Something that is sent on one of some channels; the register says which.
+struct Sent {
+    channel: Register,
+    channels: Range<u32>,
+}
+
 /// A process that may receive what is sent.
 struct Receiver<'p, 'a> {
     process: u32,
     /// By location: its inputs that may be on the channel.
-    inputs: Vec<(i32, Vec<&'p Instance<'a>>)>,
+    inputs: Vec<Vec<&'p Instance<'a>>>,
     /// Which of all its inputs it takes, counted from 1; 0 if none.
     chosen: Register,
     /// Which branch of it.
@@ -37,9 +44,22 @@ struct Receiver<'p, 'a> {
 
 impl<'p, 'a> Receiver<'p, 'a> {
     fn all_inputs(&self) -> impl Iterator<Item = &'p Instance<'a>> {
-        self.inputs
-            .iter()
-            .flat_map(|(_, inputs)| inputs.iter().copied())
+        self.inputs.iter().flatten().copied()
+    }
+}
+
+/// Those that move together.
+struct Movers<'p, 'a> {
+    sender: &'p Instance<'a>,
+    /// Which branch the sender takes.
+    branch: Register,
+    receivers: Vec<Receiver<'p, 'a>>,
+}
+
+impl<'p, 'a> Movers<'p, 'a> {
+    fn all_instances(&self) -> impl Iterator<Item = &'p Instance<'a>> {
+        let inputs = self.receivers.iter().flat_map(Receiver::all_inputs);
+        inputs.chain([self.sender])
     }
 }
 
@@ -62,15 +82,10 @@ impl<'a> RaceWriter<'_, 'a> {
             self.carry_out(w, only, ids);
         } else {
             let chosen = self.choose(w, outputs, missed);
-            let takes: Vec<(i32, BlockId)> = (0..)
-                .zip(outputs)
-                .map(|(number, _)| (number, w.block()))
-                .collect();
-            w.select(chosen, &takes);
-            for (output, &(_, block)) in outputs.iter().zip(&takes) {
-                w.at(block);
-                self.carry_out(w, output, ids);
-            }
+            let Ok(()) = w.cases(chosen, outputs.len(), |w, number| {
+                self.carry_out(w, &outputs[number], ids);
+                Ok(())
+            });
         }
         w.at(missed);
         let (word, bit) = self.layout.stale_bit(process);
@@ -90,11 +105,7 @@ impl<'a> RaceWriter<'_, 'a> {
     ) -> Register {
         let candidates = (0..).zip(instances).map(|(number, instance)| {
             let flag = (instance.guard != Condition::Always).then(|| {
-                let flag = w.integer(0);
-                self.when_enabled(w, instance, |w| {
-                    let one = w.integer(1);
-                    w.copy(flag, one);
-                });
+                let Ok(flag) = rules::is_any_enabled(w, self.program, slice::from_ref(instance));
                 flag
             });
             Candidate {
@@ -108,47 +119,29 @@ impl<'a> RaceWriter<'_, 'a> {
         chosen
     }
 
-    /// Writes what is done only if the guard of an instance holds.
-    fn when_enabled(
-        &self,
-        w: &mut Writer<'_>,
-        instance: &Instance<'a>,
-        write: impl FnOnce(&mut Writer<'_>),
-    ) {
-        let next = w.block();
-        let Ok(()) = rules::require(w, self.program, instance.guard, &instance.values, next);
-        write(w);
-        w.jump(next);
-        w.at(next);
-    }
-
     /// Lets a process take an output with all who receive, and returns.
     fn carry_out(&self, w: &mut Writer<'_>, sender: &Instance<'a>, ids: &Ids) {
-        let channels = match sender.channel {
-            Channel::None => None,
-            Channel::Known(channel) => Some((w.integer(channel as i32), channel..channel + 1)),
-            Channel::Computed(first, index) => {
-                let count = sender.edge.sync.map_or(1, |sync| sync.count);
-                Some((
-                    computed_channel(w, sender, (first, index)),
-                    first..first + count,
-                ))
+        let channels = sender.edge.sync.map_or(0..0, Sync::channels);
+        let channel = match sender.channel {
+            Channel::None => return self.carry_out_on(w, sender, None, ids),
+            Channel::Known(channel) => {
+                let channels = channel..channel + 1;
+                let channel = w.integer(channel as i32);
+                return self.carry_out_on(w, sender, Some(Sent { channel, channels }), ids);
             }
+            Channel::Computed(first, index) => computed_channel(w, sender, first, index),
         };
-        match channels {
-            Some((channel, channels)) if self.is_worth_telling_apart(&channels) => {
-                let places: Vec<(i32, BlockId)> = channels
-                    .map(|channel| (channel as i32, w.block()))
-                    .collect();
-                w.select(channel, &places);
-                for &(channel, block) in &places {
-                    w.at(block);
-                    let known = w.integer(channel);
-                    let channel = channel as u32;
-                    self.carry_out_on(w, sender, Some((known, channel..channel + 1)), ids);
-                }
-            }
-            channels => self.carry_out_on(w, sender, channels, ids),
+        if !self.is_worth_telling_apart(&channels) {
+            return self.carry_out_on(w, sender, Some(Sent { channel, channels }), ids);
+        }
+        let places = channels.map(|channel| (channel as i32, w.block()));
+        let places: Vec<(i32, BlockId)> = places.collect();
+        w.select(channel, &places);
+        for &(number, block) in &places {
+            w.at(block);
+            let channel = w.integer(number);
+            let channels = number as u32..number as u32 + 1;
+            self.carry_out_on(w, sender, Some(Sent { channel, channels }), ids);
         }
     }
 
@@ -160,21 +153,18 @@ impl<'a> RaceWriter<'_, 'a> {
         (2..=MOST_CHANNELS).contains(&channels.len()) && 2 * most < all
     }
 
-    /// Lets a process take an output on one of these channels; the register says which.
+    /// Lets a process take an output, which is sent if it synchronises.
     fn carry_out_on(
         &self,
         w: &mut Writer<'_>,
         sender: &Instance<'a>,
-        channels: Option<(Register, Range<u32>)>,
+        sent: Option<Sent>,
         ids: &Ids,
     ) {
         let mut receivers = Vec::new();
-        if let Some((channel, channels)) = channels {
-            for process in self.program.partners(sender) {
-                if let Some(receiver) = self.receiver(w, process, (channel, &channels)) {
-                    receivers.push(receiver);
-                }
-            }
+        if let Some(sent) = sent {
+            let partners = self.program.partners(sender).into_iter();
+            receivers.extend(partners.filter_map(|process| self.receiver(w, process, &sent)));
         }
         let Ok(branch) = rules::branch(w, self.program, sender);
         for receiver in &receivers {
@@ -182,35 +172,35 @@ impl<'a> RaceWriter<'_, 'a> {
         }
         self.apply(w, sender, branch);
         for receiver in &receivers {
-            let done = w.block();
-            Self::for_chosen(w, receiver, done, |w, input| {
+            Self::for_chosen(w, receiver, |w, input| {
                 self.apply(w, input, receiver.branch);
             });
         }
         if let Some(renewal) = self.renewal_of_rates {
             w.call(renewal, &[]);
         }
-        if self.may_commit(sender, &receivers) {
+        let movers = Movers {
+            sender,
+            branch,
+            receivers,
+        };
+        if self.may_commit(&movers) {
             let committed = w.load(self.layout.committed);
-            let (put_off, now) = (w.block(), w.block());
-            w.branch(committed, put_off, now);
-            w.at(put_off);
-            self.put_plans_off(w, (sender, branch), &receivers, ids);
-            w.at(now);
+            w.when(committed, |w| self.put_plans_off(w, &movers, ids));
         }
-        self.plan_movers(w, (sender, branch), &receivers, ids);
+        self.plan_movers(w, &movers, ids);
         let result = w.integer(MOVED);
         w.return_value(Some(result));
     }
 
     /// Whether a process may be in a location that is committed when the movers have moved.
-    fn may_commit(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> bool {
-        let inputs = receivers.iter().flat_map(Receiver::all_inputs);
-        let mut entered = inputs.chain([sender]).flat_map(|mover| {
+    fn may_commit(&self, movers: &Movers<'_, 'a>) -> bool {
+        let mut entered = movers.all_instances().flat_map(|mover| {
             let branches = mover.edge.branches.iter();
             branches.map(|branch| (mover.process, branch.target))
         });
         // If the sender is not in such a location, nobody is: it could not move.
+        let sender = movers.sender;
         let mut others = self.committing.iter();
         entered.any(|(process, target)| self.is_committed(process, target))
             || self.leaves_committed(sender)
@@ -226,17 +216,16 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Who may be marked when the movers have moved: by them, or before if plans were put off.
-    fn marked_by(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> BTreeSet<u32> {
-        if self.renewal_of_rates.is_some() || self.leaves_committed(sender) {
+    fn marked_by(&self, movers: &Movers<'_, 'a>) -> BTreeSet<u32> {
+        if self.renewal_of_rates.is_some() || self.leaves_committed(movers.sender) {
             return (0..self.network().processes.len() as u32).collect();
         }
-        self.concerned_by(sender, receivers)
+        self.concerned_by(movers)
     }
 
     /// Whose plans may depend on what the movers have changed.
-    fn concerned_by(&self, sender: &Instance<'a>, receivers: &[Receiver<'_, 'a>]) -> BTreeSet<u32> {
-        let inputs = receivers.iter().flat_map(Receiver::all_inputs);
-        let concerned = inputs.chain([sender]).flat_map(|mover| {
+    fn concerned_by(&self, movers: &Movers<'_, 'a>) -> BTreeSet<u32> {
+        let concerned = movers.all_instances().flat_map(|mover| {
             let branches = 0..mover.edge.branches.len();
             let concerned = branches.flat_map(|number| self.program.concerned(mover, number));
             let followers = self.program.followers(ProcessId(mover.process)).iter();
@@ -249,22 +238,17 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Ends a move after which those that have moved do not plan yet: only those invariants are
     /// looked at that may not hold any more.
-    fn put_plans_off(
-        &self,
-        w: &mut Writer<'_>,
-        (sender, branch): (&Instance<'a>, Register),
-        receivers: &[Receiver<'_, 'a>],
-        ids: &Ids,
-    ) {
-        let broken = w.block();
-        Self::for_branch(w, sender, branch, |w, number| {
+    fn put_plans_off(&self, w: &mut Writer<'_>, movers: &Movers<'_, 'a>, ids: &Ids) {
+        let sender = movers.sender;
+        Self::for_branch(w, sender, movers.branch, |w, number| {
             let target = sender.edge.branches[number].target;
             let spot = self.program.spot(sender.process as usize, target);
-            let Ok(()) = rules::require(w, self.program, spot.invariant, &[], broken);
+            let process = sender.process as usize;
+            let Ok(()) = rules::require_invariant(w, self.program, process, spot);
         });
         self.mark_processes(w, [sender.process]);
         let invariant_of = |process: u32| ids.invariants[process as usize];
-        for receiver in receivers {
+        for receiver in &movers.receivers {
             w.when(receiver.chosen, |w| {
                 if let Some(invariant) = invariant_of(receiver.process) {
                     w.call(invariant, &[]);
@@ -272,35 +256,27 @@ impl<'a> RaceWriter<'_, 'a> {
                 self.mark_processes(w, [receiver.process]);
             });
         }
-        for process in self.concerned_by(sender, receivers) {
+        for process in self.concerned_by(movers) {
             if let Some(invariant) = invariant_of(process) {
                 w.call(invariant, &[]);
             }
         }
         let result = w.integer(PUT_OFF);
         w.return_value(Some(result));
-        w.at(broken);
-        w.give_up();
     }
 
     /// Lets those plan that have moved, the sender first; the others do so later.
-    fn plan_movers(
-        &self,
-        w: &mut Writer<'_>,
-        (sender, branch): (&Instance<'a>, Register),
-        receivers: &[Receiver<'_, 'a>],
-        ids: &Ids,
-    ) {
-        let marked = self.marked_by(sender, receivers);
+    fn plan_movers(&self, w: &mut Writer<'_>, movers: &Movers<'_, 'a>, ids: &Ids) {
+        let (marked, sender) = (self.marked_by(movers), movers.sender);
         if marked.contains(&sender.process) {
             self.unmark(w, sender.process);
         }
-        for receiver in receivers {
+        for receiver in &movers.receivers {
             if marked.contains(&receiver.process) {
                 w.when(receiver.chosen, |w| self.unmark(w, receiver.process));
             }
         }
-        Self::for_branch(w, sender, branch, |w, number| {
+        Self::for_branch(w, sender, movers.branch, |w, number| {
             let process = sender.process as usize;
             let target = sender.edge.branches[number].target;
             let spot = self.program.spot(process, target);
@@ -310,10 +286,9 @@ impl<'a> RaceWriter<'_, 'a> {
             }
             let Ok(()) = rules::plan(w, self.program, process, spot);
         });
-        for receiver in receivers {
-            let done = w.block();
+        for receiver in &movers.receivers {
             let plans = &ids.plans[receiver.process as usize];
-            Self::for_chosen(w, receiver, done, |w, input| {
+            Self::for_chosen(w, receiver, |w, input| {
                 let plan = match &input.edge.branches[..] {
                     [only] => plans.by_location[only.target.0 as usize],
                     _ => Some(plans.anywhere),
@@ -326,53 +301,41 @@ impl<'a> RaceWriter<'_, 'a> {
         }
     }
 
-    /// Lets a process choose what it receives on one of some channels.
+    /// Lets a process choose what it receives of what is sent; none if it never receives it.
     fn receiver<'p>(
         &'p self,
         w: &mut Writer<'_>,
         process: u32,
-        (channel, channels): (Register, &Range<u32>),
+        sent: &Sent,
     ) -> Option<Receiver<'p, 'a>> {
+        let channels = &sent.channels;
         let may_receive = |input: &&Instance<'a>| match input.channel {
             Channel::None => false,
             Channel::Known(one) => channels.contains(&one),
-            Channel::Computed(first, _) => {
-                let count = input.edge.sync.map_or(0, |sync| sync.count);
-                first < channels.end && channels.start < first + count
-            }
+            Channel::Computed(..) => input.edge.sync.is_some_and(|sync| {
+                let own = sync.channels();
+                own.start < channels.end && channels.start < own.end
+            }),
         };
-        let spots = self.program.spots_of(process as usize);
-        let inputs: Vec<(i32, Vec<&Instance<'a>>)> = (0..)
-            .zip(spots)
-            .map(|(location, spot)| {
-                let inputs = self.program.range(spot.inputs).iter();
-                (location, inputs.filter(may_receive).collect())
-            })
+        let spots = self.program.spots_of(process as usize).iter();
+        let inputs = spots.map(|spot| self.program.range(spot.inputs).iter());
+        let inputs: Vec<Vec<_>> = inputs
+            .map(|inputs| inputs.filter(may_receive).collect())
             .collect();
-        if inputs.iter().all(|(_, inputs)| inputs.is_empty()) {
+        if inputs.iter().all(Vec::is_empty) {
             return None;
         }
         let (chosen, branch) = (w.integer(0), w.integer(0));
-        let next = w.block();
         let location = w.load(process);
-        let start = w.block();
-        w.jump(start);
-        let mut places = Vec::new();
         let mut first = 1;
-        for (location, inputs) in &inputs {
-            if inputs.is_empty() {
-                places.push((*location, next));
-                continue;
+        let Ok(()) = w.cases(location, inputs.len(), |w, location| {
+            let inputs = &inputs[location];
+            if !inputs.is_empty() {
+                self.choose_input(w, inputs, first, sent, chosen);
+                first += inputs.len() as i32;
             }
-            let block = w.block();
-            places.push((*location, block));
-            w.at(block);
-            self.choose_input(w, inputs, (channel, channels), (chosen, first), next);
-            first += inputs.len() as i32;
-        }
-        w.at(start);
-        w.select(location, &places);
-        w.at(next);
+            Ok(())
+        });
         Some(Receiver {
             process,
             inputs,
@@ -381,75 +344,70 @@ impl<'a> RaceWriter<'_, 'a> {
         })
     }
 
-    /// Chooses one of the inputs of a location that are enabled, if there are any.
+    /// Chooses one of the inputs of a location that are enabled, if there are any; the inputs are
+    /// counted from `first`.
     fn choose_input(
         &self,
         w: &mut Writer<'_>,
         inputs: &[&Instance<'a>],
-        (channel, channels): (Register, &Range<u32>),
-        (chosen, first): (Register, i32),
-        next: BlockId,
+        first: i32,
+        sent: &Sent,
+        chosen: Register,
     ) {
-        let mut candidates = Vec::new();
-        for (number, &input) in (first..).zip(inputs) {
-            let (flag, otherwise) = (w.integer(0), w.block());
-            match input.channel {
-                Channel::None => {}
-                Channel::Known(_) if channels.len() == 1 => {}
-                Channel::Known(own) => {
-                    let is_it = w.compare_to(channel, Relation::Equal, own as i32);
-                    w.unless(is_it, otherwise);
-                }
-                Channel::Computed(own, index) => {
-                    let own = computed_channel(w, input, (own, index));
-                    let is_it = w.compare(channel, Relation::Equal, own);
-                    w.unless(is_it, otherwise);
-                }
+        let Ok(()) = w.attempt(|w, none| {
+            let mut candidates = Vec::new();
+            for (number, &instance) in (first..).zip(inputs) {
+                let flag = w.integer(0);
+                w.attempt(|w, otherwise| {
+                    if let Channel::Computed(first, index) = instance.channel {
+                        let own = computed_channel(w, instance, first, index);
+                        let is_it = w.compare(sent.channel, Relation::Equal, own);
+                        w.unless(is_it, otherwise);
+                    } else if let Channel::Known(own) = instance.channel
+                        && sent.channels.len() > 1
+                    {
+                        let is_it = w.compare_to(sent.channel, Relation::Equal, own as i32);
+                        w.unless(is_it, otherwise);
+                    }
+                    let (guard, values) = (instance.guard, &instance.values);
+                    rules::require(w, self.program, guard, values, otherwise)?;
+                    let one = w.integer(1);
+                    w.copy(flag, one);
+                    Ok(())
+                })?;
+                candidates.push(Candidate {
+                    instance,
+                    number,
+                    flag: Some(flag),
+                });
             }
-            let Ok(()) = rules::require(w, self.program, input.guard, &input.values, otherwise);
-            let one = w.integer(1);
-            w.copy(flag, one);
-            w.jump(otherwise);
-            w.at(otherwise);
-            candidates.push(Candidate {
-                instance: input,
-                number,
-                flag: Some(flag),
-            });
-        }
-        let Ok(taken) = rules::one_of(w, self.program, &candidates, next);
-        w.copy(chosen, taken);
-        w.jump(next);
+            let taken = rules::one_of(w, self.program, &candidates, none)?;
+            w.copy(chosen, taken);
+            Ok(())
+        });
     }
 
-    /// Writes what is done for each input that a receiver may have chosen, and goes on at `done`.
+    /// Writes what is done for each input that a receiver may have chosen.
     fn for_chosen(
         w: &mut Writer<'_>,
         receiver: &Receiver<'_, 'a>,
-        done: BlockId,
         write: impl Fn(&mut Writer<'_>, &Instance<'a>),
     ) {
-        let start = w.block();
-        w.jump(start);
-        let mut places = vec![(0, done)];
-        let inputs = receiver.inputs.iter().flat_map(|(_, inputs)| inputs);
-        for (number, input) in (1..).zip(inputs) {
-            let block = w.block();
-            places.push((number, block));
-            w.at(block);
-            write(w, input);
-            w.jump(done);
-        }
-        w.at(start);
-        w.select(receiver.chosen, &places);
-        w.at(done);
+        let inputs: Vec<_> = receiver.all_inputs().collect();
+        let Ok(()) = w.cases(receiver.chosen, 1 + inputs.len(), |w, number| {
+            if let Some(place) = number.checked_sub(1) {
+                write(w, inputs[place]);
+            }
+            Ok(())
+        });
     }
 
     fn branch_of_receiver(&self, w: &mut Writer<'_>, receiver: &Receiver<'_, 'a>) {
-        let mut inputs = receiver.inputs.iter().flat_map(|(_, inputs)| inputs);
-        if inputs.any(|input| input.edge.branches.len() > 1) {
-            let done = w.block();
-            Self::for_chosen(w, receiver, done, |w, input| {
+        if receiver
+            .all_inputs()
+            .any(|input| input.edge.branches.len() > 1)
+        {
+            Self::for_chosen(w, receiver, |w, input| {
                 let Ok(branch) = rules::branch(w, self.program, input);
                 w.copy(receiver.branch, branch);
             });
@@ -469,24 +427,10 @@ impl<'a> RaceWriter<'_, 'a> {
         branch: Register,
         write: impl Fn(&mut Writer<'_>, usize),
     ) {
-        let branches = mover.edge.branches.len();
-        if branches == 1 {
-            write(w, 0);
-            return;
-        }
-        let (start, done) = (w.block(), w.block());
-        w.jump(start);
-        let mut places = Vec::new();
-        for number in 0..branches {
-            let block = w.block();
-            places.push((number as i32, block));
-            w.at(block);
+        let Ok(()) = w.cases(branch, mover.edge.branches.len(), |w, number| {
             write(w, number);
-            w.jump(done);
-        }
-        w.at(start);
-        w.select(branch, &places);
-        w.at(done);
+            Ok(())
+        });
     }
 
     fn enter(&self, w: &mut Writer<'_>, mover: &Instance<'a>, number: usize) {
@@ -563,33 +507,23 @@ impl<'a> RaceWriter<'_, 'a> {
         let mut w = self.writer(&format!("whether process {process} can move"), result);
         let only_committed = Register(0);
         let location = w.load(process as u32);
-        let (start, unable) = (w.block(), w.block());
-        w.jump(start);
-        let mut places = Vec::new();
-        for (location, spot) in (0..).zip(self.program.spots_of(process)) {
-            if spot.outputs.0 == spot.outputs.1 {
-                places.push((location, unable));
-                continue;
+        let spots = self.program.spots_of(process);
+        let Ok(()) = w.cases(location, spots.len(), |w, location| {
+            let spot = &spots[location];
+            let outputs = self.program.range(spot.outputs);
+            if outputs.is_empty() {
+                return Ok(());
             }
-            let block = w.block();
-            places.push((location, block));
-            w.at(block);
-            if spot.urgency != Urgency::Committed {
-                let any = w.compare_to(only_committed, Relation::Equal, 0);
-                w.unless(any, unable);
-            }
-            let some = w.integer(0);
-            for output in self.program.range(spot.outputs) {
-                self.when_enabled(&mut w, output, |w| {
-                    let one = w.integer(1);
-                    w.copy(some, one);
-                });
-            }
-            w.return_value(Some(some));
-        }
-        w.at(start);
-        w.select(location, &places);
-        w.at(unable);
+            w.attempt(|w, unable| {
+                if spot.urgency != Urgency::Committed {
+                    let any = w.compare_to(only_committed, Relation::Equal, 0);
+                    w.unless(any, unable);
+                }
+                let is_able = rules::is_any_enabled(w, self.program, outputs)?;
+                w.return_value(Some(is_able));
+                Ok(())
+            })
+        });
         let zero = w.integer(0);
         w.return_value(Some(zero));
         w.finish()
@@ -600,11 +534,10 @@ impl<'a> RaceWriter<'_, 'a> {
 fn computed_channel(
     w: &mut Writer<'_>,
     instance: &Instance<'_>,
-    (first, index): (u32, FunctionId),
+    first: u32,
+    index: FunctionId,
 ) -> Register {
-    let values = instance.values.iter();
-    let arguments = values.map(|&one| w.integer(one)).collect();
-    let offset = w.call_for(index, arguments);
+    let Ok(offset) = Backend::call(w, index, &instance.values);
     let first = w.integer(first as i32);
     w.add_integers(first, offset)
 }

@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
-use crate::ir::{BlockId, Function, IntegerOperator, Relation};
+use crate::ir::{Function, IntegerOperator, Relation};
 use crate::stochastic::program::Program;
-use crate::stochastic::rules::Backend;
+use crate::stochastic::rules::{self, Backend};
 
 /// The clocks whose rates some location of a process sets.
 fn clocks_of(program: &Program<'_>, process: u32) -> BTreeSet<u32> {
@@ -51,35 +51,21 @@ impl RaceWriter<'_, '_> {
             let one = w.real(1.0);
             w.store_double(clock + 2, one);
         }
-        let (start, done) = (w.block(), w.block());
         let location = w.load(process);
-        w.jump(start);
-        let mut places: Vec<(i32, BlockId)> = Vec::new();
         let locations = &self.network().processes[process as usize].locations;
-        for (number, location) in (0..).zip(locations) {
-            let Some(rates) = location.chances.rates else {
-                places.push((number, done));
-                continue;
-            };
-            let (block, wrong) = (w.block(), w.block());
-            places.push((number, block));
-            w.at(block);
-            w.call(rates, &[]);
-            for &clock in &location.chances.rated_clocks {
-                let rate = w.load_real(clock + 2);
-                let negative = w.negate(rate);
-                let size = w.greatest(rate, negative);
-                let infinity = w.real(f64::INFINITY);
-                let is_finite = w.compare_reals(size, Relation::Less, infinity);
-                w.unless(is_finite, wrong);
+        let Ok(()) = w.cases(location, locations.len(), |w, location| {
+            let chances = &locations[location].chances;
+            if let Some(rates) = chances.rates {
+                w.call(rates, &[]);
+                for &clock in &chances.rated_clocks {
+                    let rate = w.load_real(clock + 2);
+                    let size = rules::size(w, rate);
+                    let is_finite = w.compare_real_to(size, Relation::Less, f64::INFINITY);
+                    w.insist(is_finite);
+                }
             }
-            w.jump(done);
-            w.at(wrong);
-            w.give_up();
-        }
-        w.at(start);
-        w.select(location, &places);
-        w.at(done);
+            Ok(())
+        });
         for clock in clocks {
             let Some(readers) = self.program.rate_readers.get(&clock) else {
                 continue;

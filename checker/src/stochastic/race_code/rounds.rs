@@ -11,6 +11,16 @@ use crate::ir::{
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::rules::{self, Backend};
 
+/// What all parts of a round need.
+#[derive(Clone, Copy)]
+struct Round<'r> {
+    ids: &'r Ids,
+    watched: &'r Watched,
+    /// Set to the cell of the winner before it moves, in the block behind it.
+    cell: Register,
+    moving: BlockId,
+}
+
 /// Who wins, in registers.
 #[derive(Clone, Copy)]
 struct First {
@@ -61,13 +71,19 @@ impl RaceWriter<'_, '_> {
         // Where the winner moves, from the location that the cell says; the delay before it has
         // passed.
         let (cell, delay) = (w.integer(0), w.real(0.0));
+        let this = Round {
+            ids,
+            watched,
+            cell,
+            moving,
+        };
         if self.committing.is_empty() {
             w.jump(racing);
         } else {
             let committed = w.load(layout.committed);
             w.branch(committed, settling, racing);
             w.at(settling);
-            self.settle_committed(w, (ids, watched), (cell, moving));
+            self.settle_committed(w, this);
         }
         w.at(racing);
         self.plan_anew(w, ids);
@@ -80,7 +96,7 @@ impl RaceWriter<'_, '_> {
         w.branch(has_stays, bounded, free);
         // Some process may not stay for ever, and tries to move later than it must.
         w.at(bounded);
-        self.settle_stays(w, (ids, watched), delay, (cell, moving), (free, over));
+        self.settle_stays(w, this, delay, free, over);
         w.at(free);
         let passing = self.watch_delay(w, watched, delay, over);
         if let Some(first) = first {
@@ -218,19 +234,16 @@ impl RaceWriter<'_, '_> {
 
     /// Sets the cell to one of those whose attempts come until then, all with the same chance.
     fn choose_among(w: &mut Writer<'_>, all: &[First], latest: Register, cell: Register) {
-        let count = w.integer(0);
-        let flags: Vec<Register> = all
-            .iter()
-            .map(|one| {
-                let is_first = w.compare_reals(one.attempt, Relation::LessEqual, latest);
-                let more = w.add_integers(count, is_first);
-                w.copy(count, more);
-                is_first
-            })
-            .collect();
-        let rest = w.draw_below(count);
-        let cells = all.iter().map(|one| one.cell);
-        take_one_of(w, cells.zip(flags.into_iter().map(Some)), rest, cell);
+        let flagged = all.iter().map(|one| {
+            let is_first = w.compare_reals(one.attempt, Relation::LessEqual, latest);
+            (one.cell, Some(is_first))
+        });
+        let flagged: Vec<_> = flagged.collect();
+        let Ok(()) = w.attempt(|w, none| {
+            let chosen = rules::draw(w, &flagged, none)?;
+            w.copy(cell, chosen);
+            Ok(())
+        });
     }
 
     /// The cell of a process that is where it is.
@@ -290,58 +303,48 @@ impl RaceWriter<'_, '_> {
     }
 
     /// Chooses who leaves one of the committed locations.
-    fn settle_committed(
-        &self,
-        w: &mut Writer<'_>,
-        (ids, watched): (&Ids, &Watched),
-        (cell, moving): (Register, BlockId),
-    ) {
+    fn settle_committed(&self, w: &mut Writer<'_>, round: Round<'_>) {
         if let [only] = self.committing[..] {
             // It can move, or the run is given up.
-            let own = Self::cell(w, ids, only);
-            w.copy(cell, own);
-            self.watch(w, watched, None);
-            w.jump(moving);
-            return;
+            let own = Self::cell(w, round.ids, only);
+            w.copy(round.cell, own);
+            self.watch(w, round.watched, None);
+            w.jump(round.moving);
+        } else {
+            self.let_one_move(w, round, &self.committing, true);
         }
-        let who = (self.committing.clone(), true);
-        self.let_one_move(w, (ids, watched), who, (cell, moving));
     }
 
     /// Chooses one of those who can move now as the winner, all with the same chance.
     fn let_one_move(
         &self,
         w: &mut Writer<'_>,
-        (ids, watched): (&Ids, &Watched),
-        (processes, only_committed): (Vec<usize>, bool),
-        (cell, moving): (Register, BlockId),
+        round: Round<'_>,
+        processes: &[usize],
+        only_committed: bool,
     ) {
-        let ties = w.integer(0);
-        for &process in &processes {
+        let Round {
+            ids,
+            watched,
+            cell,
+            moving,
+        } = round;
+        let competitors = w.variable(0);
+        for &process in processes {
             let Some(ability) = ids.abilities[process] else {
                 continue;
             };
             let argument = w.integer(only_committed.into());
             let is_able = w.call_for(ability, vec![argument]);
             w.when(is_able, |w| {
-                let one = w.integer(1);
-                let more = w.add_integers(ties, one);
-                w.copy(ties, more);
-                let (wins, next) = (w.block(), w.block());
-                let is_first = w.compare(ties, Relation::Equal, one);
-                let drawing = w.block();
-                w.branch(is_first, wins, drawing);
-                w.at(drawing);
-                let drawn = w.draw_below(ties);
-                w.branch(drawn, next, wins);
-                w.at(wins);
-                let own = Self::cell(w, ids, process);
-                w.copy(cell, own);
-                w.jump(next);
-                w.at(next);
+                let Ok(()) = rules::compete(w, &competitors, |w| {
+                    let own = Self::cell(w, ids, process);
+                    w.copy(cell, own);
+                    Ok(())
+                });
             });
         }
-        w.insist(ties);
+        w.insist(competitors.get());
         self.watch(w, watched, None);
         w.jump(moving);
     }
@@ -351,10 +354,10 @@ impl RaceWriter<'_, '_> {
     fn settle_stays(
         &self,
         w: &mut Writer<'_>,
-        (ids, watched): (&Ids, &Watched),
+        round: Round<'_>,
         delay: Register,
-        (cell, moving): (Register, BlockId),
-        (free, over): (BlockId, BlockId),
+        free: BlockId,
+        over: BlockId,
     ) {
         let infinity = w.real(f64::INFINITY);
         let mut least = infinity;
@@ -367,20 +370,18 @@ impl RaceWriter<'_, '_> {
             let latest = rules::tolerant(w, least);
             let is_beyond = w.compare_reals(delay, Relation::Greater, latest);
             w.unless(is_beyond, free);
-            let tolerance = w.real(TOLERANCE);
-            let is_now = w.compare_reals(least, Relation::LessEqual, tolerance);
+            let is_now = w.compare_real_to(least, Relation::LessEqual, TOLERANCE);
             let (now, later, stuck) = (w.block(), w.block(), w.block());
             w.branch(is_now, now, later);
             w.at(now);
-            let zero = w.real(0.0);
-            let is_zero = w.compare_reals(least, Relation::LessEqual, zero);
+            let is_zero = w.compare_real_to(least, Relation::LessEqual, 0.0);
             w.unless(is_zero, stuck);
-            let all = (0..ids.moves.len()).collect();
-            self.let_one_move(w, (ids, watched), (all, false), (cell, moving));
+            let all: Vec<usize> = (0..round.ids.moves.len()).collect();
+            self.let_one_move(w, round, &all, false);
             w.at(later);
             let (rest, slack) = self.rest(w);
             let passing = w.least(least, rest);
-            self.watch(w, watched, Some(passing));
+            self.watch(w, round.watched, Some(passing));
             let end = w.add(rest, slack);
             let is_over = w.compare_reals(end, Relation::Less, least);
             w.unless(is_over, stuck);
@@ -415,8 +416,7 @@ impl RaceWriter<'_, '_> {
 
     /// Lets time pass, if it is more than none.
     fn wait(&self, w: &mut Writer<'_>, delay: Register, attempts: &[(u32, Register)]) {
-        let zero = w.real(0.0);
-        let passes = w.compare_reals(delay, Relation::Greater, zero);
+        let passes = w.compare_real_to(delay, Relation::Greater, 0.0);
         w.when(passes, |w| {
             self.advance(w, delay);
             for &(word, attempt) in attempts {
@@ -435,8 +435,7 @@ impl RaceWriter<'_, '_> {
     }
 
     fn wait_until_the_end(&self, w: &mut Writer<'_>, delay: Register) {
-        let zero = w.real(0.0);
-        let passes = w.compare_reals(delay, Relation::Greater, zero);
+        let passes = w.compare_real_to(delay, Relation::Greater, 0.0);
         w.when(passes, |w| self.advance(w, delay));
     }
 
@@ -456,31 +455,4 @@ impl RaceWriter<'_, '_> {
         let time = w.add(time, delay);
         w.store_double(self.layout.time, time);
     }
-}
-
-/// Sets `chosen` to one of some numbers: so many of those whose flag is set are passed over as
-/// `rest` says, which counts down. A number without a flag counts always.
-fn take_one_of(
-    w: &mut Writer<'_>,
-    numbers: impl Iterator<Item = (Register, Option<Register>)>,
-    rest: Register,
-    chosen: Register,
-) {
-    let (found, minus_one) = (w.block(), w.integer(-1));
-    for (number, flag) in numbers {
-        let next = w.block();
-        if let Some(flag) = flag {
-            w.unless(flag, next);
-        }
-        w.copy(chosen, number);
-        let goes_on = w.block();
-        w.branch(rest, goes_on, found);
-        w.at(goes_on);
-        let less = w.add_integers(rest, minus_one);
-        w.copy(rest, less);
-        w.jump(next);
-        w.at(next);
-    }
-    w.jump(found);
-    w.at(found);
 }

@@ -95,6 +95,13 @@ impl<'l> Writer<'l> {
         self.is_reached[block as usize]
     }
 
+    /// Whether the current block is this one, and nothing is written there.
+    pub(super) fn is_empty(&self, BlockId(block): BlockId) -> bool {
+        let block = block as usize;
+        let is_current = self.current == block && !self.is_ended;
+        is_current && self.function.blocks[block].instructions.is_empty()
+    }
+
     fn end(&mut self, terminator: Terminator) {
         if !self.is_ended {
             for block in terminator.successors() {
@@ -246,16 +253,6 @@ impl<'l> Writer<'l> {
             left,
             right,
         })
-    }
-
-    pub(super) fn compare_to(
-        &mut self,
-        left: Register,
-        relation: Relation,
-        right: i32,
-    ) -> Register {
-        let right = self.integer(right);
-        self.compare(left, relation, right)
     }
 
     pub(super) fn double_of(&mut self, source: Register) -> Register {

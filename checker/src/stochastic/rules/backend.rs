@@ -22,7 +22,22 @@ pub(in crate::stochastic) trait Backend: Sized {
     fn integer(&mut self, value: i32) -> Self::Integer;
     fn real(&mut self, value: f64) -> Self::Real;
 
-    /// Gives a variable another value. A variable begins with a value of its own.
+    /// A variable that begins with a number.
+    fn variable(&mut self, value: i32) -> Cell<Self::Integer> {
+        Cell::new(self.integer(value))
+    }
+
+    fn real_variable(&mut self, value: f64) -> Cell<Self::Real> {
+        Cell::new(self.real(value))
+    }
+
+    /// A variable that begins with what a value is now.
+    fn copy_of(&mut self, value: Self::Real) -> Cell<Self::Real> {
+        let variable = self.real_variable(0.0);
+        self.set_real(&variable, value);
+        variable
+    }
+
     fn set(&mut self, variable: &Cell<Self::Integer>, value: Self::Integer);
     fn set_real(&mut self, variable: &Cell<Self::Real>, value: Self::Real);
 
@@ -80,6 +95,21 @@ pub(in crate::stochastic) trait Backend: Sized {
         right: Self::Real,
     ) -> Self::Integer;
 
+    fn compare_to(&mut self, left: Self::Integer, relation: Relation, right: i32) -> Self::Integer {
+        let right = self.integer(right);
+        self.compare(left, relation, right)
+    }
+
+    fn compare_real_to(
+        &mut self,
+        left: Self::Real,
+        relation: Relation,
+        right: f64,
+    ) -> Self::Integer {
+        let right = self.real(right);
+        self.compare_reals(left, relation, right)
+    }
+
     /// Does something only if a condition holds.
     fn when(
         &mut self,
@@ -117,6 +147,11 @@ pub(in crate::stochastic) trait Backend: Sized {
         left: impl FnOnce(&mut Self) -> Flow<Self>,
     ) -> Flow<Self>;
 
+    /// Does something that may leave by the exit, and goes on.
+    fn attempt(&mut self, body: impl FnOnce(&mut Self, Self::Exit) -> Flow<Self>) -> Flow<Self> {
+        self.within(body, |_| Ok(()))
+    }
+
     /// Leaves by an exit.
     fn leave(&mut self, exit: Self::Exit) -> Flow<Self>;
 
@@ -135,6 +170,18 @@ pub(in crate::stochastic) trait Backend: Sized {
         why: impl FnOnce(&Self) -> Failure,
     ) -> Flow<Self> {
         self.choose(condition, |_| Ok(()), |b| b.fail(why))
+    }
+
+    /// Goes on if a number is finite and not negative, else ends the run.
+    fn insist_on_range(
+        &mut self,
+        value: Self::Real,
+        why: impl Copy + FnOnce(&Self) -> Failure,
+    ) -> Flow<Self> {
+        let is_least = self.compare_real_to(value, Relation::GreaterEqual, 0.0);
+        self.insist(is_least, why)?;
+        let is_finite = self.compare_real_to(value, Relation::Less, f64::INFINITY);
+        self.insist(is_finite, why)
     }
 
     /// A number from 0 to a maximum, or one with a mean delay, or one of so many integers.

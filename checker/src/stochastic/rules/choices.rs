@@ -29,9 +29,10 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
     otherwise: B::Exit,
 ) -> Flow<B, B::Integer> {
     if candidates.iter().all(|one| one.instance.edge.leg.is_none()) {
-        let numbered = candidates.iter().map(|one| (one.number, one.flag));
-        let numbered: Vec<_> = numbered.collect();
-        return draw(b, &numbered, otherwise);
+        let candidates = candidates.iter();
+        let numbers = candidates.map(|one| (b.integer(one.number), one.flag));
+        let numbers: Vec<_> = numbers.collect();
+        return draw(b, &numbers, otherwise);
     }
     let mut entries: BTreeMap<u32, Vec<&Candidate<'_, '_, B::Integer>>> = BTreeMap::new();
     for one in candidates {
@@ -39,9 +40,8 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
     }
     let mut flags = Vec::new();
     for legs in entries.values() {
-        let flag = Cell::new(b.integer(0));
+        let (flag, one) = (b.variable(0), b.integer(1));
         for leg in legs {
-            let one = b.integer(1);
             b.when(leg.flag.unwrap_or(one), |b| {
                 b.set(&flag, one);
                 Ok(())
@@ -49,10 +49,10 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
         }
         flags.push(Some(flag.get()));
     }
-    let numbered: Vec<_> = (0..).zip(flags).collect();
-    let entry = draw(b, &numbered, otherwise)?;
+    let numbers: Vec<_> = (0..).map(|place| b.integer(place)).zip(flags).collect();
+    let entry = draw(b, &numbers, otherwise)?;
     let legs: Vec<_> = entries.into_values().collect();
-    let chosen = Cell::new(b.integer(0));
+    let chosen = b.variable(0);
     b.cases(entry, legs.len(), |b, place| {
         let number = leg(b, program, &legs[place])?;
         b.set(&chosen, number);
@@ -61,49 +61,66 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
     Ok(chosen.get())
 }
 
-/// One of some numbers whose flags are set, all with the same chance; leaves if there are none.
-fn draw<B: Backend>(
+/// One of some numbers whose flags are set, all with the same chance; leaves if there are none. A
+/// number without a flag counts always.
+pub(in crate::stochastic) fn draw<B: Backend>(
     b: &mut B,
-    numbered: &[(i32, Option<B::Integer>)],
+    numbers: &[(B::Integer, Option<B::Integer>)],
     otherwise: B::Exit,
 ) -> Flow<B, B::Integer> {
-    let sure = numbered.iter().filter(|one| one.1.is_none()).count();
+    let sure = numbers.iter().filter(|one| one.1.is_none()).count();
     let mut count = b.integer(sure as i32);
-    for flag in numbered.iter().filter_map(|one| one.1) {
+    for flag in numbers.iter().filter_map(|one| one.1) {
         count = b.sum(count, flag);
     }
     if sure == 0 {
         b.unless(count, otherwise)?;
     }
-    let (rest, one) = (Cell::new(b.integer(0)), b.integer(1));
-    let are_many = b.compare(count, Relation::Greater, one);
+    let rest = b.variable(0);
+    let are_many = b.compare_to(count, Relation::Greater, 1);
     b.when(are_many, |b| {
         let drawn = b.draw_below(count);
         b.set(&rest, drawn);
         Ok(())
     })?;
-    let chosen = Cell::new(b.integer(0));
-    b.within(
-        |b, found| {
-            for &(number, flag) in numbered {
-                let take = |b: &mut B| {
-                    let number = b.integer(number);
-                    b.set(&chosen, number);
-                    b.unless(rest.get(), found)?;
-                    let less = b.plus(rest.get(), -1);
-                    b.set(&rest, less);
-                    Ok(())
-                };
-                match flag {
-                    None => take(b)?,
-                    Some(flag) => b.when(flag, take)?,
-                }
+    let chosen = b.variable(0);
+    b.attempt(|b, found| {
+        for &(number, flag) in numbers {
+            let take = |b: &mut B| {
+                b.set(&chosen, number);
+                b.unless(rest.get(), found)?;
+                let less = b.plus(rest.get(), -1);
+                b.set(&rest, less);
+                Ok(())
+            };
+            match flag {
+                None => take(b)?,
+                Some(flag) => b.when(flag, take)?,
             }
-            Ok(())
-        },
-        |_| Ok(()),
-    )?;
+        }
+        Ok(())
+    })?;
     Ok(chosen.get())
+}
+
+/// Does something for one of all that compete, each of them in turn with the same chance so far:
+/// the last for which it is done has won.
+pub(in crate::stochastic) fn compete<B: Backend>(
+    b: &mut B,
+    competitors: &Cell<B::Integer>,
+    win: impl FnOnce(&mut B) -> Flow<B>,
+) -> Flow<B> {
+    let count = b.plus(competitors.get(), 1);
+    b.set(competitors, count);
+    let wins = b.variable(1);
+    let are_many = b.compare_to(count, Relation::Greater, 1);
+    b.when(are_many, |b| {
+        let drawn = b.draw_below(count);
+        let is_it = b.compare_to(drawn, Relation::Equal, 0);
+        b.set(&wins, is_it);
+        Ok(())
+    })?;
+    b.when(wins.get(), win)
 }
 
 /// The number of one of the legs of an entry that are enabled.
@@ -119,7 +136,7 @@ fn leg<B: Backend>(
     }
     let mut weights = Vec::with_capacity(legs.len());
     for leg in legs {
-        let flagged = Cell::new(b.real(0.0));
+        let flagged = b.real_variable(0.0);
         let one = b.integer(1);
         b.when(leg.flag.unwrap_or(one), |b| {
             let given = weight(b, program, leg.instance, 0)?;
@@ -129,7 +146,7 @@ fn leg<B: Backend>(
         weights.push(flagged.get());
     }
     let place = by_weight(b, legs[0].instance, &weights)?;
-    let chosen = Cell::new(b.integer(0));
+    let chosen = b.variable(0);
     b.cases(place, legs.len(), |b, place| {
         let number = b.integer(legs[place].number);
         b.set(&chosen, number);
@@ -168,11 +185,7 @@ fn weight<B: Backend>(
         return Ok(weight);
     }
     let stand = b.stand(mover.process as usize);
-    let (zero, infinity) = (b.real(0.0), b.real(f64::INFINITY));
-    for (relation, limit) in [(Relation::GreaterEqual, zero), (Relation::Less, infinity)] {
-        let is_weight = b.compare_reals(weight, relation, limit);
-        b.insist(is_weight, |_| Failure::Weight(stand, mover.id))?;
-    }
+    b.insist_on_range(weight, |_| Failure::Weight(stand, mover.id))?;
     Ok(weight)
 }
 
@@ -183,33 +196,29 @@ fn by_weight<B: Backend>(
     mover: &Instance<'_>,
     weights: &[B::Real],
 ) -> Flow<B, B::Integer> {
-    let (chosen, zero) = (Cell::new(b.integer(-1)), b.real(0.0));
-    let mut total = b.real(0.0);
+    let (chosen, mut total) = (b.variable(-1), b.real(0.0));
     for &weight in weights {
         total = b.add(total, weight);
     }
     let rest = Cell::new(b.draw_uniform(total));
-    b.within(
-        |b, found| {
-            for (place, &weight) in (0..).zip(weights) {
-                let is_possible = b.compare_reals(weight, Relation::Greater, zero);
-                b.when(is_possible, |b| {
-                    // The last one takes what rounding leaves.
-                    let place = b.integer(place);
-                    b.set(&chosen, place);
-                    let is_beyond = b.compare_reals(rest.get(), Relation::GreaterEqual, weight);
-                    b.unless(is_beyond, found)?;
-                    let less = b.subtract(rest.get(), weight);
-                    b.set_real(&rest, less);
-                    Ok(())
-                })?;
-            }
-            Ok(())
-        },
-        |_| Ok(()),
-    )?;
-    let (stand, none) = (b.stand(mover.process as usize), b.integer(0));
-    let is_some = b.compare(chosen.get(), Relation::GreaterEqual, none);
+    b.attempt(|b, found| {
+        for (place, &weight) in (0..).zip(weights) {
+            let is_possible = b.compare_real_to(weight, Relation::Greater, 0.0);
+            b.when(is_possible, |b| {
+                // The last one takes what rounding leaves.
+                let place = b.integer(place);
+                b.set(&chosen, place);
+                let is_beyond = b.compare_reals(rest.get(), Relation::GreaterEqual, weight);
+                b.unless(is_beyond, found)?;
+                let less = b.subtract(rest.get(), weight);
+                b.set_real(&rest, less);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    })?;
+    let stand = b.stand(mover.process as usize);
+    let is_some = b.compare_to(chosen.get(), Relation::GreaterEqual, 0);
     b.insist(is_some, |_| Failure::NoWeight(stand, mover.id))?;
     Ok(chosen.get())
 }

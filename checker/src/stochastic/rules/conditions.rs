@@ -27,6 +27,21 @@ impl<R> Span<R> {
     };
 }
 
+impl<R: Copy> Span<R> {
+    /// A variable that begins with its low end.
+    pub(super) fn begin<B: Backend<Real = R>>(self, b: &mut B) -> Cell<R> {
+        match self.low {
+            None => b.real_variable(0.0),
+            Some(low) => b.copy_of(low),
+        }
+    }
+
+    /// The moment so long after its low end.
+    pub(super) fn after<B: Backend<Real = R>>(self, b: &mut B, passed: R) -> R {
+        self.low.map_or(passed, |low| b.add(low, passed))
+    }
+}
+
 /// Goes on if a condition holds now, else leaves.
 pub(in crate::stochastic) fn require<B: Backend>(
     b: &mut B,
@@ -48,8 +63,7 @@ pub(in crate::stochastic) fn require<B: Backend>(
             for &(clock, relation, bound) in &comparisons.bounds {
                 let unclear = |b: &mut B| {
                     let gap = gap(b, clock, bound, values)?;
-                    let zero = b.real(0.0);
-                    let holds = b.compare_reals(gap, relation, zero);
+                    let holds = b.compare_real_to(gap, relation, 0.0);
                     b.unless(holds, otherwise)
                 };
                 if matches!(relation, Relation::LessEqual | Relation::GreaterEqual) {
@@ -124,7 +138,8 @@ fn gap<B: Backend>(b: &mut B, clock: u32, bound: Number, values: &[i32]) -> Flow
     Ok(gap.get())
 }
 
-fn size<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
+/// How far a number is from 0.
+pub(in crate::stochastic) fn size<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let negative = b.negate(value);
     b.greatest(value, negative)
 }
@@ -156,14 +171,14 @@ fn rated<B: Backend>(
             at_most(b, relation.swapped(), gap, slope, otherwise)
         }
         Relation::Equal => {
-            let (zero, infinity) = (b.real(0.0), b.real(f64::INFINITY));
-            let (low, high) = (Cell::new(b.real(0.0)), Cell::new(b.real(0.0)));
-            let is_equal = b.compare_reals(gap, Relation::Equal, zero);
+            let (low, high) = (b.real_variable(0.0), b.real_variable(0.0));
+            let is_equal = b.compare_real_to(gap, Relation::Equal, 0.0);
             b.choose(
                 is_equal,
                 |b| {
-                    let stands_still = b.compare_reals(slope, Relation::Equal, zero);
+                    let stands_still = b.compare_real_to(slope, Relation::Equal, 0.0);
                     b.when(stands_still, |b| {
+                        let infinity = b.real(f64::INFINITY);
                         b.set_real(&high, infinity);
                         Ok(())
                     })
@@ -171,9 +186,9 @@ fn rated<B: Backend>(
                 |b| {
                     let rest = b.negate(gap);
                     let moment = b.divide(rest, slope);
-                    let is_ahead = b.compare_reals(moment, Relation::Greater, zero);
+                    let is_ahead = b.compare_real_to(moment, Relation::Greater, 0.0);
                     b.unless(is_ahead, otherwise)?;
-                    let is_finite = b.compare_reals(moment, Relation::Less, infinity);
+                    let is_finite = b.compare_real_to(moment, Relation::Less, f64::INFINITY);
                     b.unless(is_finite, otherwise)?;
                     b.set_real(&low, moment);
                     b.set_real(&high, moment);
@@ -197,10 +212,9 @@ fn at_most<B: Backend>(
     slope: B::Real,
     otherwise: B::Exit,
 ) -> Flow<B, Span<B::Real>> {
-    let zero = b.real(0.0);
-    let (low, high) = (Cell::new(b.real(0.0)), Cell::new(b.real(f64::INFINITY)));
-    let holds = b.compare_reals(gap, relation, zero);
-    let rises = b.compare_reals(slope, Relation::Greater, zero);
+    let (low, high) = (b.real_variable(0.0), b.real_variable(f64::INFINITY));
+    let holds = b.compare_real_to(gap, relation, 0.0);
+    let rises = b.compare_real_to(slope, Relation::Greater, 0.0);
     b.choose(
         rises,
         |b| {
@@ -216,9 +230,9 @@ fn at_most<B: Backend>(
                 |_| Ok(()),
                 |b| {
                     // A NaN never holds.
-                    let falls = b.compare_reals(slope, Relation::Less, zero);
+                    let falls = b.compare_real_to(slope, Relation::Less, 0.0);
                     b.unless(falls, otherwise)?;
-                    let is_above = b.compare_reals(gap, Relation::GreaterEqual, zero);
+                    let is_above = b.compare_real_to(gap, Relation::GreaterEqual, 0.0);
                     b.unless(is_above, otherwise)?;
                     let fall = b.negate(slope);
                     let begin = b.divide(gap, fall);
@@ -241,26 +255,27 @@ fn compared<B: Backend>(
     gap: B::Real,
     otherwise: B::Exit,
 ) -> Flow<B, Span<B::Real>> {
-    let zero = b.real(0.0);
     let rest = b.negate(gap);
     match relation {
         Relation::LessEqual | Relation::Less => {
-            let holds = b.compare_reals(gap, relation, zero);
+            let holds = b.compare_real_to(gap, relation, 0.0);
             b.unless(holds, otherwise)?;
             Ok(Span {
                 low: None,
                 high: Some(rest),
             })
         }
-        Relation::GreaterEqual | Relation::Greater => Ok(Span {
-            low: Some(b.greatest(rest, zero)),
-            high: None,
-        }),
+        Relation::GreaterEqual | Relation::Greater => {
+            let zero = b.real(0.0);
+            Ok(Span {
+                low: Some(b.greatest(rest, zero)),
+                high: None,
+            })
+        }
         Relation::Equal => {
-            let is_ahead = b.compare_reals(rest, Relation::GreaterEqual, zero);
+            let is_ahead = b.compare_real_to(rest, Relation::GreaterEqual, 0.0);
             b.unless(is_ahead, otherwise)?;
-            let infinity = b.real(f64::INFINITY);
-            let is_finite = b.compare_reals(rest, Relation::Less, infinity);
+            let is_finite = b.compare_real_to(rest, Relation::Less, f64::INFINITY);
             b.unless(is_finite, otherwise)?;
             Ok(Span {
                 low: Some(rest),
@@ -290,8 +305,7 @@ fn both<B: Backend>(
         return Ok(Span { low, high });
     };
     let is_beyond = b.compare_reals(low, Relation::Greater, high);
-    let end = Cell::new(b.real(0.0));
-    b.set_real(&end, high);
+    let end = b.copy_of(high);
     b.when(is_beyond, |b| {
         // Two moments that are the same but for rounding.
         let past = b.subtract(low, high);

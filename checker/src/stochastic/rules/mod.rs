@@ -15,7 +15,7 @@ mod plans;
 mod windows;
 
 pub(super) use backend::{Backend, Flow};
-pub(super) use choices::{Candidate, branch, one_of};
-pub(super) use conditions::{number, require, span};
-pub(super) use plans::{exponential_rate, plan, require_invariant, stay, tolerant};
+pub(super) use choices::{Candidate, branch, compete, draw, one_of};
+pub(super) use conditions::{number, require, size, span};
+pub(super) use plans::{exponential_rate, is_any_enabled, plan, require_invariant, stay, tolerant};
 pub(super) use windows::delay_in_windows;

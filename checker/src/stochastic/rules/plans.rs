@@ -21,8 +21,7 @@ struct Bound<R> {
 impl<R: Copy> Bound<R> {
     /// Whether the process may not stay for ever.
     fn has_end<B: Backend<Real = R>>(self, b: &mut B) -> B::Integer {
-        let infinity = b.real(f64::INFINITY);
-        b.compare_reals(self.end, Relation::Less, infinity)
+        b.compare_real_to(self.end, Relation::Less, f64::INFINITY)
     }
 }
 
@@ -102,8 +101,7 @@ fn bound<B: Backend>(
         |b, broken| {
             let span = span(b, program, spot.invariant, &[], broken)?;
             if let Some(low) = span.low {
-                let zero = b.real(0.0);
-                let holds_now = b.compare_reals(low, Relation::LessEqual, zero);
+                let holds_now = b.compare_real_to(low, Relation::LessEqual, 0.0);
                 b.unless(holds_now, broken)?;
             }
             low.set(span.low);
@@ -142,8 +140,7 @@ pub(in crate::stochastic) fn require_invariant<B: Backend>(
     )
 }
 
-/// Goes on if an output of a process is enabled, else leaves. All guards are computed, for each may
-/// fail.
+/// Goes on if an output of a process is enabled, else leaves.
 fn require_some_output<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -160,34 +157,29 @@ fn require_some_output<B: Backend>(
     if let [only] = outputs {
         return require(b, program, only.guard, &only.values, never);
     }
-    let some = Cell::new(b.integer(0));
-    for output in outputs {
-        when_enabled(b, program, output, |b| {
-            let one = b.integer(1);
-            b.set(&some, one);
-            Ok(())
-        })?;
-    }
+    let is_some = is_any_enabled(b, program, outputs)?;
     if is_certain {
         return Ok(());
     }
-    b.unless(some.get(), never)
+    b.unless(is_some, never)
 }
 
-/// Does something only if the guard of an instance holds.
-fn when_enabled<B: Backend>(
+/// Whether one of some instances is enabled. All guards are computed, for each may fail.
+pub(in crate::stochastic) fn is_any_enabled<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
-    instance: &Instance<'_>,
-    then: impl FnOnce(&mut B) -> Flow<B>,
-) -> Flow<B> {
-    b.within(
-        |b, next| {
-            require(b, program, instance.guard, &instance.values, next)?;
-            then(b)
-        },
-        |_| Ok(()),
-    )
+    instances: &[Instance<'_>],
+) -> Flow<B, B::Integer> {
+    let some = b.variable(0);
+    for one in instances {
+        b.attempt(|b, next| {
+            require(b, program, one.guard, &one.values, next)?;
+            let yes = b.integer(1);
+            b.set(&some, yes);
+            Ok(())
+        })?;
+    }
+    Ok(some.get())
 }
 
 /// A process that plans in a location where time may pass.
@@ -268,15 +260,11 @@ impl<R: Copy> Planning<'_, '_, R> {
             self.end_in_time(b, moment);
             return Ok(());
         }
-        let moment = Cell::new(b.real(0.0));
-        if let Some(low) = window.low {
-            b.set_real(&moment, low);
-        }
-        let zero = b.real(0.0);
-        let has_length = b.compare_reals(length, Relation::Greater, zero);
+        let moment = window.begin(b);
+        let has_length = b.compare_real_to(length, Relation::Greater, 0.0);
         b.when(has_length, |b| {
             let passed = b.draw_uniform(length);
-            let at = window.low.map_or(passed, |low| b.add(low, passed));
+            let at = window.after(b, passed);
             b.set_real(&moment, at);
             Ok(())
         })?;
@@ -296,21 +284,17 @@ impl<R: Copy> Planning<'_, '_, R> {
         };
         let Some(length) = length.filter(|_| !self.spot.is_plain) else {
             let passed = b.draw_exponential(rate);
-            let moment = window.low.map_or(passed, |low| b.add(low, passed));
+            let moment = window.after(b, passed);
             self.end_in_time(b, moment);
             return Ok(());
         };
-        let zero = b.real(0.0);
-        let has_length = b.compare_reals(length, Relation::NotEqual, zero);
-        let moment = Cell::new(b.real(0.0));
-        if let Some(low) = window.low {
-            b.set_real(&moment, low);
-        }
+        let has_length = b.compare_real_to(length, Relation::NotEqual, 0.0);
+        let moment = window.begin(b);
         b.when(has_length, |b| {
             let passed = b.draw_exponential(rate);
             let is_inside = b.compare_reals(passed, Relation::LessEqual, length);
             b.unless(is_inside, never)?;
-            let at = window.low.map_or(passed, |low| b.add(low, passed));
+            let at = window.after(b, passed);
             b.set_real(&moment, at);
             Ok(())
         })?;
@@ -327,24 +311,20 @@ impl<R: Copy> Planning<'_, '_, R> {
             let window = span(b, self.program, only.guard, &only.values, never)?;
             return self.in_window(b, window, never);
         }
-        let moment = Cell::new(b.real(f64::INFINITY));
+        let moment = b.real_variable(f64::INFINITY);
         let is_drawn = outputs.iter().any(|output| !output.may_be_urgent);
         if is_drawn {
             let none = b.integer(0);
             b.set_window_count(none);
         }
         for output in outputs {
-            b.within(
-                |b, next| self.add_window(b, output, &moment, next),
-                |_| Ok(()),
-            )?;
+            b.attempt(|b, next| self.add_window(b, output, &moment, next))?;
         }
         if is_drawn {
             let windows = b.window_count();
             b.when(windows, |b| self.draw_in_windows(b, &moment))?;
         }
-        let infinity = b.real(f64::INFINITY);
-        let comes = b.compare_reals(moment.get(), Relation::Less, infinity);
+        let comes = b.compare_real_to(moment.get(), Relation::Less, f64::INFINITY);
         b.unless(comes, never)?;
         let Some(bound) = self.bound else {
             self.end_in_time(b, moment.get());
@@ -404,12 +384,11 @@ impl<R: Copy> Planning<'_, '_, R> {
             Ok(())
         };
         let by_rate = |b: &mut B| {
-            b.within(
+            b.attempt(
                 |b, never| match exponential_rate(b, self.process, self.spot, never)? {
                     None => Ok(()),
                     rate => draw(b, rate),
                 },
-                |_| Ok(()),
             )
         };
         match self.bound {
@@ -442,12 +421,8 @@ pub(in crate::stochastic) fn exponential_rate<B: Backend>(
     }
     let rate = number(b, known, &[])?;
     if !matches!(known, Number::Known(rate) if rate > 0.0 && rate.is_finite()) {
-        let (zero, infinity) = (b.real(0.0), b.real(f64::INFINITY));
-        for (relation, limit) in [(Relation::GreaterEqual, zero), (Relation::Less, infinity)] {
-            let is_rate = b.compare_reals(rate, relation, limit);
-            b.insist(is_rate, |b| Failure::Rate(stand, b.shown(rate)))?;
-        }
-        let is_positive = b.compare_reals(rate, Relation::Greater, zero);
+        b.insist_on_range(rate, |b| Failure::Rate(stand, b.shown(rate)))?;
+        let is_positive = b.compare_real_to(rate, Relation::Greater, 0.0);
         b.unless(is_positive, never)?;
     }
     Ok(Some(rate))

@@ -15,9 +15,8 @@ pub(in crate::stochastic) fn delay_in_windows<B: Backend>(
     sort(b)?;
     join(b)?;
     let length = length(b)?;
-    let (delay, passed) = (Cell::new(b.real(0.0)), Cell::new(b.real(0.0)));
-    let zero = b.real(0.0);
-    let has_length = b.compare_reals(length, Relation::Greater, zero);
+    let (delay, passed) = (b.real_variable(0.0), b.real_variable(0.0));
+    let has_length = b.compare_real_to(length, Relation::Greater, 0.0);
     b.choose(
         has_length,
         |b| {
@@ -38,10 +37,10 @@ pub(in crate::stochastic) fn delay_in_windows<B: Backend>(
         },
         |b| {
             // All are moments.
-            let chosen = Cell::new(b.integer(0));
+            let chosen = b.variable(0);
             b.when(is_uniform, |b| {
-                let (count, one) = (b.window_count(), b.integer(1));
-                let are_many = b.compare(count, Relation::Greater, one);
+                let count = b.window_count();
+                let are_many = b.compare_to(count, Relation::Greater, 1);
                 b.when(are_many, |b| {
                     let drawn = b.draw_below(count);
                     b.set(&chosen, drawn);
@@ -58,33 +57,27 @@ pub(in crate::stochastic) fn delay_in_windows<B: Backend>(
 
 /// Sorts windows by their low ends.
 fn sort<B: Backend>(b: &mut B) -> Flow<B> {
-    let (number, count) = (Cell::new(b.integer(1)), b.window_count());
+    let (number, count) = (b.variable(1), b.window_count());
     b.repeat(
         |b| b.compare(number.get(), Relation::Less, count),
         |b| {
             let (low, high) = b.window(number.get());
-            let free = Cell::new(b.integer(0));
+            let free = b.variable(0);
             b.set(&free, number.get());
-            b.within(
-                |b, out| {
-                    b.repeat(
-                        |b| {
-                            let zero = b.integer(0);
-                            b.compare(free.get(), Relation::Greater, zero)
-                        },
-                        |b| {
-                            let before = b.plus(free.get(), -1);
-                            let (its_low, its_high) = b.window(before);
-                            let is_after = b.compare_reals(its_low, Relation::Greater, low);
-                            b.unless(is_after, out)?;
-                            b.set_window(free.get(), its_low, its_high);
-                            b.set(&free, before);
-                            Ok(())
-                        },
-                    )
-                },
-                |_| Ok(()),
-            )?;
+            b.attempt(|b, out| {
+                b.repeat(
+                    |b| b.compare_to(free.get(), Relation::Greater, 0),
+                    |b| {
+                        let before = b.plus(free.get(), -1);
+                        let (its_low, its_high) = b.window(before);
+                        let is_after = b.compare_reals(its_low, Relation::Greater, low);
+                        b.unless(is_after, out)?;
+                        b.set_window(free.get(), its_low, its_high);
+                        b.set(&free, before);
+                        Ok(())
+                    },
+                )
+            })?;
             b.set_window(free.get(), low, high);
             count_up(b, &number);
             Ok(())
@@ -94,7 +87,7 @@ fn sort<B: Backend>(b: &mut B) -> Flow<B> {
 
 /// Joins windows that touch.
 fn join<B: Backend>(b: &mut B) -> Flow<B> {
-    let (last, number) = (Cell::new(b.integer(0)), Cell::new(b.integer(1)));
+    let (last, number) = (b.variable(0), b.variable(1));
     let count = b.window_count();
     b.repeat(
         |b| b.compare(number.get(), Relation::Less, count),
@@ -126,7 +119,7 @@ fn join<B: Backend>(b: &mut B) -> Flow<B> {
 
 /// How long all windows are together.
 fn length<B: Backend>(b: &mut B) -> Flow<B, B::Real> {
-    let (length, number) = (Cell::new(b.real(0.0)), Cell::new(b.integer(0)));
+    let (length, number) = (b.real_variable(0.0), b.variable(0));
     let count = b.window_count();
     b.repeat(
         |b| b.compare(number.get(), Relation::Less, count),
@@ -144,36 +137,33 @@ fn length<B: Backend>(b: &mut B) -> Flow<B, B::Real> {
 
 /// Sets the delay to the time at which this much of the windows has passed.
 fn pass<B: Backend>(b: &mut B, passed: &Cell<B::Real>, delay: &Cell<B::Real>) -> Flow<B> {
-    let (number, count) = (Cell::new(b.integer(0)), b.window_count());
+    let (number, count) = (b.variable(0), b.window_count());
     let infinity = b.real(f64::INFINITY);
     b.set_real(delay, infinity);
-    b.within(
-        |b, inside| {
-            b.repeat(
-                |b| b.compare(number.get(), Relation::Less, count),
-                |b| {
-                    let (low, high) = b.window(number.get());
-                    let part = b.subtract(high, low);
-                    let is_beyond = b.compare_reals(passed.get(), Relation::Greater, part);
-                    b.choose(
-                        is_beyond,
-                        |b| {
-                            let rest = b.subtract(passed.get(), part);
-                            b.set_real(passed, rest);
-                            count_up(b, &number);
-                            Ok(())
-                        },
-                        |b| {
-                            let moment = b.add(low, passed.get());
-                            b.set_real(delay, moment);
-                            b.leave(inside)
-                        },
-                    )
-                },
-            )
-        },
-        |_| Ok(()),
-    )
+    b.attempt(|b, inside| {
+        b.repeat(
+            |b| b.compare(number.get(), Relation::Less, count),
+            |b| {
+                let (low, high) = b.window(number.get());
+                let part = b.subtract(high, low);
+                let is_beyond = b.compare_reals(passed.get(), Relation::Greater, part);
+                b.choose(
+                    is_beyond,
+                    |b| {
+                        let rest = b.subtract(passed.get(), part);
+                        b.set_real(passed, rest);
+                        count_up(b, &number);
+                        Ok(())
+                    },
+                    |b| {
+                        let moment = b.add(low, passed.get());
+                        b.set_real(delay, moment);
+                        b.leave(inside)
+                    },
+                )
+            },
+        )
+    })
 }
 
 fn count_up<B: Backend>(b: &mut B, number: &Cell<B::Integer>) {
