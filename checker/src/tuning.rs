@@ -78,8 +78,6 @@ parts! {
     full_backward: "Explore the whole graph first where all of it is to be computed.";
     exact_first: "Try games that compare two clocks without abstraction first.";
     // Code.
-    unrolling: "Write out loops of few rounds.";
-    value_numbering: "Compute equal values once.";
     compiled_runs: "Compile whole random runs once many moves were made.";
     interpret_first: "Compile functions only once they have run for a while.";
 }

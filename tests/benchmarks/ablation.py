@@ -110,8 +110,6 @@ PARTS = {
     "delayed_zones": Part("game"),
     "full_backward": Part("game", ("game/backward/full_backward.rs",)),
     "exact_first": Part("game"),
-    "unrolling": Part("both", ("exec/optimise/unroll.rs",)),
-    "value_numbering": Part("both", ("exec/optimise/numbering",)),
     "compiled_runs": Part("runs", ("stochastic/race_code",)),
     "interpret_first": Part("both", ("exec/jit/needs.rs",)),
 }

@@ -1,7 +1,7 @@
 //! The functions that the language defines, in one table: name, types and code of each.
 //!
 //! The parser (which names are taken), the checker (names, types, folding of constants), the
-//! interpreter, the optimiser and compiled code all read this table. A new function is one row in
+//! interpreter and compiled code all read this table. A new function is one row in
 //! the table of [`MathFunction`], and its code in `library.rs`. The kind of its code gives its
 //! types, and what may go wrong: only a code that gives an [`IntegerResult`] can wrap round or have
 //! no result. The random functions are the table of [`Distribution`].

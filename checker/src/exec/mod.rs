@@ -13,7 +13,6 @@ mod rounds;
 mod wraps;
 
 mod interpreter;
-mod optimise;
 
 mod validate;
 
@@ -26,8 +25,6 @@ pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]
 pub use jit::{Jit, JitError};
 pub use libraries::{Libraries, call_hook};
-pub use optimise::optimise;
-pub(crate) use optimise::simplified;
 pub use rounds::ROUND_LIMIT;
 pub use validate::{Flaw, validate};
 pub use wraps::Wraps;

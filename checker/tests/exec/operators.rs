@@ -114,7 +114,7 @@ fn check_integer(operator: IntegerOperator, cases: &[(i32, i32, Result<i32, Kind
             Some(2),
             &expected.map(|value| (value, vec![0; 4])),
         );
-        // The same with operands that an optimiser knows.
+        // The same with operands that are written in the code.
         let constants = [(0, left), (1, right)].map(|(target, value)| Instruction::Integer {
             target: Register(target),
             value,

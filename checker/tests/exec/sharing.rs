@@ -88,7 +88,6 @@ fn quotient(value: f64) -> Function {
     };
     let code = vec![
         double(1, value),
-        // The argument keeps the optimiser from computing the quotient.
         Instruction::IntegerToDouble {
             target: Register(2),
             source: Register(0),
@@ -131,7 +130,7 @@ fn reader() -> Function {
     straight_line(1, &[Integer; 3], code, Some(2))
 }
 
-/// Adds a constant, which the optimiser reads: then the function is that of an [`adder`].
+/// Adds a constant.
 fn adder_of_constant(offset: u32) -> Function {
     let load = Instruction::LoadInteger {
         target: Register(1),

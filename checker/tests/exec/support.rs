@@ -1,7 +1,7 @@
 //! Engines side by side, and a short way to write code.
 
 use checker::exec::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError, optimise,
+    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
 };
 use checker::ir::{
     Address, Base, Block, Function, FunctionId, Instruction, Overflow, Register, RegisterType,
@@ -32,15 +32,9 @@ pub(crate) fn engines(
     constants: &[i32],
     overflow: Overflow,
 ) -> Vec<(&'static str, Box<dyn Executor>)> {
-    let interpreter =
-        |functions: &[Function]| Interpreter::new(functions, constants).with_overflow(overflow);
-    let (optimised, interpreter) = (
-        interpreter(&optimise(functions, constants)),
-        interpreter(functions),
-    );
+    let interpreter = Interpreter::new(functions, constants).with_overflow(overflow);
     vec![
         ("interpreter", Box::new(interpreter)),
-        ("optimised code", Box::new(optimised)),
         #[cfg(feature = "jit")]
         (
             "compiled code",

@@ -1,8 +1,8 @@
 //! Makes native code of the functions of one engine on demand.
 //!
-//! Functions are optimised, and compiled together with everything they call that is not compiled
-//! yet, unless another engine has compiled an equal one ([`Pool`]). Calls go to absolute addresses,
-//! since code that is compiled late may lie anywhere.
+//! Functions are compiled together with everything they call that is not compiled yet, unless
+//! another engine has compiled an equal one ([`Pool`]). Calls go to absolute addresses, since code
+//! that is compiled late may lie anywhere.
 //!
 //! Cost: some 10 to 50 µs, and then about 1 µs an instruction.
 
@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex};
 
 use cranelift_module::FuncId;
 
-use crate::ir::{Constants, Function, FunctionId, Overflow, RegisterType};
+use crate::ir::{Function, FunctionId, Overflow, RegisterType};
 use crate::tuning::Tuning;
 
 use super::error::JitError;
@@ -33,8 +33,7 @@ pub(super) struct Compiler {
     overflow: Overflow,
     tuning: Tuning,
     functions: Vec<Function>,
-    constants: Constants,
-    /// What the functions need before they are optimised.
+    /// What the functions need.
     needs: AllNeeds,
     /// The numbers in the pool of the functions that are compiled.
     numbers: Vec<Option<FuncId>>,
@@ -49,20 +48,17 @@ impl Compiler {
             overflow,
             tuning,
             functions: Vec::new(),
-            constants: Constants::default(),
             needs: AllNeeds::default(),
             numbers: Vec::new(),
             compiled: 0,
         })
     }
 
-    /// Takes over what was appended since: both arguments are the whole of it, and begin with what
-    /// was given before.
-    pub(super) fn extend(&mut self, functions: &[Function], constants: &Constants) {
+    /// Takes over the functions that were appended since, of all functions.
+    pub(super) fn extend(&mut self, functions: &[Function]) {
         let known = self.functions.len();
         self.functions.extend_from_slice(&functions[known..]);
         self.numbers.resize(functions.len(), None);
-        self.constants = constants.clone();
     }
 
     /// What it does where results do not fit, and which heuristics it uses.
@@ -70,8 +66,8 @@ impl Compiler {
         (self.overflow, self.tuning)
     }
 
-    /// How many instructions were compiled so far, counted after optimisation; those that another
-    /// engine had compiled do not count.
+    /// How many instructions were compiled so far; those that another engine had compiled do not
+    /// count.
     pub(super) fn compiled(&self) -> usize {
         self.compiled
     }
@@ -113,14 +109,9 @@ impl Compiler {
         let mut pool = locked(&self.pool);
         let before = pool.instructions();
         for index in self.uncompiled_below(root) {
-            let key = Key::new(
-                &self.functions[index],
-                &self.numbers,
-                self.overflow,
-                self.tuning,
-            );
-            let number = match pool.known(&key, &self.constants) {
-                None if compiles => pool.compiled(key, &self.constants)?,
+            let key = Key::new(&self.functions[index], &self.numbers, self.overflow);
+            let number = match pool.known(&key) {
+                None if compiles => pool.compiled(key)?,
                 known => known,
             };
             if number.is_none() {

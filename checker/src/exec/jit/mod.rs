@@ -1,7 +1,7 @@
 //! Native code by Cranelift: the fast engine.
 //!
 //! Functions that loop much are compiled before their first call ([`Jit::prepare`]). Any other
-//! function is interpreted until it has run for a while, and then optimised and compiled with all
+//! function is interpreted until it has run for a while, and then compiled with all
 //! that it calls; or once only, if another engine has compiled an equal one. A model with thousands
 //! of small guards pays for the few that matter, and a model that is solved at once for none. As
 //! interpreted and compiled code agree in everything, it makes no difference to results when this
@@ -148,7 +148,7 @@ impl Jit {
         self.compiler
             .get_mut()
             .unwrap_or_else(std::sync::PoisonError::into_inner)
-            .extend(functions, &constants);
+            .extend(functions);
         self.interpreter.extend(functions, &constants);
         self.constants = constants;
         Ok(())

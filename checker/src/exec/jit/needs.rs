@@ -41,7 +41,7 @@ impl Needs {
         self.work > HEAVY_WORK
     }
 
-    /// The needs of two functions of which one runs after the other.
+    /// What one function needs, and then another.
     pub(super) fn then(self, other: Needs) -> Needs {
         Needs {
             frame_words: self.frame_words.max(other.frame_words),

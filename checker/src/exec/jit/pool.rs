@@ -6,14 +6,12 @@
 //!
 //! Invariants
 //! * Functions share native code only if all that it depends on is equal: registers, frame, all
-//!   instructions bit by bit, the code of what they call, the rule for overflows, which heuristics
-//!   are used, and the words of constant memory that the optimiser has read. Else, constant memory
-//!   and states are reached through the context and the arguments of a call.
+//!   instructions bit by bit, the code of what they call, and the rule for overflows. Constant
+//!   memory and states are reached through the context and the arguments of a call.
 //! * Code is never moved or freed while an engine holds its pool, which it keeps for life.
 //! * What a function calls is compiled before it.
 //!
-//! Cost: of a function that is known, that of comparing it as it was given: it is not optimised
-//! again.
+//! Cost: of a function that is known, that of comparing it as it was given.
 
 use std::collections::HashMap;
 use std::mem::ManuallyDrop;
@@ -26,9 +24,8 @@ use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Module, default_libcall_names};
 
-use crate::exec::optimise::optimised;
+use crate::exec::rounds::count_rounds;
 use crate::ir::{Function, FunctionId, Instruction, Overflow};
-use crate::tuning::Tuning;
 
 use super::error::JitError;
 use super::needs::Needs;
@@ -47,10 +44,8 @@ pub(super) struct Pool {
     convention: CallConv,
     context: Context,
     builder_context: FunctionBuilderContext,
-    /// By function as it was given: what was made of it, the last first to be tried.
-    known: HashMap<Key, Vec<Known>>,
-    /// By optimised function: its number. Functions that differ may become equal.
-    optimised: HashMap<Key, FuncId>,
+    /// By function as it was given: its number.
+    known: HashMap<Key, FuncId>,
     /// What the functions need, with all that they call.
     needs: HashMap<FuncId, Needs>,
     /// The entries of functions with parameters.
@@ -65,19 +60,13 @@ pub(super) struct Pool {
 #[derive(PartialEq, Eq, Hash)]
 pub(super) struct Key {
     overflow: Overflow,
-    tuning: Tuning,
     /// Without its name; it calls functions by their numbers in the pool.
     function: Function,
 }
 
 impl Key {
     /// That of a function, given the numbers in the pool of what it calls.
-    pub(super) fn new(
-        function: &Function,
-        numbers: &[Option<FuncId>],
-        overflow: Overflow,
-        tuning: Tuning,
-    ) -> Key {
+    pub(super) fn new(function: &Function, numbers: &[Option<FuncId>], overflow: Overflow) -> Key {
         let mut function = Function {
             name: String::new(),
             registers: function.registers.clone(),
@@ -93,19 +82,8 @@ impl Key {
                 }
             }
         }
-        Key {
-            overflow,
-            tuning,
-            function,
-        }
+        Key { overflow, function }
     }
-}
-
-/// What was made of a function.
-struct Known {
-    /// The words of constant memory that it depends on.
-    read: Vec<(u32, i32)>,
-    id: FuncId,
 }
 
 impl Pool {
@@ -136,8 +114,8 @@ impl Pool {
             "false"
         };
         for (name, value) in [
-            // The code is optimised already: doing it again takes as long as all the rest and gains
-            // nothing.
+            // Optimising takes as long as all the rest, and what it gains is less on all members of
+            // the benchmarks.
             ("opt_level", "none"),
             ("enable_verifier", verify),
             ("is_pic", "false"),
@@ -157,7 +135,6 @@ impl Pool {
             convention,
             builder_context: FunctionBuilderContext::new(),
             known: HashMap::new(),
-            optimised: HashMap::new(),
             needs: HashMap::new(),
             entries: HashMap::new(),
             instructions: 0,
@@ -171,21 +148,16 @@ impl Pool {
     }
 
     /// The number of a function in the pool, if it is known.
-    pub(super) fn known(&self, key: &Key, constants: &[i32]) -> Option<FuncId> {
-        let has = |&(offset, word): &(u32, i32)| constants.get(offset as usize) == Some(&word);
-        let mut known = self.known.get(key)?.iter().rev();
-        known.find(|one| one.read.iter().all(has)).map(|one| one.id)
+    pub(super) fn known(&self, key: &Key) -> Option<FuncId> {
+        self.known.get(key).copied()
     }
 
     /// Compiles a function that is not known; `None` if it is too large.
     ///
     /// Its code has an address only after [`Pool::address_of`].
-    pub(super) fn compiled(
-        &mut self,
-        key: Key,
-        constants: &[i32],
-    ) -> Result<Option<FuncId>, JitError> {
-        let (function, read) = optimised(key.function.clone(), constants, key.tuning);
+    pub(super) fn compiled(&mut self, key: Key) -> Result<Option<FuncId>, JitError> {
+        let mut function = key.function.clone();
+        count_rounds(&mut function);
         let calls = function
             .callees()
             .map(|callee| self.needs_of(FuncId::from_u32(callee.0)));
@@ -193,18 +165,11 @@ impl Pool {
         if !needs.are_modest() {
             return Ok(None);
         }
-        let made = Key { function, ..key };
-        let id = if let Some(&id) = self.optimised.get(&made) {
-            id
-        } else {
-            let defined = self.define(&made);
-            self.is_broken |= defined.is_err();
-            let id = defined?;
-            self.optimised.insert(made, id);
-            self.needs.insert(id, needs);
-            id
-        };
-        self.known.entry(key).or_default().push(Known { read, id });
+        let defined = self.define(&function, key.overflow);
+        self.is_broken |= defined.is_err();
+        let id = defined?;
+        self.needs.insert(id, needs);
+        self.known.insert(key, id);
         Ok(Some(id))
     }
 
@@ -235,8 +200,7 @@ impl Pool {
         Ok(self.module.get_finalized_function(id))
     }
 
-    fn define(&mut self, key: &Key) -> Result<FuncId, JitError> {
-        let function = &key.function;
+    fn define(&mut self, function: &Function, overflow: Overflow) -> Result<FuncId, JitError> {
         let signature = native_signature(function, self.convention);
         let id = self
             .module
@@ -253,7 +217,7 @@ impl Pool {
         let mut import = |FunctionId(callee): FunctionId, native: &mut ir::Function| {
             import_function(&mut self.module, FuncId::from_u32(callee), native)
         };
-        translate(builder, function, &mut import, config, key.overflow);
+        translate(builder, function, &mut import, config, overflow);
         self.finish(id)?;
         Ok(id)
     }

@@ -1,7 +1,7 @@
 //! Takes the code of small functions into those that call them.
 //!
-//! The optimiser of the engine leaves calls as they are, for it gains nothing in symbolic queries.
-//! In a race a guard or an update is often cheaper than its call.
+//! In a race a guard or an update is often cheaper than its call; symbolic queries gain nothing by
+//! it.
 
 use rustc_hash::FxHashMap;
 

@@ -9,7 +9,7 @@ use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
 use crate::analysis::function_reads::read_words;
 use crate::cancellation;
 use crate::exec::arithmetic::{double_of_words, double_words};
-use crate::exec::{Context, Executor, simplified};
+use crate::exec::{Context, Executor};
 use crate::ir::{
     Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
 };
@@ -68,8 +68,6 @@ impl WrittenRace {
         let mut instructions = 0;
         let mut add = |function: Function, largest: usize| {
             let function = inlined(function, &functions, (largest, MOST_TAKEN_IN));
-            // In a large function the optimiser would not see what it sees in this one.
-            let function = simplified(function, &network.constants);
             instructions += size_of(&function);
             functions.push(function);
             let id = FunctionId(functions.len() as u32 - 1);
