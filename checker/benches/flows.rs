@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use checker::exec::Jit;
 use checker::ir::Statistical;
-use checker::stochastic::Runner;
+use checker::stochastic::{RunId, Runner};
 
 use statistical::{DEVIATIONS, Measured, load};
 use support::Scratch;
@@ -191,7 +191,7 @@ fn run(case: &Case, runs: u64) -> Result<(Measured, f64), Box<dyn Error>> {
     let begin = Instant::now();
     for run in 0..runs {
         let outcome = runner
-            .path((1, run), bound, path)
+            .path(RunId { seed: 1, run }, bound, path)
             .map_err(|failure| format!("{}: run {run} fails: {failure:?}", case.name))?;
         satisfied += u64::from(outcome.satisfied);
         moves += outcome.moves;

@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use checker::exec::{Executor, Jit};
 use checker::ir::{Network, Statistical};
-use checker::stochastic::{Precision, Runner, estimate};
+use checker::stochastic::{Precision, RunId, Runner, estimate};
 
 use statistical::{DEVIATIONS, Measured, load};
 use support::Scratch;
@@ -234,7 +234,7 @@ fn counted_moves(network: &Network, executor: &dyn Executor, query: &Statistical
     let mut runner = Runner::new(network, executor);
     let (mut sum, mut squares) = (0.0, 0.0);
     for run in 0..COUNTED_RUNS {
-        let outcome = runner.path((0, run), bound, path);
+        let outcome = runner.path(RunId { seed: 0, run }, bound, path);
         let moves = outcome
             .expect("the runs of the benchmark do not fail")
             .moves as f64;

@@ -200,7 +200,8 @@ impl<'a> Advice<'a> {
     /// allowed, or one of the environment. The strategy may name moves by the sender alone.
     pub(super) fn allows_broadcast(
         &self,
-        (sender, is_alone): (Entry, bool),
+        sender: Entry,
+        is_alone: bool,
         receivers: &[Ready],
         ahead: f64,
         view: View,

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
-use super::run::Runner;
+use super::run::{RunId, Runner};
 use super::run_watch::{RunWatch, Shown, Shows};
 use crate::cancellation;
 use crate::ir::{Path, RunBound, Statistical};
@@ -183,9 +183,19 @@ pub fn block(
     let mut runner = Runner::of(behaviour);
     match query {
         Statistical::Comparison { left, right, .. } => written(numbers, |pair| {
-            pair_of_runs(&mut runner, [left, right], (seed, pair))
+            pair_of_runs(
+                &mut runner,
+                left,
+                right,
+                RunId {
+                    seed,
+                    run: 2 * pair,
+                },
+            )
         }),
-        query => written(numbers, |run| shown(&mut runner, query, (seed, run))),
+        query => written(numbers, |run| {
+            shown(&mut runner, query, RunId { seed, run })
+        }),
     }
 }
 
@@ -214,7 +224,7 @@ fn written<T: Transferred>(
 pub(super) fn shown(
     runner: &mut Runner<'_>,
     query: &Statistical,
-    run: (u64, u64),
+    run: RunId,
 ) -> Result<Shown, Failure> {
     match query {
         Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
@@ -238,14 +248,19 @@ pub(super) fn shown(
     }
 }
 
-/// Whether the two runs of a pair have what is asked: runs 2k and 2k + 1 are pair k.
+/// Whether a run and the next one have what is asked of the two runs of a pair.
 pub(super) fn pair_of_runs(
     runner: &mut Runner<'_>,
-    [left, right]: [&(RunBound, Path); 2],
-    (seed, pair): (u64, u64),
+    left: &(RunBound, Path),
+    right: &(RunBound, Path),
+    first: RunId,
 ) -> Result<(bool, bool), Failure> {
-    let first = runner.path((seed, 2 * pair), &left.0, &left.1)?;
-    let second = runner.path((seed, 2 * pair + 1), &right.0, &right.1)?;
+    let next = RunId {
+        run: first.run + 1,
+        ..first
+    };
+    let first = runner.path(first, &left.0, &left.1)?;
+    let second = runner.path(next, &right.0, &right.1)?;
     Ok((first.satisfied, second.satisfied))
 }
 
@@ -253,7 +268,8 @@ pub(super) fn pair_of_runs(
 /// from a source, which is told how many are needed at most.
 pub(super) fn from_anywhere<T: Transferred + Shows + Send>(
     runs: Runs<'_>,
-    (threads, most): (usize, Option<u64>),
+    threads: usize,
+    most: Option<u64>,
     run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
     mut consume: impl FnMut(T) -> bool,
     watch: &mut dyn RunWatch,

@@ -6,6 +6,7 @@ use super::behaviour::Behaviour;
 use super::blocks::{Runs, from_anywhere, shown};
 use super::failure::Failure;
 use super::precision::{Estimate, MeanMethod, Precision};
+use super::run::RunId;
 use super::run_watch::{Ends, RunWatch, Shown};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,
@@ -282,8 +283,12 @@ pub fn estimate_watched<'a>(
     };
     let is_complete = from_anywhere(
         runs.into(),
-        (precision.threads, most),
-        |runner, run| shown(runner, query, (precision.seed, run)),
+        precision.threads,
+        most,
+        |runner, run| {
+            let seed = precision.seed;
+            shown(runner, query, RunId { seed, run })
+        },
         |shown| match shown {
             Shown::Decided { satisfied, .. } => push(f64::from(satisfied)),
             Shown::Value(value) => push(value),

@@ -4,8 +4,9 @@ use super::blocks::{Runs, from_anywhere, pair_of_runs};
 use super::estimate::share;
 use super::failure::Failure;
 use super::precision::{Estimate, Precision};
+use super::run::RunId;
 use super::run_watch::Ends;
-use super::statistics::{Decision, DoubleSampling};
+use super::statistics::DoubleSampling;
 use crate::ir::Statistical;
 
 /// After so many pairs the test gives up: two probabilities that are both near to 0 or 1 hardly
@@ -33,15 +34,22 @@ pub fn compare<'a>(
     else {
         panic!("this compares no probabilities");
     };
-    let mut test = DoubleSampling::new(precision.odds_ratios, precision.alpha, precision.beta);
+    let mut test = {
+        let (u0, u1) = precision.odds_ratios;
+        DoubleSampling::new(u0, u1, precision.alpha, precision.beta)
+    };
     let mut decision = None;
     let (mut pairs, mut first, mut second) = (0, 0, 0);
     let said = left.0.runs.max(right.0.runs);
     let most = precision.runs.or(said).unwrap_or(MOST_PAIRS);
     from_anywhere(
         runs.into(),
-        (precision.threads, Some(most)),
-        |runner, pair| pair_of_runs(runner, [left, right], (precision.seed, pair)),
+        precision.threads,
+        Some(most),
+        |runner, pair| {
+            let (seed, run) = (precision.seed, 2 * pair);
+            pair_of_runs(runner, left, right, RunId { seed, run })
+        },
         |(left, right)| {
             pairs += 1;
             first += u64::from(left);
@@ -57,18 +65,11 @@ pub fn compare<'a>(
         },
         &mut Ends(|pairs| ends(2 * pairs)),
     )?;
-    Ok(estimate((pairs, first, second), decision, precision.alpha))
-}
-
-fn estimate(
-    (pairs, first, second): (u64, u64, u64),
-    decision: Option<Decision>,
-    alpha: f64,
-) -> Estimate {
     let is_complete = decision.is_some();
-    Estimate {
+    let share = |satisfied| share(pairs, satisfied, precision.alpha, is_complete);
+    Ok(Estimate {
         decision,
-        compared: Some(Box::new(share((pairs, second), alpha, is_complete))),
-        ..share((pairs, first), alpha, is_complete)
-    }
+        compared: Some(Box::new(share(second))),
+        ..share(first)
+    })
 }

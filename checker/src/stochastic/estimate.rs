@@ -4,7 +4,7 @@ use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
-use super::run::Trajectory;
+use super::run::{RunId, Trajectory};
 use super::run_watch::Ends;
 use super::statistics::{Method, clopper_pearson};
 use crate::ir::Simulation;
@@ -44,7 +44,10 @@ pub fn simulate(
     let is_complete = in_order(
         behaviour,
         precision.threads,
-        |runner, run| runner.trajectory((precision.seed, run), query),
+        |runner, run| {
+            let seed = precision.seed;
+            runner.trajectory(RunId { seed, run }, query)
+        },
         |trajectory| {
             made += 1;
             if trajectory.satisfied {
@@ -58,8 +61,7 @@ pub fn simulate(
         },
         &mut Ends(ends),
     )?;
-    let counted = (made, shown.len() as u64);
-    let estimate = share(counted, precision.alpha, is_complete);
+    let estimate = share(made, shown.len() as u64, precision.alpha, is_complete);
     Ok(Simulated {
         items: query.items.iter().map(|item| item.text.clone()).collect(),
         runs: shown,
@@ -69,7 +71,7 @@ pub fn simulate(
 }
 
 /// The estimate of a probability from the numbers of runs and of satisfied ones.
-pub(super) fn share((runs, satisfied): (u64, u64), alpha: f64, is_complete: bool) -> Estimate {
+pub(super) fn share(runs: u64, satisfied: u64, alpha: f64, is_complete: bool) -> Estimate {
     let interval = clopper_pearson(satisfied, runs, alpha);
     Estimate {
         value: satisfied as f64 / runs as f64,

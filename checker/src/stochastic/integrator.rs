@@ -104,7 +104,8 @@ impl Integrator {
         &mut self,
         time: f64,
         slopes: &mut Slopes<'_>,
-        (values, rates): (&mut Vec<f64>, &mut Vec<f64>),
+        values: &mut Vec<f64>,
+        rates: &mut Vec<f64>,
     ) -> Result<(), Failure> {
         values.clear();
         rates.clear();
@@ -362,7 +363,7 @@ mod tests {
         integrator.begin(&[1.0]);
         for time in [0.0, 0.3, 5.0, 1.0, 0.001] {
             integrator
-                .at(time, &mut decay, (&mut found, &mut rates))
+                .at(time, &mut decay, &mut found, &mut rates)
                 .expect("it is finite");
             assert!(
                 (found[0] - (-time).exp()).abs() < 1e-9,
@@ -373,7 +374,7 @@ mod tests {
         integrator.begin(&[1.0, 0.0]);
         for time in [0.7, 10.0, 3.0] {
             integrator
-                .at(time, &mut circle, (&mut found, &mut rates))
+                .at(time, &mut circle, &mut found, &mut rates)
                 .expect("it is finite");
             assert!((found[0] - time.cos()).abs() < 1e-7, "{time}: {}", found[0]);
             assert!((found[1] - time.sin()).abs() < 1e-7, "{time}: {}", found[1]);
@@ -400,7 +401,7 @@ mod tests {
         for solution in 0..1000 {
             integrator.begin(&found);
             integrator
-                .at(0.1, &mut falling, (&mut found, &mut rates))
+                .at(0.1, &mut falling, &mut found, &mut rates)
                 .expect("it is finite");
             let exact = f64::from(solution + 1) * (0.1 * 10.0 - 0.1 * 0.1 / 2.0);
             let error = (found[0] - exact).abs();
@@ -415,7 +416,7 @@ mod tests {
         integrator.begin(&[1.0, 0.0]);
         for time in [0.7, 10.0, 3.0] {
             integrator
-                .at(time, &mut circle, (&mut found, &mut rates))
+                .at(time, &mut circle, &mut found, &mut rates)
                 .expect("it is finite");
             assert!((rates[0] + found[1]).abs() < 1e-6, "{time}: {}", rates[0]);
             assert!((rates[1] - found[0]).abs() < 1e-6, "{time}: {}", rates[1]);
@@ -430,7 +431,7 @@ mod tests {
         let (mut time, mut highest) = (0.0, f64::NEG_INFINITY);
         while time < 2.0 {
             integrator
-                .at(time, &mut throw, (&mut found, &mut rates))
+                .at(time, &mut throw, &mut found, &mut rates)
                 .expect("it is finite");
             highest = found[0].max(highest);
             time = integrator
@@ -449,7 +450,7 @@ mod tests {
         for _ in 0..100 {
             integrator.begin(&[0.0, 10.0]);
             integrator
-                .at(2.0, &mut throw, (&mut found, &mut rates))
+                .at(2.0, &mut throw, &mut found, &mut rates)
                 .expect("it is finite");
             assert!(found[0].abs() < 1e-12, "{}", found[0]);
             assert!((found[1] + 10.0).abs() < 1e-12, "{}", found[1]);
@@ -463,7 +464,7 @@ mod tests {
         let (mut found, mut rates) = (Vec::new(), Vec::new());
         let mut read = |integrator: &mut Integrator, time| {
             integrator
-                .at(time, &mut circle, (&mut found, &mut rates))
+                .at(time, &mut circle, &mut found, &mut rates)
                 .expect("it is finite");
             found.clone()
         };
@@ -483,7 +484,7 @@ mod tests {
         let (mut found, mut rates) = (Vec::new(), Vec::new());
         integrator.begin(&[1.0]);
         integrator
-            .at(0.75, &mut decay, (&mut found, &mut rates))
+            .at(0.75, &mut decay, &mut found, &mut rates)
             .expect("it is finite");
         assert!((found[0] - 0.375).abs() < 1e-15);
     }

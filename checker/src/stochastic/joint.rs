@@ -18,7 +18,7 @@ use super::failure::Failure;
 use super::in_order::in_order;
 use super::mitl::Watch;
 use super::precision::{Estimate, Precision};
-use super::run::{Runner, watched};
+use super::run::{RunId, Runner, watched};
 use super::run_watch::{Ends, Shows};
 use crate::ir::{Path, RunBound, Statistical};
 
@@ -47,7 +47,7 @@ pub fn estimate_jointly(
     in_order(
         behaviour,
         *threads,
-        |runner, run| Ok(runner.all((*seed, run), bound, &queries, &open)),
+        |runner, run| Ok(runner.all(RunId { seed: *seed, run }, bound, &queries, &open)),
         |run| {
             let mut is_over = true;
             let results = collectors.iter_mut().zip(run.results);
@@ -119,10 +119,10 @@ struct JointRun {
 impl Shows for JointRun {}
 
 impl Runner<'_> {
-    /// What run number `run` of a seed says of each query that is open when it begins.
+    /// What a run says of each query that is open when it begins.
     fn all(
         &mut self,
-        (seed, run): (u64, u64),
+        id: RunId,
         bound: &RunBound,
         queries: &[&Statistical],
         open: &[AtomicBool],
@@ -143,7 +143,7 @@ impl Runner<'_> {
                 _ => Seen::Open,
             })
             .collect();
-        let ended = self.until_bound((seed, run), bound, &mut |race, delay| {
+        let ended = self.until_bound(id, bound, &mut |race, delay| {
             let mut is_over = true;
             for (query, seen) in queries.iter().zip(&mut seen) {
                 match (&mut *seen, query) {

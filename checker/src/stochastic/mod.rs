@@ -51,7 +51,7 @@ pub use race_code::Asked;
 pub use rare::{Rare, Splitting, estimate_rare};
 pub use repeatable::is_repeatable;
 pub use restriction::{Restriction, UnderChoice, Unfit};
-pub use run::{Outcome, Runner, Trajectory};
+pub use run::{Outcome, RunId, Runner, Trajectory};
 pub use run_watch::{RunWatch, Shown};
 pub use samples::{Distribution, Histogram, MOST_BINS, MOST_VALUES, Samples};
 pub use splitting::MOST_EFFORT;

@@ -124,8 +124,8 @@ impl Motion {
         let mut slopes = |time: f64, values: &[f64], target: &mut [f64]| {
             slopes_at(machine, (base, flowing, rates), time, values, target)
         };
-        let target = (&mut self.values, &mut self.slopes);
-        self.integrator.at(time, &mut slopes, target)?;
+        let (values, rates) = (&mut self.values, &mut self.slopes);
+        self.integrator.at(time, &mut slopes, values, rates)?;
         linear(machine, &self.base, time);
         for (&clock, &value) in self.flowing.iter().zip(&self.values) {
             machine.set_double(clock, value);
@@ -225,7 +225,7 @@ impl Motion {
                     let is_same = found.signature.to_bits() == side;
                     Ok(is_same.then_some(found.gap_closes_in))
                 };
-                let change = first_change((known, seen.gap_closes_in), next, &mut probe)?;
+                let change = first_change(known, seen.gap_closes_in, next, &mut probe)?;
                 mask.horizon = change - time;
                 return Ok(mask);
             }
@@ -241,7 +241,8 @@ impl Motion {
     pub(super) fn reach(
         &mut self,
         machine: &mut Machine<'_>,
-        (clock, value): (u32, f64),
+        clock: u32,
+        value: f64,
         until: f64,
     ) -> Result<Option<f64>, Failure> {
         let is_below = |motion: &mut Motion, machine: &mut Machine<'_>, time: f64| {
@@ -260,7 +261,7 @@ impl Motion {
                         self.look(machine, time, |machine| Ok(machine.clock(clock)))?;
                     Ok((found < value).then_some((value - found) / rate))
                 };
-                let time = first_change((known, f64::INFINITY), next, &mut probe)?;
+                let time = first_change(known, f64::INFINITY, next, &mut probe)?;
                 return Ok((time <= until).then_some(time));
             }
             known = next;
@@ -279,7 +280,8 @@ type Probe<'a> = dyn FnMut(f64) -> Result<Option<f64>, Failure> + 'a;
 /// The method of Newton comes near; then steps that grow find both sides of the change; what is
 /// left is halved.
 fn first_change(
-    (mut same, mut differs_in): (f64, f64),
+    mut same: f64,
+    mut differs_in: f64,
     mut other: f64,
     probe: &mut Probe<'_>,
 ) -> Result<f64, Failure> {

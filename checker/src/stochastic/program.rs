@@ -7,6 +7,7 @@
 //! depend on a word that it writes, and [`Program::followers`] for each process all processes whose
 //! plans depend on where it is.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -54,15 +55,31 @@ pub(super) struct Instance<'a> {
     pub(super) entry: u32,
 }
 
+/// Instances that follow each other, by their numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InstanceRange {
+    first: u32,
+    end: u32,
+}
+
+impl InstanceRange {
+    pub(super) fn numbers(self) -> Range<u32> {
+        self.first..self.end
+    }
+
+    pub(super) fn is_empty(self) -> bool {
+        self.numbers().is_empty()
+    }
+}
+
 /// A process in a location.
 #[derive(Debug)]
 pub(super) struct Spot {
     pub(super) urgency: Urgency,
     pub(super) invariant: Condition,
-    /// Its outputs, as a range of [`Program::instances`].
-    pub(super) outputs: (u32, u32),
-    /// Its receiving instances, likewise.
-    pub(super) inputs: (u32, u32),
+    pub(super) outputs: InstanceRange,
+    /// Those that receive.
+    pub(super) inputs: InstanceRange,
     /// The rate of the exponential delay.
     pub(super) exponential_rate: Option<Number>,
     /// Sets the rates of clocks.
@@ -137,14 +154,14 @@ impl<'a> Program<'a> {
         let network = self.network;
         self.first_spots.push(self.spots.len() as u32);
         for location in &network.processes[process].locations {
-            let outputs = self.add_instances((process, &location.edges), true, machine);
-            let inputs = self.add_instances((process, &location.edges), false, machine);
+            let outputs = self.add_instances(process, &location.edges, true, machine);
+            let inputs = self.add_instances(process, &location.edges, false, machine);
             let chances = &location.chances;
             if chances.rates.is_some() && self.rated.last() != Some(&(process as u32)) {
                 self.rated.push(process as u32);
             }
             self.has_flows |= chances.flows.contains(&true);
-            let known = &self.instances[outputs.0 as usize..outputs.1 as usize];
+            let known = self.range(outputs);
             let is_controllable = known.iter().any(|one| one.edge.controllable);
             let is_plain = known
                 .iter()
@@ -169,10 +186,11 @@ impl<'a> Program<'a> {
     /// Adds the outputs among some edges, or those that receive.
     fn add_instances(
         &mut self,
-        (process, edges): (usize, &[EdgeId]),
+        process: usize,
+        edges: &[EdgeId],
         outputs: bool,
         machine: &mut Machine<'a>,
-    ) -> (u32, u32) {
+    ) -> InstanceRange {
         let first = self.instances.len() as u32;
         let network = self.network;
         let mut entries: FxHashMap<(EdgeId, Box<[i32]>), u32> = FxHashMap::default();
@@ -211,7 +229,8 @@ impl<'a> Program<'a> {
                 }
             }
         }
-        (first, self.instances.len() as u32)
+        let end = self.instances.len() as u32;
+        InstanceRange { first, end }
     }
 
     /// A guard or an invariant; what does not depend on the state is computed once.
@@ -399,8 +418,8 @@ impl<'a> Program<'a> {
     }
 
     /// The instances with these numbers.
-    pub(super) fn range(&self, (first, end): (u32, u32)) -> &[Instance<'a>] {
-        &self.instances[first as usize..end as usize]
+    pub(super) fn range(&self, range: InstanceRange) -> &[Instance<'a>] {
+        &self.instances[range.first as usize..range.end as usize]
     }
 
     /// The instance with this number.

@@ -6,7 +6,7 @@ use super::failure::Failure;
 use super::in_order::in_order;
 use super::precision::{Estimate, Precision};
 use super::race::Race;
-use super::run::{Runner, watched};
+use super::run::{RunId, Runner, watched};
 use super::run_watch::Ends;
 use super::splitting::{End, Part, Parts, pilot, repetition};
 use super::statistics::{Expectation, Interval, Method};
@@ -41,7 +41,8 @@ pub struct Rare {
 /// A part of a run failed.
 pub fn estimate_rare(
     behaviour: Behaviour<'_>,
-    (bound, path): (&RunBound, &Path),
+    bound: &RunBound,
+    path: &Path,
     splitting: &Splitting,
     precision: &Precision,
     ends: impl FnMut(u64) -> bool,
@@ -71,8 +72,14 @@ pub fn estimate_rare(
                 level,
             };
             // The pilot has the number 0.
-            let numbered = (seed, number + 1);
-            repetition(&mut parts, &found.thresholds, splitting.effort, numbered)
+            let number = number + 1;
+            repetition(
+                &mut parts,
+                &found.thresholds,
+                splitting.effort,
+                seed,
+                number,
+            )
         },
         |(value, parts)| {
             mean.push(value);
@@ -156,7 +163,13 @@ impl Parts for RunParts<'_, '_> {
         match from {
             None => {
                 let Runner { program, race, .. } = &mut *self.runner;
-                race.start(program, (self.seed, numbers))?;
+                race.start(
+                    program,
+                    RunId {
+                        seed: self.seed,
+                        run: numbers,
+                    },
+                )?;
             }
             Some(halt) => halt.resume(self.runner, self.seed, numbers)?,
         }

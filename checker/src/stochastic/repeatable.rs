@@ -2,7 +2,7 @@
 
 use super::behaviour::Behaviour;
 use super::failure::Failure;
-use super::run::Runner;
+use super::run::{RunId, Runner};
 use crate::ir::Statistical;
 
 /// How many runs are made twice.
@@ -22,15 +22,16 @@ pub fn is_repeatable(
 ) -> Result<bool, Failure> {
     let mut runner = Runner::of(behaviour);
     for run in 0..RUNS {
-        let first = seen(&mut runner, query, (seed, run))?;
-        if seen(&mut runner, query, (seed, run))? != first {
+        let id = RunId { seed, run };
+        let first = seen(&mut runner, query, id)?;
+        if seen(&mut runner, query, id)? != first {
             return Ok(false);
         }
     }
     Ok(true)
 }
 
-fn seen(runner: &mut Runner<'_>, query: &Statistical, run: (u64, u64)) -> Result<Seen, Failure> {
+fn seen(runner: &mut Runner<'_>, query: &Statistical, run: RunId) -> Result<Seen, Failure> {
     match query {
         Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
             let outcome = runner.path(run, bound, path)?;

@@ -89,7 +89,8 @@ pub struct Restriction {
 impl Restriction {
     /// What a strategy for a model in the symbolic reading allows in runs of the stochastic one.
     pub fn new(
-        (symbolic, stochastic): (&Network, &Network),
+        symbolic: &Network,
+        stochastic: &Network,
         strategy: &Strategy,
         choice: UnderChoice,
     ) -> Result<Restriction, Unfit> {

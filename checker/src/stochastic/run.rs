@@ -22,6 +22,15 @@ use crate::ir::{Formula, FunctionId, Network, Path, RunBound, RunLimit, Simulati
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
 
+/// A run of a seed, by its number: it has the same random numbers wherever it is made.
+#[derive(Clone, Copy, Debug)]
+pub struct RunId {
+    /// The seed of all runs of a query.
+    pub seed: u64,
+    /// The number of the run.
+    pub run: u64,
+}
+
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
@@ -59,7 +68,8 @@ impl Trajectory {
         &mut self,
         machine: &mut Machine<'_>,
         asked: &Simulation,
-        (time, is_end): (f64, bool),
+        time: f64,
+        is_end: bool,
         flows: bool,
     ) -> Result<(), Failure> {
         for (item, points) in asked.items.iter().zip(&mut self.points) {
@@ -143,15 +153,10 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes a run as code, if there is any.
-    fn written(&mut self, numbers: (u64, u64), bound: &RunBound, asked: Asked<'_>) -> Option<End> {
+    fn written(&mut self, id: RunId, bound: &RunBound, asked: Asked<'_>) -> Option<End> {
         let stages = self.stages.as_mut().filter(|_| RaceCode::knows(bound))?;
         let watched = Watched::of(asked)?;
-        stages.run(
-            (&self.program, self.executor),
-            watched,
-            numbers,
-            bound.value,
-        )
+        stages.run(&self.program, self.executor, watched, id, bound.value)
     }
 
     /// Counts the moves of a run that was made move by move.
@@ -173,17 +178,12 @@ impl<'a> Runner<'a> {
         iter::once(first).chain(others).collect()
     }
 
-    /// Run number `run` of a seed, until it has what `path` asks or not.
-    pub fn path(
-        &mut self,
-        (seed, run): (u64, u64),
-        bound: &RunBound,
-        path: &Path,
-    ) -> Result<Outcome, Failure> {
+    /// A run, until it has what `path` asks or not.
+    pub fn path(&mut self, id: RunId, bound: &RunBound, path: &Path) -> Result<Outcome, Failure> {
         if let Path::Formula(formula) = path {
-            return self.formula((seed, run), bound, formula);
+            return self.formula(id, bound, formula);
         }
-        if let Some(end) = self.written((seed, run), bound, Asked::Path(path)) {
+        if let Some(end) = self.written(id, bound, Asked::Path(path)) {
             return Ok(Outcome {
                 satisfied: end.decided.unwrap_or(matches!(path, Path::Always(_))),
                 time: end.time,
@@ -192,7 +192,7 @@ impl<'a> Runner<'a> {
             });
         }
         let mut decided = None;
-        self.until_bound((seed, run), bound, &mut |race, delay| {
+        self.until_bound(id, bound, &mut |race, delay| {
             decided = watched(race, path, delay)?;
             Ok(decided.is_some())
         })?;
@@ -206,16 +206,16 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// Run number `run` of a seed, until it is decided whether a formula holds for it.
+    /// A run, until it is decided whether a formula holds for it.
     fn formula(
         &mut self,
-        (seed, run): (u64, u64),
+        id: RunId,
         bound: &RunBound,
         formula: &Formula,
     ) -> Result<Outcome, Failure> {
         let mut watch = Watch::new(formula);
         let mut decided = None;
-        self.until_bound((seed, run), bound, &mut |race, delay| {
+        self.until_bound(id, bound, &mut |race, delay| {
             decided = watch.state(race, delay)?;
             Ok(decided.is_some())
         })?;
@@ -228,22 +228,22 @@ impl<'a> Runner<'a> {
         })
     }
 
-    /// The least or greatest value of an expression in run number `run` of a seed.
+    /// The least or greatest value of an expression in a run.
     pub fn extreme(
         &mut self,
-        (seed, run): (u64, u64),
+        id: RunId,
         bound: &RunBound,
         value: FunctionId,
         maximum: bool,
     ) -> Result<(f64, u64), Failure> {
         let asked = Asked::Extreme(value, maximum);
-        if let Some(end) = self.written((seed, run), bound, asked) {
+        if let Some(end) = self.written(id, bound, asked) {
             let sign = if maximum { 1.0 } else { -1.0 };
             return Ok((sign * end.best, end.moves));
         }
         let is_timed = self.program.is_timed(value);
         let mut extreme = Extreme::new(value, maximum);
-        self.until_bound((seed, run), bound, &mut |race, delay| {
+        self.until_bound(id, bound, &mut |race, delay| {
             extreme.look(&mut race.machine)?;
             if is_timed && delay > 0.0 && delay.is_finite() {
                 extreme.look_through(race, delay)?;
@@ -255,15 +255,11 @@ impl<'a> Runner<'a> {
         Ok((extreme.value(), self.race.moves))
     }
 
-    /// Run number `run` of a seed, as the values of expressions over time; until what it must
+    /// A run, as the values of expressions over time; until what it must
     /// reach, if that is given.
-    pub fn trajectory(
-        &mut self,
-        (seed, run): (u64, u64),
-        asked: &Simulation,
-    ) -> Result<Trajectory, Failure> {
+    pub fn trajectory(&mut self, id: RunId, asked: &Simulation) -> Result<Trajectory, Failure> {
         let mut trajectory = Trajectory {
-            run,
+            run: id.run,
             satisfied: asked.filter.is_none(),
             points: vec![Vec::new(); asked.items.len()],
         };
@@ -274,9 +270,9 @@ impl<'a> Runner<'a> {
         let step = asked.bound.value / SAMPLES;
         let is_sampled = asked.bound.limit == RunLimit::Time && step > 0.0;
         let is_curved = asked.items.iter().any(|item| item.is_curved);
-        self.until_bound((seed, run), &asked.bound, &mut |race, delay| {
+        self.until_bound(id, &asked.bound, &mut |race, delay| {
             let start = race.time;
-            trajectory.record(&mut race.machine, asked, (start, true), false)?;
+            trajectory.record(&mut race.machine, asked, start, true, false)?;
             let mut shown = delay;
             if let Some(path) = &reached
                 && let Some((true, ahead)) = watched(race, path, delay)?
@@ -295,9 +291,9 @@ impl<'a> Runner<'a> {
                     race.motion.next_look(&mut race.machine, ahead)?
                 };
                 ahead = shown.min(next);
-                let moment = (start + ahead, ahead >= shown);
+                let is_end = ahead >= shown;
                 race.look_ahead(ahead, |machine| {
-                    trajectory.record(machine, asked, moment, flows)
+                    trajectory.record(machine, asked, start + ahead, is_end, flows)
                 })?;
             }
             Ok(reached.is_some() && trajectory.satisfied)
@@ -309,11 +305,11 @@ impl<'a> Runner<'a> {
     /// returns true.
     pub(super) fn until_bound(
         &mut self,
-        numbers: (u64, u64),
+        id: RunId,
         bound: &RunBound,
         watch: &mut dyn FnMut(&mut Race<'_>, f64) -> Result<bool, Failure>,
     ) -> Result<(), Failure> {
-        self.race.start(&self.program, numbers)?;
+        self.race.start(&self.program, id)?;
         self.go_on(bound, watch)
     }
 
@@ -337,8 +333,8 @@ impl<'a> Runner<'a> {
             let next = race.next(program, rest)?;
             let rest = match bound.limit {
                 RunLimit::Clock(clock) if race.motion.flows(clock) => {
-                    let goal = (clock, bound.value);
-                    let reached = race.motion.reach(&mut race.machine, goal, next.delay)?;
+                    let (goal, until) = (bound.value, next.delay);
+                    let reached = race.motion.reach(&mut race.machine, clock, goal, until)?;
                     reached.unwrap_or(f64::INFINITY)
                 }
                 _ => rest,

@@ -79,9 +79,19 @@ enum Entry<S> {
     Event,
 }
 
-/// The number of random numbers of a part: different for all parts of all repetitions.
-fn numbers(repetition: u64, stage: usize, index: u64) -> u64 {
-    (repetition << 36) | ((stage as u64) << 24) | index
+/// Which stage it is.
+#[derive(Clone, Copy)]
+struct StageId {
+    seed: u64,
+    repetition: u64,
+    stage: usize,
+}
+
+impl StageId {
+    /// The number of random numbers of a part: different for all parts of all repetitions.
+    fn part(self, index: u64) -> u64 {
+        (self.repetition << 36) | ((self.stage as u64) << 24) | index
+    }
 }
 
 /// The parts of one stage, up to a threshold.
@@ -97,15 +107,11 @@ fn stage<P: Parts>(
     entries: &[Entry<P::State>],
     threshold: f64,
     effort: u64,
-    (seed, repetition, stage): (u64, u64, usize),
+    id: StageId,
 ) -> Result<Stage<P::State>, P::Failure> {
     // The number after those of all parts.
     let mut words = [0; STREAM_WORDS];
-    Stream::start(
-        &mut words,
-        seed,
-        numbers(repetition, stage, MOST_EFFORT - 1),
-    );
+    Stream::start(&mut words, id.seed, id.part(MOST_EFFORT - 1));
     let first = Stream::of(&mut words).below(entries.len() as u32) as usize;
     let mut found = Stage {
         entries: Vec::new(),
@@ -121,7 +127,7 @@ fn stage<P: Parts>(
                 continue;
             }
         };
-        let part = parts.part(from, threshold, numbers(repetition, stage, index))?;
+        let part = parts.part(from, threshold, id.part(index))?;
         match part.end {
             End::Threshold(state) => {
                 found.entries.push(Entry::State(state));
@@ -159,7 +165,11 @@ pub(super) fn pilot<P: Parts>(parts: &mut P, seed: u64, effort: u64) -> Result<P
     let mut level = f64::NEG_INFINITY;
     while found.thresholds.len() < MOST_THRESHOLDS {
         // Repetitions have numbers from 1 on.
-        let here = (seed, 0, found.thresholds.len());
+        let here = StageId {
+            seed,
+            repetition: 0,
+            stage: found.thresholds.len(),
+        };
         let mut highest = stage(parts, &entries, f64::INFINITY, effort, here)?.highest;
         found.parts += effort;
         highest.sort_by(|one, other| other.total_cmp(one));
@@ -192,13 +202,18 @@ pub(super) fn repetition<P: Parts>(
     parts: &mut P,
     thresholds: &[f64],
     effort: u64,
-    (seed, repetition): (u64, u64),
+    seed: u64,
+    repetition: u64,
 ) -> Result<(f64, u64), P::Failure> {
     let mut entries = vec![Entry::Start];
     let (mut product, mut made) = (1.0, 0);
     let stages = thresholds.iter().copied().chain([f64::INFINITY]);
-    for (number, threshold) in stages.enumerate() {
-        let here = (seed, repetition, number);
+    for (stage_number, threshold) in stages.enumerate() {
+        let here = StageId {
+            seed,
+            repetition,
+            stage: stage_number,
+        };
         entries = stage(parts, &entries, threshold, effort, here)?.entries;
         made += effort;
         product *= entries.len() as f64 / effort as f64;
@@ -274,8 +289,7 @@ mod tests {
         let mut mean = Expectation::default();
         let mut parts = found.parts;
         for number in 1..=repetitions {
-            let Ok((value, made)) =
-                repetition(&mut walk, &found.thresholds, effort, (seed, number));
+            let Ok((value, made)) = repetition(&mut walk, &found.thresholds, effort, seed, number);
             mean.push(value);
             parts += made;
         }
@@ -321,7 +335,7 @@ mod tests {
         for thresholds in [&[][..], &[4.0], &[2.0, 3.0, 6.0], &[7.5, 7.5]] {
             let mut mean = Expectation::default();
             for number in 1..=4000 {
-                let Ok((value, _)) = repetition(&mut walk, thresholds, 50, (5, number));
+                let Ok((value, _)) = repetition(&mut walk, thresholds, 50, 5, number);
                 mean.push(value);
             }
             let interval = mean.student(1e-6).expect("there are repetitions");

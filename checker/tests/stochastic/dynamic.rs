@@ -6,7 +6,7 @@ use checker::engine::{CodeEngine, LoadedModel, Options};
 use checker::exec::{Interpreter, Libraries};
 use checker::ir::{QueryKind, Statistical};
 use checker::semantics::{self, Reading};
-use checker::stochastic::{Outcome, Precision, Runner};
+use checker::stochastic::{Outcome, Precision, RunId, Runner};
 use checker::syntax;
 
 use super::{executors, expect, load};
@@ -212,8 +212,12 @@ fn runs_do_not_depend_on_the_number_of_slots() {
         let interpreter = Interpreter::new(&network.functions, &network.constants);
         let mut runner = Runner::new(network, &interpreter);
         let runs = 0..200;
-        runs.map(|run| runner.path((5, run), bound, path).expect("no run fails"))
-            .collect()
+        runs.map(|run| {
+            runner
+                .path(RunId { seed: 5, run }, bound, path)
+                .expect("no run fails")
+        })
+        .collect()
     };
     let few = outcomes(6);
     assert!(few.iter().any(|one| one.satisfied) && !few.iter().all(|one| one.satisfied));
@@ -317,7 +321,9 @@ fn foreach_shows_the_places_of_instances() {
     for executor in [interpreter, jit] {
         let mut runner = Runner::new(&network, &*executor);
         for run in 0..20 {
-            let trajectory = runner.trajectory((1, run), asked).expect("there is room");
+            let trajectory = runner
+                .trajectory(RunId { seed: 1, run }, asked)
+                .expect("there is room");
             let at = |row: usize, time: f64| {
                 let points = trajectory.points[row].iter();
                 points
@@ -350,7 +356,9 @@ fn foreach_shows_the_values_of_a_range() {
     };
     let [interpreter, _] = executors(&network);
     let mut runner = Runner::new(&network, &*interpreter);
-    let trajectory = runner.trajectory((1, 0), asked).expect("nothing fails");
+    let trajectory = runner
+        .trajectory(RunId { seed: 1, run: 0 }, asked)
+        .expect("nothing fails");
     let last = trajectory
         .points
         .iter()

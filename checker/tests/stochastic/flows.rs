@@ -2,7 +2,7 @@
 //! solutions in closed form.
 
 use checker::ir::Statistical;
-use checker::stochastic::{Behaviour, Precision, Runner, simulate};
+use checker::stochastic::{Behaviour, Precision, RunId, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -20,7 +20,7 @@ fn extreme(model: &str, query: &str) -> f64 {
     };
     let [left, right] = executors(&network).map(|executor| {
         let mut runner = Runner::new(&network, &*executor);
-        let found = runner.extreme((1, 0), bound, value, maximum);
+        let found = runner.extreme(RunId { seed: 1, run: 0 }, bound, value, maximum);
         found.expect("the run does not fail").0
     });
     assert_eq!(left.to_bits(), right.to_bits(), "the engines differ");
@@ -159,7 +159,7 @@ fn a_run_with_equations_is_the_same_alone_and_after_others() {
         for run in 0..10 {
             let mut alone = Runner::new(&network, &*executor);
             let [left, right] = [&mut together, &mut alone].map(|runner| {
-                let found = runner.extreme((1, run), bound, *value, true);
+                let found = runner.extreme(RunId { seed: 1, run }, bound, *value, true);
                 found.expect("the run does not fail").0
             });
             assert_eq!(left.to_bits(), right.to_bits(), "run {run}");
@@ -257,7 +257,7 @@ fn a_fixed_step_is_eulers() {
         ..Behaviour::new(&network, &*jit)
     });
     let (found, _) = runner
-        .extreme((1, 0), bound_of(&query), value, false)
+        .extreme(RunId { seed: 1, run: 0 }, bound_of(&query), value, false)
         .expect("the run does not fail");
     assert!((found - 0.75_f64.powi(4)).abs() < 1e-12, "{found}");
 }

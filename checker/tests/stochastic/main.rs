@@ -10,7 +10,7 @@ use checker::engine::{JointQuery, LoadedModel};
 use checker::exec::{Executor, Interpreter, Jit, Libraries};
 use checker::ir::{Network, QueryKind, RunBound, Simulation, Statistical};
 use checker::semantics::{self, FIRST_POOL, Reading};
-use checker::stochastic::{Failure, Precision, Runner};
+use checker::stochastic::{Failure, Precision, RunId, Runner};
 use checker::syntax;
 
 mod bad_input;
@@ -136,7 +136,7 @@ fn satisfied(network: &Network, query: &StatisticalQuery, runs: u64) -> Result<u
         let mut moves = Vec::new();
         let mut satisfied = 0;
         for run in 0..runs {
-            let outcome = runner.path((1, run), bound, path)?;
+            let outcome = runner.path(RunId { seed: 1, run }, bound, path)?;
             satisfied += u64::from(outcome.satisfied);
             moves
                 .push(outcome.time.to_bits() ^ outcome.moves ^ outcome.at.to_bits().rotate_left(7));

@@ -5,7 +5,7 @@
 
 use checker::exec::{Executor, Interpreter, Jit};
 use checker::ir::Statistical;
-use checker::stochastic::{Asked, Failure, Runner};
+use checker::stochastic::{Asked, Failure, RunId, Runner};
 
 use crate::networks::generate::{Family, network};
 use crate::random::Random;
@@ -21,7 +21,7 @@ type Shown = (Option<bool>, u64, u64);
 fn end(runner: &mut Runner<'_>, query: &StatisticalQuery, run: u64) -> Result<Shown, Failure> {
     match &query.kind {
         Statistical::Probability(bound, path) => {
-            let outcome = runner.path((3, run), bound, path)?;
+            let outcome = runner.path(RunId { seed: 3, run }, bound, path)?;
             Ok((
                 Some(outcome.satisfied),
                 outcome.time.to_bits(),
@@ -34,7 +34,7 @@ fn end(runner: &mut Runner<'_>, query: &StatisticalQuery, run: u64) -> Result<Sh
             maximum,
             ..
         } => {
-            let (value, moves) = runner.extreme((3, run), bound, *value, *maximum)?;
+            let (value, moves) = runner.extreme(RunId { seed: 3, run }, bound, *value, *maximum)?;
             Ok((None, value.to_bits(), moves))
         }
         _ => panic!("{} has no runs to compare", query.text),

@@ -26,10 +26,10 @@ fn split(
         effort,
         repetitions,
     };
-    let asked = (bound, path);
     estimate_rare(
         Behaviour::new(network, &*jit),
-        asked,
+        bound,
+        path,
         &splitting,
         precision,
         |_| false,

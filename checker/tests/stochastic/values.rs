@@ -1,7 +1,7 @@
 //! Probabilities and expectations that have closed forms.
 
 use checker::ir::Statistical;
-use checker::stochastic::{Behaviour, Failure, Precision, Runner, simulate};
+use checker::stochastic::{Behaviour, Failure, Precision, RunId, Runner, simulate};
 
 use super::{bound_of, executors, expect, load};
 
@@ -386,7 +386,7 @@ fn expectations_are_means() {
         let mut sum = 0.0;
         for run in 0..runs {
             sum += runner
-                .extreme((7, run), bound, value, maximum)
+                .extreme(RunId { seed: 7, run }, bound, value, maximum)
                 .expect("no run fails")
                 .0;
         }
@@ -414,7 +414,9 @@ fn trajectories_are_linear_between_their_points() {
     let [interpreter, jit] = executors(&network);
     for executor in [interpreter, jit] {
         let mut runner = Runner::new(&network, &*executor);
-        let shown = runner.trajectory((0, 1), asked).expect("no run fails");
+        let shown = runner
+            .trajectory(RunId { seed: 0, run: 1 }, asked)
+            .expect("no run fails");
         assert_eq!(
             shown.points,
             [
@@ -507,7 +509,7 @@ fn a_value_that_is_no_number_is_an_error() {
     };
     let [_, jit] = executors(&network);
     let mut runner = Runner::new(&network, &*jit);
-    let failed = runner.extreme((1, 0), bound_of(&query), value, true);
+    let failed = runner.extreme(RunId { seed: 1, run: 0 }, bound_of(&query), value, true);
     assert_eq!(failed, Err(Failure::NoNumber));
 }
 

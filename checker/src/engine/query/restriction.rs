@@ -15,9 +15,8 @@ impl LoadedModel {
             return Ok(None);
         };
         let stochastic = self.stochastic.as_ref().expect(ANALYSED).network();
-        let readings = (self.network(), stochastic);
-        let choice = prepared.options.under_choice;
-        let restriction = Restriction::new(readings, &under.strategy, choice);
+        let (symbolic, choice) = (self.network(), prepared.options.under_choice);
+        let restriction = Restriction::new(symbolic, stochastic, &under.strategy, choice);
         restriction.map(Some).map_err(|unfit| {
             let (message, help) = match unfit {
                 Unfit::Environment => (

@@ -119,7 +119,7 @@ fn shown_by_runs(
         }
         (Statistical::Probability(bound, path), Some(splitting)) => {
             let ends = |runs| watched.ends(runs);
-            let rare = estimate_rare(behaviour, (bound, path), &splitting, &precision, ends)?;
+            let rare = estimate_rare(behaviour, bound, path, &splitting, &precision, ends)?;
             answer.remark(splitting_remark(&rare));
             answer.estimate = Some(rare.estimate);
         }

@@ -180,7 +180,11 @@ fn add(formula: &Temporal, nodes: &mut Vec<Node>) -> usize {
             interval,
             keep,
             goal,
-        } => Node::Until(add(keep, nodes), add(goal, nodes), Until::new(*interval)),
+        } => Node::Until(
+            add(keep, nodes),
+            add(goal, nodes),
+            Until::new(interval.0, interval.1),
+        ),
     };
     nodes.push(node);
     nodes.len() - 1

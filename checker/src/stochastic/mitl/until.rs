@@ -28,7 +28,7 @@ pub(super) struct Until {
 }
 
 impl Until {
-    pub(super) fn new((from, to): (f64, f64)) -> Until {
+    pub(super) fn new(from: f64, to: f64) -> Until {
         Until {
             from: Moment::new(from),
             to: Moment::new(to),
@@ -71,7 +71,7 @@ impl Until {
                     Cut::before(moment)
                 }
             };
-            self.reached((self.earliest(self.read), end), result);
+            self.reached(self.earliest(self.read), end, result);
         }
         self.decide(self.earliest(part.end), false, result);
     }
@@ -85,7 +85,7 @@ impl Until {
             } else {
                 Cut::after(start.moment.earlier_by(self.from))
             };
-            self.reached((self.earliest(start), end.min(start)), result);
+            self.reached(self.earliest(start), end.min(start), result);
         }
         self.decide(start, false, result);
         let holds_itself = part.holds && self.from == Moment::ZERO;
@@ -103,7 +103,7 @@ impl Until {
     }
 
     /// The formula holds between these two cuts, and nothing that comes makes it hold before them.
-    fn reached(&mut self, (start, end): (Cut, Cut), result: &mut Parts) {
+    fn reached(&mut self, start: Cut, end: Cut, result: &mut Parts) {
         self.decide(start, false, result);
         self.decide(end, true, result);
     }

@@ -148,14 +148,14 @@ impl Race<'_> {
         let view = View::Drawn(self.longest_stay);
         let mut urgent = self.demanded(program, instance, bound)?;
         if instance.may_be_urgent && self.is_urgent(instance)? {
-            let first = self.first(program, instance, (bound, view))?;
+            let first = self.instance_windows(program, instance, bound, view, true)?;
             urgent = urgent.min(first);
-            let possible = self.first(program, instance, (bound, View::Model))?;
+            let possible = self.instance_windows(program, instance, bound, View::Model, true)?;
             if possible < urgent && self.standstill.is_none_or(|one| possible < one.0) {
                 self.standstill = Some((possible, instance.process as usize));
             }
         } else if self.advice.as_ref().is_some_and(Advice::is_eager) {
-            let first = self.first(program, instance, (bound, view))?;
+            let first = self.instance_windows(program, instance, bound, view, true)?;
             if first.is_finite() {
                 let mask = self.output(program, instance, first, view)?;
                 // Without a first moment one soon after the beginning is taken.
@@ -163,19 +163,9 @@ impl Race<'_> {
                 urgent = urgent.min(if mask.now { first } else { first + soon });
             }
         } else {
-            self.instance_windows(program, instance, (bound, view), false)?;
+            self.instance_windows(program, instance, bound, view, false)?;
         }
         Ok(urgent)
-    }
-
-    /// The first time at which an instance is enabled.
-    fn first(
-        &mut self,
-        program: &Program<'_>,
-        instance: &Instance<'_>,
-        asked: (f64, View),
-    ) -> Result<f64, Failure> {
-        self.instance_windows(program, instance, asked, true)
     }
 
     /// When the strategy demands a move that this instance can make; infinity if it cannot.
@@ -236,7 +226,7 @@ impl Race<'_> {
         }
         Ok(match &self.advice {
             Some(advice) if is_broadcast => {
-                advice.allows_broadcast((own, is_alone), &audience, ahead, view)
+                advice.allows_broadcast(own, is_alone, &audience, ahead, view)
             }
             _ => ready,
         })

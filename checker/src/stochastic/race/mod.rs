@@ -43,6 +43,7 @@ use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
 use super::program::Program;
 use super::rules;
+use super::run::RunId;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
 /// The changes of a condition that are followed within one delay.
@@ -156,7 +157,7 @@ impl<'a> Race<'a> {
     pub(in crate::stochastic) fn start(
         &mut self,
         program: &Program<'_>,
-        (seed, run): (u64, u64),
+        RunId { seed, run }: RunId,
     ) -> Result<(), Failure> {
         self.machine.start(seed, run);
         self.time = 0.0;

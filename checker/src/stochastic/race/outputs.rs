@@ -29,11 +29,10 @@ impl Race<'_> {
                 urgent = urgent.min(self.advised_windows(program, instance, bound)?);
             } else if instance.may_be_urgent && self.is_urgent(instance)? {
                 // It is taken as soon as it can be, so no time is drawn for it.
-                let asked = (bound, view);
-                let first = self.instance_windows(program, instance, asked, true)?;
+                let first = self.instance_windows(program, instance, bound, view, true)?;
                 urgent = urgent.min(first);
             } else {
-                self.instance_windows(program, instance, (bound, view), false)?;
+                self.instance_windows(program, instance, bound, view, false)?;
             }
         }
         Ok(urgent)
@@ -45,7 +44,8 @@ impl Race<'_> {
         &mut self,
         program: &Program<'_>,
         instance: &Instance<'_>,
-        (bound, view): (f64, View),
+        bound: f64,
+        view: View,
         only_first: bool,
     ) -> Result<f64, Failure> {
         let steps = self.steps(program, instance.guard);
@@ -221,7 +221,7 @@ impl Race<'_> {
         let spot = program.spot(process, self.locations[process]);
         let leaves_committed = self.committed == 0 || spot.urgency == Urgency::Committed;
         let is_advised = spot.is_controllable && self.advice.is_some();
-        for number in spot.outputs.0..spot.outputs.1 {
+        for number in spot.outputs.numbers() {
             let instance = program.instance(number);
             let is_enabled = if instance.is_binary || is_advised {
                 self.output(program, instance, 0.0, View::Allowed)?.now
@@ -271,7 +271,7 @@ impl Race<'_> {
         let inputs = program
             .spot(process as usize, self.locations[process as usize])
             .inputs;
-        for number in inputs.0..inputs.1 {
+        for number in inputs.numbers() {
             let input = program.instance(number);
             if self.channel(input)? == Some(channel)
                 && self.holds(program, input.guard, &input.values)?

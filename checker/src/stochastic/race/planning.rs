@@ -149,7 +149,7 @@ impl Race<'_> {
     ) -> Result<f64, Failure> {
         self.is_stepped[process] = true;
         let until = self.until;
-        let needs_bound = spot.exponential_rate.is_none() && spot.outputs.0 < spot.outputs.1;
+        let needs_bound = spot.exponential_rate.is_none() && !spot.outputs.is_empty();
         self.until = self.rest * if needs_bound { FAR_BEYOND } else { 1.0 };
         let mut ahead = 0.0;
         let found = loop {

@@ -17,7 +17,8 @@ pub(super) fn size_of(function: &Function) -> usize {
 pub(super) fn inlined(
     mut function: Function,
     functions: &[Function],
-    (largest, most): (usize, usize),
+    largest: usize,
+    most: usize,
 ) -> Function {
     let mut size = size_of(&function);
     let mut block = 0;
@@ -45,7 +46,7 @@ pub(super) fn inlined(
         };
         let callee = &functions[callee as usize];
         size += size_of(callee);
-        take_in(&mut function, (block, place), callee, (target, &arguments));
+        take_in(&mut function, block, place, callee, target, &arguments);
     }
     function
 }
@@ -53,9 +54,11 @@ pub(super) fn inlined(
 /// Replaces a call by the code that it calls.
 fn take_in(
     function: &mut Function,
-    (block, place): (usize, usize),
+    block: usize,
+    place: usize,
     callee: &Function,
-    (target, arguments): (Option<Register>, &[Register]),
+    target: Option<Register>,
+    arguments: &[Register],
 ) {
     let first_register = function.registers.len() as u32;
     function.registers.extend(&callee.registers);

@@ -65,9 +65,7 @@ impl Layout {
         let processes = network.processes.len();
         let attempts = (0..processes).map(|process| {
             let mut spots = program.spots_of(process).iter();
-            spots
-                .any(|spot| spot.outputs.0 < spot.outputs.1)
-                .then(|| take(2))
+            spots.any(|spot| !spot.outputs.is_empty()).then(|| take(2))
         });
         let attempts: Vec<_> = attempts.collect();
         let stays = (0..processes).map(|process| {
@@ -82,7 +80,7 @@ impl Layout {
         let stays = stays.collect();
         let most_windows = (0..processes)
             .flat_map(|process| program.spots_of(process))
-            .map(|spot| spot.outputs.1 - spot.outputs.0)
+            .map(|spot| spot.outputs.numbers().len() as u32)
             .max()
             .unwrap_or(0)
             .max(1);

@@ -66,9 +66,8 @@ impl<'p, 'a> Movers<'p, 'a> {
 impl<'a> RaceWriter<'_, 'a> {
     /// The function that lets a process move from a location.
     pub(super) fn movement(&self, process: usize, location: usize, ids: &Ids) -> Function {
-        let result = (0, Some(RegisterType::Integer));
         let name = format!("move of process {process} from location {location}");
-        let mut writer = self.writer(&name, result);
+        let mut writer = self.writer(&name, 0, Some(RegisterType::Integer));
         let w = &mut writer;
         let spot = &self.program.spots_of(process)[location];
         let outputs = self.program.range(spot.outputs);
@@ -503,8 +502,11 @@ impl<'a> RaceWriter<'_, 'a> {
     /// The function that says whether an output of a process is enabled now, where time stands
     /// still; if its argument is not 0, only an output that leaves a committed location counts.
     pub(super) fn ability(&self, process: usize) -> Function {
-        let result = (1, Some(RegisterType::Integer));
-        let mut w = self.writer(&format!("whether process {process} can move"), result);
+        let mut w = self.writer(
+            &format!("whether process {process} can move"),
+            1,
+            Some(RegisterType::Integer),
+        );
         let only_committed = Register(0);
         let location = w.load(process as u32);
         let spots = self.program.spots_of(process);

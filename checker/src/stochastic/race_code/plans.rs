@@ -10,7 +10,7 @@ impl RaceWriter<'_, '_> {
     /// The function that lets a process plan in a location.
     pub(super) fn plan_in(&self, process: usize, location: usize) -> Function {
         let name = format!("plan of process {process} in location {location}");
-        let mut w = self.writer(&name, (0, None));
+        let mut w = self.writer(&name, 0, None);
         let spot = &self.program.spots_of(process)[location];
         let Ok(()) = rules::plan(&mut w, self.program, process, spot);
         w.return_value(None);
@@ -19,7 +19,7 @@ impl RaceWriter<'_, '_> {
 
     /// The function that lets a process plan wherever it is.
     pub(super) fn plan(&self, process: usize, by_location: &[Option<FunctionId>]) -> Function {
-        let mut w = self.writer(&format!("plan of process {process}"), (0, None));
+        let mut w = self.writer(&format!("plan of process {process}"), 0, None);
         let location = w.load(process as u32);
         let (idle, wrong) = (w.block(), w.block());
         let mut places = Vec::new();
@@ -55,7 +55,7 @@ impl RaceWriter<'_, '_> {
         if spots.iter().all(|spot| spot.invariant == Condition::Always) {
             return None;
         }
-        let mut w = self.writer(&format!("invariant of process {process}"), (0, None));
+        let mut w = self.writer(&format!("invariant of process {process}"), 0, None);
         let location = w.load(process as u32);
         let (kept, broken) = (w.block(), w.block());
         let places: Vec<BlockId> = spots
@@ -83,8 +83,7 @@ impl RaceWriter<'_, '_> {
     /// The function that draws a delay in the windows that lie in their words: uniformly if its
     /// argument is 1, else by the rate that lies beside them.
     pub(super) fn windows(&self) -> Function {
-        let result = (1, Some(RegisterType::Double));
-        let mut w = self.writer("a delay in windows", result);
+        let mut w = self.writer("a delay in windows", 1, Some(RegisterType::Double));
         let rate = w.load_real(self.layout.rate);
         let Ok(delay) = rules::delay_in_windows(&mut w, Register(0), rate);
         w.return_value(Some(delay));
@@ -94,7 +93,7 @@ impl RaceWriter<'_, '_> {
 
 /// Whether nothing ever comes of a plan.
 fn is_idle(spot: &Spot) -> bool {
-    spot.outputs.0 == spot.outputs.1
+    spot.outputs.is_empty()
         && spot.urgency == Urgency::Normal
         && spot.invariant == Condition::Always
 }

@@ -45,7 +45,12 @@ impl<'a> RaceWriter<'_, 'a> {
         self.program.network
     }
 
-    pub(super) fn writer(&self, name: &str, signature: (u32, Option<RegisterType>)) -> Writer<'_> {
-        Writer::new(name, signature, self.layout)
+    pub(super) fn writer(
+        &self,
+        name: &str,
+        parameters: u32,
+        result: Option<RegisterType>,
+    ) -> Writer<'_> {
+        Writer::new(name, parameters, result, self.layout)
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn rated_clocks(program: &Program<'_>) -> Option<Vec<(u32, u32)>> {
 impl RaceWriter<'_, '_> {
     /// The function that lets those set rates who plan anew, and finds whose plans that concerns.
     pub(super) fn renewal_of_rates(&self) -> Function {
-        let mut writer = self.writer("rates of clocks", (0, None));
+        let mut writer = self.writer("rates of clocks", 0, None);
         let w = &mut writer;
         for &process in &self.program.rated {
             let (word, bit) = self.layout.stale_bit(process as usize);
@@ -70,7 +70,7 @@ impl RaceWriter<'_, '_> {
             let Some(readers) = self.program.rate_readers.get(&clock) else {
                 continue;
             };
-            let is_same = w.same_words((self.layout.rate_before(clock), clock + 2), 2);
+            let is_same = w.same_words(self.layout.rate_before(clock), clock + 2, 2);
             let is_other = w.compare_to(is_same, Relation::Equal, 0);
             w.when(is_other, |w| self.mark_readers(w, readers, None));
         }

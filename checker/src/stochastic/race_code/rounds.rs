@@ -1,7 +1,6 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
 use super::asked::Watched;
-use super::moves::MISSED;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER};
 use super::writer::Writer;
@@ -11,14 +10,25 @@ use crate::ir::{
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::rules::{self, Backend};
 
-/// What all parts of a round need.
+/// What all parts of a round share.
 #[derive(Clone, Copy)]
 struct Round<'r> {
     ids: &'r Ids,
     watched: &'r Watched,
-    /// Set to the cell of the winner before it moves, in the block behind it.
+    /// The cell of the winner, and the delay before it moves.
     cell: Register,
+    delay: Register,
+    begin: BlockId,
+    /// Somebody must leave a committed location.
+    settling: BlockId,
+    /// Nobody must.
+    racing: BlockId,
+    /// All may stay until the delay is over.
+    free: BlockId,
+    /// The winner is known, and the delay has passed.
     moving: BlockId,
+    /// The run ends at its bound, after the delay.
+    over: BlockId,
 }
 
 /// Who wins, in registers.
@@ -61,44 +71,46 @@ impl RaceWriter<'_, '_> {
     /// The function that makes moves until the run has ended, or so many as its words say.
     pub(super) fn rounds(&self, ids: &Ids, watched: &Watched) -> Function {
         let layout = self.layout;
-        let mut writer = self.writer("moves of a run", (0, Some(RegisterType::Integer)));
+        let mut writer = self.writer("moves of a run", 0, Some(RegisterType::Integer));
         let w = &mut writer;
         self.begin_run(w, ids);
-        let (round, settling, racing) = (w.block(), w.block(), w.block());
-        let (moving, over) = (w.block(), w.block());
-        w.jump(round);
-        w.at(round);
-        // Where the winner moves, from the location that the cell says; the delay before it has
-        // passed.
-        let (cell, delay) = (w.integer(0), w.real(0.0));
-        let this = Round {
+        let begin = w.block();
+        w.jump(begin);
+        w.at(begin);
+        let round = Round {
             ids,
             watched,
-            cell,
-            moving,
+            cell: w.integer(0),
+            delay: w.real(0.0),
+            begin,
+            settling: w.block(),
+            racing: w.block(),
+            free: w.block(),
+            moving: w.block(),
+            over: w.block(),
         };
         if self.committing.is_empty() {
-            w.jump(racing);
+            w.jump(round.racing);
         } else {
             let committed = w.load(layout.committed);
-            w.branch(committed, settling, racing);
-            w.at(settling);
-            self.settle_committed(w, this);
+            w.branch(committed, round.settling, round.racing);
+            w.at(round.settling);
+            self.settle_committed(w, round);
         }
-        w.at(racing);
+        w.at(round.racing);
         self.plan_anew(w, ids);
         let all = self.attempts(w, ids);
         let infinity = w.real(f64::INFINITY);
         let first = (!all.is_empty()).then(|| First::of(w, &all));
-        w.copy(delay, first.map_or(infinity, |first| first.attempt));
-        let (bounded, free) = (w.block(), w.block());
+        w.copy(round.delay, first.map_or(infinity, |first| first.attempt));
+        let bounded = w.block();
         let has_stays = w.load(layout.has_stays);
-        w.branch(has_stays, bounded, free);
+        w.branch(has_stays, bounded, round.free);
         // Some process may not stay for ever, and tries to move later than it must.
         w.at(bounded);
-        self.settle_stays(w, this, delay, free, over);
-        w.at(free);
-        let passing = self.watch_delay(w, watched, delay, over);
+        self.settle_stays(w, round);
+        w.at(round.free);
+        let passing = self.watch_delay(w, round);
         if let Some(first) = first {
             let words = layout.attempts.iter().flatten();
             let attempts: Vec<(u32, Register)> = words
@@ -106,23 +118,22 @@ impl RaceWriter<'_, '_> {
                 .map(|(&word, one)| (word, one.attempt))
                 .collect();
             self.wait(w, passing, &attempts);
-            w.copy(cell, first.cell);
+            w.copy(round.cell, first.cell);
             if let Some(second) = first.second {
-                let latest = rules::tolerant(w, delay);
+                let latest = rules::tolerant(w, round.delay);
                 let are_many = w.compare_reals(second, Relation::LessEqual, latest);
-                let tied = w.block();
-                w.branch(are_many, tied, moving);
-                w.at(tied);
-                Self::choose_among(w, &all, latest, cell);
+                w.when(are_many, |w| {
+                    Self::choose_among(w, &all, latest, round.cell);
+                });
             }
-            w.jump(moving);
+            w.jump(round.moving);
         } else {
             w.give_up();
         }
-        w.at(moving);
-        self.let_winner_move(w, ids, cell, [round, racing, settling]);
-        w.at(over);
-        self.end_run(w, watched, delay);
+        w.at(round.moving);
+        self.let_winner_move(w, round);
+        w.at(round.over);
+        self.end_run(w, watched, round.delay);
         writer.finish()
     }
 
@@ -160,14 +171,8 @@ impl RaceWriter<'_, '_> {
     /// Watches all through a delay, and goes elsewhere if the bound of the run comes first: the
     /// delay is then what is left of it. Returns how much time passes, which is less than the delay
     /// if that lies beyond the bound by no more than rounding.
-    fn watch_delay(
-        &self,
-        w: &mut Writer<'_>,
-        watched: &Watched,
-        delay: Register,
-        over: BlockId,
-    ) -> Register {
-        let layout = self.layout;
+    fn watch_delay(&self, w: &mut Writer<'_>, round: Round<'_>) -> Register {
+        let (layout, delay) = (self.layout, round.delay);
         let (inside, beyond, in_time) = (w.block(), w.block(), w.block());
         let passing = w.real(0.0);
         let (bound, time) = (w.load_real(layout.bound), w.load_real(layout.time));
@@ -179,17 +184,17 @@ impl RaceWriter<'_, '_> {
         let (rest, slack) = self.rest(w);
         let first_end = w.least(delay, rest);
         w.copy(passing, first_end);
-        self.watch(w, watched, Some(passing));
+        self.watch(w, round.watched, Some(passing));
         let latest_end = w.add(rest, slack);
         let is_late = w.compare_reals(latest_end, Relation::Less, delay);
         let late = w.block();
         w.branch(is_late, late, in_time);
         w.at(late);
         w.copy(delay, rest);
-        w.jump(over);
+        w.jump(round.over);
         w.at(inside);
         w.copy(passing, delay);
-        self.watch(w, watched, Some(passing));
+        self.watch(w, round.watched, Some(passing));
         w.jump(in_time);
         w.at(in_time);
         passing
@@ -197,17 +202,11 @@ impl RaceWriter<'_, '_> {
 
     /// Lets the winner move, and goes to the next round: to its begin, or past it where the move
     /// says whether somebody is in a committed location now.
-    fn let_winner_move(
-        &self,
-        w: &mut Writer<'_>,
-        ids: &Ids,
-        cell: Register,
-        [round, racing, settling]: [BlockId; 3],
-    ) {
+    fn let_winner_move(&self, w: &mut Writer<'_>, round: Round<'_>) {
         w.count_round();
         let (moved, put_off, go_on) = (w.block(), w.block(), w.block());
-        self.let_move(w, ids, cell, [round, moved, put_off]);
-        for (block, next) in [(moved, racing), (put_off, settling)] {
+        self.let_move(w, round, moved, put_off);
+        for (block, next) in [(moved, round.racing), (put_off, round.settling)] {
             w.at(block);
             let left = w.load(self.layout.moves_left);
             let minus_one = w.integer(-1);
@@ -255,16 +254,21 @@ impl RaceWriter<'_, '_> {
 
     /// Lets the winner move from where it is, as its cell says; goes where what the function of the
     /// move returns leads.
-    fn let_move(&self, w: &mut Writer<'_>, ids: &Ids, cell: Register, next: [BlockId; 3]) {
+    fn let_move(&self, w: &mut Writer<'_>, round: Round<'_>, moved: BlockId, put_off: BlockId) {
         let wrong = w.block();
-        let cells = ids.moves.iter().enumerate().flat_map(|(process, moves)| {
-            let functions = moves.iter().enumerate();
-            functions.map(move |(location, function)| Some((process, location, (*function)?)))
-        });
+        let cells = round
+            .ids
+            .moves
+            .iter()
+            .enumerate()
+            .flat_map(|(process, moves)| {
+                let functions = moves.iter().enumerate();
+                functions.map(move |(location, function)| Some((process, location, (*function)?)))
+            });
         let cells: Vec<Option<(usize, usize, FunctionId)>> = cells.collect();
         let blocks = cells.iter().map(|one| one.map_or(wrong, |_| w.block()));
         let blocks: Vec<BlockId> = blocks.collect();
-        w.switch(cell, blocks.clone(), wrong);
+        w.switch(round.cell, blocks.clone(), wrong);
         for (cell, block) in cells.into_iter().zip(blocks) {
             let Some((process, location, function)) = cell else {
                 continue;
@@ -272,12 +276,14 @@ impl RaceWriter<'_, '_> {
             w.at(block);
             let result = w.call_for(function, Vec::new());
             let spot = &self.program.spots_of(process)[location];
-            let mut next = next.to_vec();
-            if spot.urgency == Urgency::Committed {
+            let missed = if spot.urgency == Urgency::Committed {
                 // Somebody else may have to move.
-                next[MISSED as usize] = wrong;
-            }
-            w.switch(result, next, wrong);
+                wrong
+            } else {
+                round.begin
+            };
+            // In the order of what the function returns.
+            w.switch(result, vec![missed, moved, put_off], wrong);
         }
         w.at(wrong);
         w.give_up();
@@ -323,42 +329,29 @@ impl RaceWriter<'_, '_> {
         processes: &[usize],
         only_committed: bool,
     ) {
-        let Round {
-            ids,
-            watched,
-            cell,
-            moving,
-        } = round;
         let competitors = w.variable(0);
         for &process in processes {
-            let Some(ability) = ids.abilities[process] else {
+            let Some(ability) = round.ids.abilities[process] else {
                 continue;
             };
             let argument = w.integer(only_committed.into());
             let is_able = w.call_for(ability, vec![argument]);
             w.when(is_able, |w| {
                 let Ok(()) = rules::compete(w, &competitors, |w| {
-                    let own = Self::cell(w, ids, process);
-                    w.copy(cell, own);
+                    let own = Self::cell(w, round.ids, process);
+                    w.copy(round.cell, own);
                     Ok(())
                 });
             });
         }
         w.insist(competitors.get());
-        self.watch(w, watched, None);
-        w.jump(moving);
+        self.watch(w, round.watched, None);
+        w.jump(round.moving);
     }
 
     /// If some process must leave before anybody tries to move, who can move then does, or the run
     /// is over by then.
-    fn settle_stays(
-        &self,
-        w: &mut Writer<'_>,
-        round: Round<'_>,
-        delay: Register,
-        free: BlockId,
-        over: BlockId,
-    ) {
+    fn settle_stays(&self, w: &mut Writer<'_>, round: Round<'_>) {
         let infinity = w.real(f64::INFINITY);
         let mut least = infinity;
         for &word in self.layout.stays.iter().flatten() {
@@ -368,8 +361,8 @@ impl RaceWriter<'_, '_> {
         let has_end = w.compare_reals(least, Relation::Less, infinity);
         w.when(has_end, |w| {
             let latest = rules::tolerant(w, least);
-            let is_beyond = w.compare_reals(delay, Relation::Greater, latest);
-            w.unless(is_beyond, free);
+            let is_beyond = w.compare_reals(round.delay, Relation::Greater, latest);
+            w.unless(is_beyond, round.free);
             let is_now = w.compare_real_to(least, Relation::LessEqual, TOLERANCE);
             let (now, later, stuck) = (w.block(), w.block(), w.block());
             w.branch(is_now, now, later);
@@ -385,13 +378,13 @@ impl RaceWriter<'_, '_> {
             let end = w.add(rest, slack);
             let is_over = w.compare_reals(end, Relation::Less, least);
             w.unless(is_over, stuck);
-            w.copy(delay, rest);
-            w.jump(over);
+            w.copy(round.delay, rest);
+            w.jump(round.over);
             w.at(stuck);
             w.give_up();
         });
         w.store_integer(self.layout.has_stays, 0);
-        w.jump(free);
+        w.jump(round.free);
     }
 
     /// How much time the run still has, and how much later a move may come.

@@ -16,6 +16,7 @@ use crate::ir::{
 use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
 use crate::stochastic::program::{Program, Spot};
+use crate::stochastic::run::RunId;
 
 /// A race of more instructions is not written as code.
 const MOST_INSTRUCTIONS: usize = 100_000;
@@ -63,11 +64,11 @@ impl WrittenRace {
         functions.push(writer.windows());
         if !rated.is_empty() {
             let renewal = writer.renewal_of_rates();
-            functions.push(inlined(renewal, &network.functions, (SMALL, MOST_TAKEN_IN)));
+            functions.push(inlined(renewal, &network.functions, SMALL, MOST_TAKEN_IN));
         }
         let mut instructions = 0;
         let mut add = |function: Function, largest: usize| {
-            let function = inlined(function, &functions, (largest, MOST_TAKEN_IN));
+            let function = inlined(function, &functions, largest, MOST_TAKEN_IN);
             instructions += size_of(&function);
             functions.push(function);
             let id = FunctionId(functions.len() as u32 - 1);
@@ -105,10 +106,10 @@ impl WrittenRace {
         for process in processes {
             let mut moves = Vec::new();
             for (location, spot) in program.spots_of(process).iter().enumerate() {
-                moves.push(if spot.outputs.0 < spot.outputs.1 {
-                    Some(add(writer.movement(process, location, &ids), SMALL)?)
-                } else {
+                moves.push(if spot.outputs.is_empty() {
                     None
+                } else {
+                    Some(add(writer.movement(process, location, &ids), SMALL)?)
                 });
             }
             ids.moves.push(moves);
@@ -220,7 +221,7 @@ impl RaceCode {
         &mut self,
         program: &Program<'_>,
         executor: &dyn Executor,
-        (seed, run): (u64, u64),
+        RunId { seed, run }: RunId,
         bound: f64,
     ) -> Option<End> {
         self.words.copy_from_slice(&self.initial);

@@ -7,6 +7,7 @@ use super::asked::{End, Watched};
 use super::runs::{RaceCode, WrittenRace};
 use crate::exec::Executor;
 use crate::stochastic::program::Program;
+use crate::stochastic::run::RunId;
 
 /// The moves before it is looked at whether there is code for a race.
 const MOVES_BEFORE_WRITING: u64 = 20_000;
@@ -77,9 +78,10 @@ impl Stages {
     /// Makes a run by code; `None` if it must be made in another way.
     pub(in crate::stochastic) fn run(
         &mut self,
-        (program, executor): (&Program<'_>, &dyn Executor),
+        program: &Program<'_>,
+        executor: &dyn Executor,
         watched: Watched,
-        numbers: (u64, u64),
+        id: RunId,
         bound: f64,
     ) -> Option<End> {
         self.go_on(program, executor, watched);
@@ -95,7 +97,7 @@ impl Stages {
             return None;
         };
         *runs += 1;
-        let end = code.run(program, executor, numbers, bound);
+        let end = code.run(program, executor, id, bound);
         if end.is_none() {
             *given_up += 1;
             if *runs >= ENOUGH_RUNS && *given_up > *runs / FEW {

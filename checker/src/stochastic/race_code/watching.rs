@@ -6,7 +6,7 @@ use super::race_writer::RaceWriter;
 use super::writer::Writer;
 use crate::ir::{BlockId, IntegerOperator, Register, Relation};
 use crate::stochastic::condition::Condition;
-use crate::stochastic::rules::Backend;
+use crate::stochastic::rules::{self, Backend};
 
 /// What the code of a run returns: it goes on if it is called again;
 pub(super) const GOES_ON: i32 = 0;
@@ -30,18 +30,16 @@ impl RaceWriter<'_, '_> {
     /// there is one.
     pub(super) fn watch(&self, w: &mut Writer<'_>, watched: &Watched, delay: Option<Register>) {
         match *watched {
-            Watched::Eventually(goal) => self.watch_for(w, (Condition::Always, goal), delay),
-            Watched::Always(keep) => self.watch_for(w, (keep, Condition::Never), delay),
-            Watched::Until(keep, goal) => self.watch_for(w, (keep, goal), delay),
+            Watched::Eventually(goal) => self.watch_for(w, Condition::Always, goal, delay),
+            Watched::Always(keep) => self.watch_for(w, keep, Condition::Never, delay),
+            Watched::Until(keep, goal) => self.watch_for(w, keep, goal, delay),
             Watched::Extreme(value, sign) => {
                 w.call(value, &[]);
                 let value = w.load_real(self.network().chances.result);
                 let sign = w.real(sign);
                 let value = w.multiply(sign, value);
-                let infinity = w.real(f64::INFINITY);
-                let negative = w.negate(value);
-                let size = w.greatest(value, negative);
-                let is_finite = w.compare_reals(size, Relation::Less, infinity);
+                let size = rules::size(w, value);
+                let is_finite = w.compare_real_to(size, Relation::Less, f64::INFINITY);
                 w.insist(is_finite);
                 let best = w.load_real(self.layout.best);
                 let best = w.greatest(value, best);
@@ -54,12 +52,14 @@ impl RaceWriter<'_, '_> {
     fn watch_for(
         &self,
         w: &mut Writer<'_>,
-        (keep, goal): (Condition, Condition),
+        keep: Condition,
+        goal: Condition,
         delay: Option<Register>,
     ) {
         let (reached, missed, next) = (w.block(), w.block(), w.block());
         if keep.is_timed() || goal.is_timed() {
-            self.watch_through(w, (keep, goal), delay, (reached, missed, next));
+            self.watch_through(w, keep, goal, delay, reached, missed);
+            w.jump(next);
         } else {
             // Both stay what they are until somebody moves.
             require(w, goal, false, reached);
@@ -78,9 +78,11 @@ impl RaceWriter<'_, '_> {
     fn watch_through(
         &self,
         w: &mut Writer<'_>,
-        (keep, goal): (Condition, Condition),
+        keep: Condition,
+        goal: Condition,
         delay: Option<Register>,
-        (reached, missed, next): (BlockId, BlockId, BlockId),
+        reached: BlockId,
+        missed: BlockId,
     ) {
         let ahead = w.real(0.0);
         let head = w.block();
@@ -106,8 +108,7 @@ impl RaceWriter<'_, '_> {
             let later = w.add(ahead, horizon);
             let is_inside = w.compare_reals(later, Relation::LessEqual, delay);
             w.unless(is_inside, after);
-            let infinity = w.real(f64::INFINITY);
-            let is_finite = w.compare_reals(later, Relation::Less, infinity);
+            let is_finite = w.compare_real_to(later, Relation::Less, f64::INFINITY);
             w.unless(is_finite, after);
             let gets_on = w.compare_reals(later, Relation::Greater, ahead);
             w.unless(gets_on, after);
@@ -119,7 +120,6 @@ impl RaceWriter<'_, '_> {
         w.at(after);
         let none = w.real(0.0);
         w.store_double(self.layout.decided_after, none);
-        w.jump(next);
     }
 
     /// What a condition says of the state after this time, if nothing happens until then.

@@ -31,7 +31,8 @@ impl<'l> Writer<'l> {
     /// A function of integers; its parameters are the first registers.
     pub(super) fn new(
         name: &str,
-        (parameters, result): (u32, Option<RegisterType>),
+        parameters: u32,
+        result: Option<RegisterType>,
         layout: &'l Layout,
     ) -> Writer<'l> {
         Writer {
@@ -336,7 +337,7 @@ impl<'l> Writer<'l> {
     }
 
     /// Whether so many words at two places are the same: 0 or 1.
-    pub(super) fn same_words(&mut self, (left, right): (u32, u32), words: u32) -> Register {
+    pub(super) fn same_words(&mut self, left: u32, right: u32, words: u32) -> Register {
         self.result(RegisterType::Integer, |target| Instruction::EqualWords {
             target,
             left: word_of_state(left, None),

@@ -19,10 +19,10 @@ pub struct DoubleSampling {
 impl DoubleSampling {
     /// A test at these risks: that p is less than q is said wrongly at a ratio of the odds of `u1`
     /// or more with a risk of `alpha`, and the opposite at `u0` or less with a risk of `beta`.
-    pub fn new((u0, u1): (f64, f64), alpha: f64, beta: f64) -> DoubleSampling {
+    pub fn new(u0: f64, u1: f64, alpha: f64, beta: f64) -> DoubleSampling {
         let share = |odds: f64| odds / (1.0 + odds);
         DoubleSampling {
-            test: SequentialTest::between((share(u0), share(u1)), alpha, beta),
+            test: SequentialTest::between(share(u0), share(u1), alpha, beta),
             differing: 0,
         }
     }
@@ -51,10 +51,10 @@ mod tests {
     /// Only differing pairs count, so the test is a walk that steps up with probability
     /// u / (1 + u). Its risks come from the distribution after each step, until next to nothing is
     /// left undecided; steps in another order come to the same place.
-    fn says((p, q): (f64, f64), bounds: (f64, f64)) -> (f64, f64) {
+    fn says(p: f64, q: f64, bounds: (f64, f64)) -> (f64, f64) {
         let odds = p * (1.0 - q) / (q * (1.0 - p));
         let up = odds / (1.0 + odds);
-        let new = || DoubleSampling::new(bounds, 0.05, 0.05);
+        let new = || DoubleSampling::new(bounds.0, bounds.1, 0.05, 0.05);
         // Of each number of steps up more than down, the probability and a test that is there.
         let mut open = vec![(0_i64, 1.0, new())];
         let (mut below, mut at_least) = (0.0, 0.0);
@@ -92,18 +92,18 @@ mod tests {
         // Ratios of the odds of u1 and u0 exactly, for likely and unlikely events.
         for q in [0.5_f64, 0.01] {
             let of_odds = |odds: f64| odds * q / (1.0 - q + odds * q);
-            let (below, at_least) = says((of_odds(1.1), q), bounds);
+            let (below, at_least) = says(of_odds(1.1), q, bounds);
             assert!(below <= 0.05 && at_least > 0.94, "{q}: {below}, {at_least}");
-            let (below, at_least) = says((of_odds(0.9), q), bounds);
+            let (below, at_least) = says(of_odds(0.9), q, bounds);
             assert!(at_least <= 0.05 && below > 0.94, "{q}: {below}, {at_least}");
         }
-        let (below, at_least) = says((0.6, 0.5), bounds);
+        let (below, at_least) = says(0.6, 0.5, bounds);
         assert!(below < 1e-4 && at_least > 0.999, "{below}, {at_least}");
     }
 
     #[test]
     fn pairs_that_agree_do_not_count() {
-        let mut test = DoubleSampling::new((0.9, 1.1), 0.05, 0.05);
+        let mut test = DoubleSampling::new(0.9, 1.1, 0.05, 0.05);
         for _ in 0..10_000 {
             assert_eq!(test.push(true, true), None);
             assert_eq!(test.push(false, false), None);

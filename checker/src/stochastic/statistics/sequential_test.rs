@@ -34,11 +34,11 @@ impl SequentialTest {
     pub fn new(threshold: f64, deltas: (f64, f64), alpha: f64, beta: f64) -> SequentialTest {
         let high = (threshold + deltas.1).clamp(LEAST, 1.0 - LEAST);
         let low = (threshold - deltas.0).clamp(LEAST, 1.0 - LEAST);
-        SequentialTest::between((low, high), alpha, beta)
+        SequentialTest::between(low, high, alpha, beta)
     }
 
     /// A test at these risks that promises nothing between two probabilities.
-    pub(super) fn between((low, high): (f64, f64), alpha: f64, beta: f64) -> SequentialTest {
+    pub(super) fn between(low: f64, high: f64, alpha: f64, beta: f64) -> SequentialTest {
         SequentialTest {
             steps: ((low / high).ln(), ((1.0 - low) / (1.0 - high)).ln()),
             limits: ((beta / (1.0 - alpha)).ln(), ((1.0 - beta) / alpha).ln()),
