@@ -89,6 +89,8 @@ pub(super) struct Spot {
     /// Whether its outputs that are enabled stay so as time passes, and none is on an urgent
     /// channel or needs a receiver.
     pub(super) is_plain: bool,
+    /// Whether each output is enabled in one interval, whoever receives.
+    pub(super) has_spans: bool,
 }
 
 impl Spot {
@@ -166,6 +168,10 @@ impl<'a> Program<'a> {
             let is_plain = known
                 .iter()
                 .all(|one| !one.guard.is_timed() && !one.is_binary && !one.may_be_urgent);
+            let has_spans = known.iter().all(|one| {
+                let is_span = !matches!(one.guard, Condition::Timed(_) | Condition::Curved(_));
+                is_span && !one.is_binary
+            });
             let invariant = self.condition(&location.invariant, &[], machine);
             let exponential_rate = chances
                 .exponential_rate
@@ -179,6 +185,7 @@ impl<'a> Program<'a> {
                 rates: chances.rates,
                 is_controllable,
                 is_plain,
+                has_spans,
             });
         }
     }

@@ -76,15 +76,16 @@ impl Race<'_> {
 
     /// Whether the rules know when the outputs of a process are enabled: each has one window, which
     /// neither a receiver nor a strategy nor the motion of clocks changes.
+    #[inline]
     pub(super) fn is_known(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
         if spot.is_controllable && self.has_decisions() {
             return false;
         }
+        let mut outputs = program.range(spot.outputs).iter();
         spot.is_plain
-            || program.range(spot.outputs).iter().all(|output| {
-                let is_span = !matches!(output.guard, Condition::Timed(_) | Condition::Curved(_));
-                is_span && !output.is_binary && !self.steps(program, output.guard)
-            })
+            || spot.has_spans
+                && !(self.motion.is_flowing()
+                    && outputs.any(|output| self.steps(program, output.guard)))
     }
 
     /// How long a process may stay where it is.
@@ -97,22 +98,8 @@ impl Race<'_> {
         Ok(rules::stay(self, program, process, spot)?.unwrap_or(f64::INFINITY))
     }
 
-    /// How long a process may stay where it is, if its invariant must be looked at again and again;
-    /// `None` if not.
-    pub(super) fn stay_by_looking(
-        &mut self,
-        program: &Program<'_>,
-        process: usize,
-        spot: &Spot,
-    ) -> Option<Result<f64, Failure>> {
-        if self.steps(program, spot.invariant) {
-            return Some(self.stepped_bound(program, spot, process));
-        }
-        let is_looked_at = matches!(spot.invariant, Condition::Timed(_) | Condition::Curved(_));
-        is_looked_at.then(|| self.looked_bound(program, spot, process))
-    }
-
-    fn looked_bound(
+    /// How long a process may stay where it is, if its invariant is found by masks.
+    pub(super) fn looked_bound(
         &mut self,
         program: &Program<'_>,
         spot: &Spot,
@@ -174,6 +161,7 @@ impl Race<'_> {
     }
 
     /// Whether a condition is looked at along the motion of clocks.
+    #[inline]
     pub(super) fn steps(&mut self, program: &Program<'_>, condition: Condition) -> bool {
         match condition {
             Condition::Curved(_) => true,

@@ -68,15 +68,19 @@ impl Race<'_> {
         program: &Program<'_>,
         instances: &[u32],
     ) -> Result<u32, Failure> {
+        if let [only] = *instances
+            && program.instance(only).edge.leg.is_none()
+        {
+            return Ok(only);
+        }
         let candidates = instances.iter().map(|&number| Candidate {
             instance: program.instance(number),
             number: number as i32,
             flag: None,
         });
-        let candidates: Vec<_> = candidates.collect();
         let chosen = Cell::new(0);
         self.attempt(|race, none| {
-            chosen.set(rules::one_of(race, program, &candidates, none)?);
+            chosen.set(rules::one_of(race, program, candidates.clone(), none)?);
             Ok(())
         })?;
         Ok(chosen.get() as u32)

@@ -10,6 +10,7 @@ use crate::ir::{
 };
 use crate::stochastic::condition::Condition;
 use crate::stochastic::failure::{Failure, Stand};
+use crate::stochastic::program::{Program, Spot};
 use crate::stochastic::rules::{Backend, Flow};
 
 impl Backend for Writer<'_> {
@@ -285,5 +286,23 @@ impl Backend for Writer<'_> {
 
     fn holds(&mut self, _: Condition, _: &[i32]) -> Flow<Self, Register> {
         unreachable!("networks with such conditions are not written as code")
+    }
+
+    fn other_stay(&mut self, _: &Program<'_>, _: usize, _: &Spot) -> Flow<Self, Register> {
+        unreachable!("the rules know all of a network that is written as code")
+    }
+
+    fn other_ability(&mut self, _: &Program<'_>, _: &Spot) -> Flow<Self, Register> {
+        unreachable!("the rules know all of a network that is written as code")
+    }
+
+    fn other_attempt(
+        &mut self,
+        _: &Program<'_>,
+        _: usize,
+        _: &Spot,
+        _: Option<Register>,
+    ) -> Flow<Self, Register> {
+        unreachable!("the rules know all of a network that is written as code")
     }
 }

@@ -109,12 +109,13 @@ impl<'a> RaceWriter<'_, 'a> {
             });
             Candidate {
                 instance,
-                number,
+                number: w.integer(number),
                 flag,
             }
         });
         let candidates: Vec<_> = candidates.collect();
-        let Ok(chosen) = rules::one_of(w, self.program, &candidates, otherwise);
+        let candidates = candidates.iter().copied();
+        let Ok(chosen) = rules::one_of(w, self.program, candidates, otherwise);
         chosen
     }
 
@@ -376,11 +377,12 @@ impl<'a> RaceWriter<'_, 'a> {
                 })?;
                 candidates.push(Candidate {
                     instance,
-                    number,
+                    number: w.integer(number),
                     flag: Some(flag),
                 });
             }
-            let taken = rules::one_of(w, self.program, &candidates, none)?;
+            let candidates = candidates.iter().copied();
+            let taken = rules::one_of(w, self.program, candidates, none)?;
             w.copy(chosen, taken);
             Ok(())
         });

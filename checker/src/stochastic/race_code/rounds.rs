@@ -239,7 +239,7 @@ impl RaceWriter<'_, '_> {
         });
         let flagged: Vec<_> = flagged.collect();
         let Ok(()) = w.attempt(|w, none| {
-            let chosen = rules::draw(w, &flagged, none)?;
+            let chosen = rules::draw(w, flagged.iter().copied(), none)?;
             w.copy(cell, chosen);
             Ok(())
         });

@@ -225,34 +225,33 @@ pub(in crate::stochastic) trait Backend: Sized {
     /// Whether a condition holds now that is no conjunction of comparisons.
     fn holds(&mut self, condition: Condition, values: &[i32]) -> Flow<Self, Self::Integer>;
 
-    /// How long a process may stay by an invariant that the rules do not know.
+    /// Whether the rules know how long a process may stay by its invariant.
+    fn knows_stay(&mut self, _: &Program<'_>, _: &Spot) -> bool {
+        true
+    }
+
+    /// How long it may stay by one that they do not know.
     fn other_stay(
         &mut self,
-        _: &Program<'_>,
-        _: usize,
-        _: &Spot,
-    ) -> Option<Flow<Self, Self::Real>> {
-        None
+        program: &Program<'_>,
+        process: usize,
+        spot: &Spot,
+    ) -> Flow<Self, Self::Real>;
+
+    /// Whether the rules know when the outputs of a process are enabled.
+    fn knows_outputs(&mut self, _: &Program<'_>, _: &Spot) -> bool {
+        true
     }
 
-    /// Whether a process can move, whose outputs the rules do not know.
-    fn other_ability(
-        &mut self,
-        _: &Program<'_>,
-        _: usize,
-        _: &Spot,
-    ) -> Option<Flow<Self, Self::Integer>> {
-        None
-    }
+    /// Whether one is enabled now that they do not know.
+    fn other_ability(&mut self, program: &Program<'_>, spot: &Spot) -> Flow<Self, Self::Integer>;
 
-    /// In how long a process tries to move whose outputs the rules do not know.
+    /// In how long a process tries to move whose outputs they do not know.
     fn other_attempt(
         &mut self,
-        _: &Program<'_>,
-        _: usize,
-        _: &Spot,
-        _: Option<Self::Real>,
-    ) -> Option<Flow<Self, Self::Real>> {
-        None
-    }
+        program: &Program<'_>,
+        process: usize,
+        spot: &Spot,
+        stay: Option<Self::Real>,
+    ) -> Flow<Self, Self::Real>;
 }

@@ -13,28 +13,30 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 
 /// An instance that may be enabled.
+#[derive(Clone, Copy)]
 pub(in crate::stochastic) struct Candidate<'i, 'a, I> {
     pub(in crate::stochastic) instance: &'i Instance<'a>,
     /// What stands for it.
-    pub(in crate::stochastic) number: i32,
+    pub(in crate::stochastic) number: I,
     /// Whether it is enabled; none if that is known.
     pub(in crate::stochastic) flag: Option<I>,
 }
 
 /// The number of one of the instances that are enabled; leaves if there are none.
-pub(in crate::stochastic) fn one_of<B: Backend>(
+#[inline]
+pub(in crate::stochastic) fn one_of<'i, 'a: 'i, B: Backend>(
     b: &mut B,
     program: &Program<'_>,
-    candidates: &[Candidate<'_, '_, B::Integer>],
+    candidates: impl Iterator<Item = Candidate<'i, 'a, B::Integer>> + Clone,
     otherwise: B::Exit,
 ) -> Flow<B, B::Integer> {
-    if candidates.iter().all(|one| one.instance.edge.leg.is_none()) {
-        let candidates = candidates.iter();
-        let numbers = candidates.map(|one| (b.integer(one.number), one.flag));
-        let numbers: Vec<_> = numbers.collect();
-        return draw(b, &numbers, otherwise);
+    if candidates
+        .clone()
+        .all(|one| one.instance.edge.leg.is_none())
+    {
+        return draw(b, candidates.map(|one| (one.number, one.flag)), otherwise);
     }
-    let mut entries: BTreeMap<u32, Vec<&Candidate<'_, '_, B::Integer>>> = BTreeMap::new();
+    let mut entries: BTreeMap<u32, Vec<Candidate<'_, '_, B::Integer>>> = BTreeMap::new();
     for one in candidates {
         entries.entry(one.instance.entry).or_default().push(one);
     }
@@ -50,7 +52,7 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
         flags.push(Some(flag.get()));
     }
     let numbers: Vec<_> = (0..).map(|place| b.integer(place)).zip(flags).collect();
-    let entry = draw(b, &numbers, otherwise)?;
+    let entry = draw(b, numbers.iter().copied(), otherwise)?;
     let legs: Vec<_> = entries.into_values().collect();
     let chosen = b.variable(0);
     b.cases(entry, legs.len(), |b, place| {
@@ -63,14 +65,15 @@ pub(in crate::stochastic) fn one_of<B: Backend>(
 
 /// One of some numbers whose flags are set, all with the same chance; leaves if there are none. A
 /// number without a flag counts always.
+#[inline]
 pub(in crate::stochastic) fn draw<B: Backend>(
     b: &mut B,
-    numbers: &[(B::Integer, Option<B::Integer>)],
+    numbers: impl Iterator<Item = (B::Integer, Option<B::Integer>)> + Clone,
     otherwise: B::Exit,
 ) -> Flow<B, B::Integer> {
-    let sure = numbers.iter().filter(|one| one.1.is_none()).count();
+    let sure = numbers.clone().filter(|one| one.1.is_none()).count();
     let mut count = b.integer(sure as i32);
-    for flag in numbers.iter().filter_map(|one| one.1) {
+    for flag in numbers.clone().filter_map(|one| one.1) {
         count = b.sum(count, flag);
     }
     if sure == 0 {
@@ -85,7 +88,7 @@ pub(in crate::stochastic) fn draw<B: Backend>(
     })?;
     let chosen = b.variable(0);
     b.attempt(|b, found| {
-        for &(number, flag) in numbers {
+        for (number, flag) in numbers {
             let take = |b: &mut B| {
                 b.set(&chosen, number);
                 b.unless(rest.get(), found)?;
@@ -127,12 +130,12 @@ pub(in crate::stochastic) fn compete<B: Backend>(
 fn leg<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
-    legs: &[&Candidate<'_, '_, B::Integer>],
+    legs: &[Candidate<'_, '_, B::Integer>],
 ) -> Flow<B, B::Integer> {
     if let [only] = legs
         && only.instance.edge.leg.is_none()
     {
-        return Ok(b.integer(only.number));
+        return Ok(only.number);
     }
     let mut weights = Vec::with_capacity(legs.len());
     for leg in legs {
@@ -148,14 +151,14 @@ fn leg<B: Backend>(
     let place = by_weight(b, legs[0].instance, &weights)?;
     let chosen = b.variable(0);
     b.cases(place, legs.len(), |b, place| {
-        let number = b.integer(legs[place].number);
-        b.set(&chosen, number);
+        b.set(&chosen, legs[place].number);
         Ok(())
     })?;
     Ok(chosen.get())
 }
 
 /// The branch that a mover takes: by weight.
+#[inline]
 pub(in crate::stochastic) fn branch<B: Backend>(
     b: &mut B,
     program: &Program<'_>,

@@ -43,6 +43,7 @@ impl<R: Copy> Span<R> {
 }
 
 /// Goes on if a condition holds now, else leaves.
+#[inline]
 pub(in crate::stochastic) fn require<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -86,6 +87,7 @@ pub(in crate::stochastic) fn require<B: Backend>(
 }
 
 /// When a condition holds; leaves if never.
+#[inline]
 pub(in crate::stochastic) fn span<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -118,6 +120,7 @@ pub(in crate::stochastic) fn span<B: Backend>(
 }
 
 /// The difference of a clock and a number; 0 if they count as equal.
+#[inline]
 fn gap<B: Backend>(b: &mut B, clock: u32, bound: Number, values: &[i32]) -> Flow<B, B::Real> {
     let bound = number(b, bound, values)?;
     let value = b.load_real(clock);
@@ -139,12 +142,14 @@ fn gap<B: Backend>(b: &mut B, clock: u32, bound: Number, values: &[i32]) -> Flow
 }
 
 /// How far a number is from 0.
+#[inline]
 pub(in crate::stochastic) fn size<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let negative = b.negate(value);
     b.greatest(value, negative)
 }
 
 /// A number that does not change as time passes.
+#[inline]
 pub(in crate::stochastic) fn number<B: Backend>(
     b: &mut B,
     number: Number,
@@ -249,6 +254,7 @@ fn at_most<B: Backend>(
 }
 
 /// When a clock that is this far above a number stands in a relation to it.
+#[inline]
 fn compared<B: Backend>(
     b: &mut B,
     relation: Relation,
@@ -287,6 +293,7 @@ fn compared<B: Backend>(
 }
 
 /// The delays that are in both intervals; leaves if there are none.
+#[inline]
 fn both<B: Backend>(
     b: &mut B,
     first: Span<B::Real>,

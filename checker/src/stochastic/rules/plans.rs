@@ -26,6 +26,7 @@ impl<R: Copy> Bound<R> {
 }
 
 /// Lets a process plan in a location.
+#[inline]
 pub(in crate::stochastic) fn plan<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -37,7 +38,7 @@ pub(in crate::stochastic) fn plan<B: Backend>(
         let now = b.real(0.0);
         return b.within(
             |b, never| {
-                require_some_output(b, program, process, spot, never)?;
+                require_some_output(b, program, spot, never)?;
                 b.set_plan(process, Some(now), Some(now), false);
                 Ok(())
             },
@@ -48,8 +49,8 @@ pub(in crate::stochastic) fn plan<B: Backend>(
         );
     }
     let stay = bound.map(|bound| bound.end);
-    if let Some(attempt) = b.other_attempt(program, process, spot, stay) {
-        let attempt = attempt?;
+    if !b.knows_outputs(program, spot) {
+        let attempt = b.other_attempt(program, process, spot, stay)?;
         b.set_plan(process, Some(attempt), stay, true);
         return Ok(());
     }
@@ -62,7 +63,7 @@ pub(in crate::stochastic) fn plan<B: Backend>(
     b.within(
         |b, never| {
             if spot.is_plain {
-                require_some_output(b, program, process, spot, never)?;
+                require_some_output(b, program, spot, never)?;
                 planning.in_window(b, Span::ALL, never)
             } else {
                 planning.in_windows(b, never)
@@ -85,14 +86,15 @@ pub(in crate::stochastic) fn stay<B: Backend>(
     Ok(bound(b, program, process, spot)?.map(|bound| bound.end))
 }
 
+#[inline]
 fn bound<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
     process: usize,
     spot: &Spot,
 ) -> Flow<B, Option<Bound<B::Real>>> {
-    if let Some(stay) = b.other_stay(program, process, spot) {
-        let (end, is_finite) = (stay?, false);
+    if !b.knows_stay(program, spot) {
+        let (end, is_finite) = (b.other_stay(program, process, spot)?, false);
         return Ok(Some(Bound { end, is_finite }));
     }
     let (low, high) = (Cell::new(None), Cell::new(None));
@@ -141,15 +143,15 @@ pub(in crate::stochastic) fn require_invariant<B: Backend>(
 }
 
 /// Goes on if an output of a process is enabled, else leaves.
+#[inline]
 fn require_some_output<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
-    process: usize,
     spot: &Spot,
     never: B::Exit,
 ) -> Flow<B> {
-    if let Some(is_able) = b.other_ability(program, process, spot) {
-        let is_able = is_able?;
+    if !b.knows_outputs(program, spot) {
+        let is_able = b.other_ability(program, spot)?;
         return b.unless(is_able, never);
     }
     let outputs = program.range(spot.outputs);
@@ -192,6 +194,7 @@ struct Planning<'p, 'a, R> {
 
 impl<R: Copy> Planning<'_, '_, R> {
     /// Ends a plan: the process tries to move at a moment that it may stay until.
+    #[inline]
     fn end_in_time<B: Backend<Real = R>>(&self, b: &mut B, moment: R) {
         let stay = self.bound.map(|bound| bound.end);
         b.set_plan(self.process, Some(moment), stay, false);
@@ -213,6 +216,7 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// The end of a window, cut where the process may stay no longer.
+    #[inline]
     fn cut<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>) -> Option<R> {
         let mut high = window.high;
         if let Some(Bound { end, .. }) = self.bound {
@@ -225,6 +229,7 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// Draws the delay in one window, and ends the plan.
+    #[inline]
     fn in_window<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -253,6 +258,7 @@ impl<R: Copy> Planning<'_, '_, R> {
         self.by_rate(b, window, length, never)
     }
 
+    #[inline]
     fn uniformly<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, length: R) -> Flow<B> {
         if self.spot.is_plain {
             // A moment of no length is drawn as any other.
@@ -272,6 +278,7 @@ impl<R: Copy> Planning<'_, '_, R> {
         Ok(())
     }
 
+    #[inline]
     fn by_rate<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -404,6 +411,7 @@ impl<R: Copy> Planning<'_, '_, R> {
 
 /// The rate of the exponential delay, which is greater than 0; leaves if it is 0. None if there is
 /// none, which has ended the run or left.
+#[inline]
 pub(in crate::stochastic) fn exponential_rate<B: Backend>(
     b: &mut B,
     process: usize,
@@ -429,6 +437,7 @@ pub(in crate::stochastic) fn exponential_rate<B: Backend>(
 }
 
 /// A number, as much greater as counts as equal.
+#[inline]
 pub(in crate::stochastic) fn tolerant<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let (part, tolerance) = (b.real(1.0 + TOLERANCE), b.real(TOLERANCE));
     let value = b.multiply(value, part);
