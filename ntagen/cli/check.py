@@ -18,6 +18,7 @@ from ntagen.cli.answer_rows import Human
 from ntagen.cli.asked import is_used_by, queries_of, with_strategies
 from ntagen.cli.effects import given_options, idle_options, say, unwritten
 from ntagen.cli.evidence import Outputs, backed
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.joint import joint_answers
 from ntagen.cli.models import (
@@ -26,14 +27,14 @@ from ntagen.cli.models import (
     include_option,
     load_model,
     pointing_to_explanations,
-    rank_option,
     show_warnings,
 )
-from ntagen.cli.options import engine_options
+from ntagen.cli.options import SETTINGS, engine_options
 from ntagen.cli.outcomes import Outcome, exit_code
 from ntagen.cli.questions import answered, for_task, list_limits, most_plans
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.run_progress import progress_of, say_interrupted
+from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached
 from ntagen.cli.spreading import Spreading, dask_option
 from ntagen.cli.terminal import echo
@@ -47,7 +48,7 @@ _EXPECTED: Final = {"yes": "satisfied", "no": "not satisfied"}
 """What ``--expect`` says about all queries; ``file`` stands for what the file says of each."""
 
 
-class _CheckCommand(click.Command):
+class _CheckCommand(Renamed):
     """The word after ``--expect`` belongs to it only if it is one of its values."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -65,6 +66,11 @@ class _CheckCommand(click.Command):
 @click.command(
     "check",
     cls=_CheckCommand,
+    former={
+        "--shortest": "write --set 'trace shortest'",
+        "--fastest": "write --set 'trace fastest'",
+        "--controller": "write --strategy {}",
+    },
     epilog="Exit codes: 0 every query is satisfied (with --expect: as expected), 1 some are not, "
     "2 the input is rejected (the other queries are still answered), 3 stopped by a limit (the "
     "answer, its check, or what should be written), or the verdict is maybe, 4 run-time error in "
@@ -119,19 +125,6 @@ class _CheckCommand(click.Command):
     "With several queries, FILE has the trace of the last query that has one.",
 )
 @click.option(
-    "--shortest",
-    "wanted_trace",
-    flag_value="shortest",
-    help="Write the trace with the fewest transitions. If a run never ends, its loop counts once.",
-)
-@click.option(
-    "--fastest",
-    "wanted_trace",
-    flag_value="fastest",
-    help="Write the trace that takes the least time. Not for E[], A<> and -->: their runs do not "
-    "end.",
-)
-@click.option(
     "--certificate",
     metavar="FILE",
     type=click.Path(path_type=Path),
@@ -143,14 +136,9 @@ class _CheckCommand(click.Command):
     "--strategy",
     metavar="FILE|-",
     help="Write the winner's strategy of a control query: how the controller wins, or how the "
-    "environment prevents it. FILE.json is JSON for tools; any other FILE is text as UPPAAL TIGA "
-    "prints it; - is standard output. With several control queries, FILE has the last strategy.",
-)
-@click.option(
-    "--controller",
-    metavar="FILE.c",
-    type=click.Path(path_type=Path),
-    help="Write the same strategy as a controller in C99, in one file without dependencies.",
+    "environment prevents it. FILE.json is JSON for tools, FILE.c is a controller in C99 without "
+    "dependencies, any other FILE is text as UPPAAL TIGA prints it; - is standard output. With "
+    "several control queries, FILE has the last strategy.",
 )
 @click.option(
     "--plans",
@@ -160,15 +148,9 @@ class _CheckCommand(click.Command):
     "in exact kinematics. FILE.jsonl has one plan on each line, in the order of the model: it is "
     "written while the plans are certified, and millions of them take no memory.",
 )
-@rank_option("plans of an environment")
-@click.option(
-    "--joint",
-    is_flag=True,
-    help="Answer all Pr and E queries so that all their intervals hold together, with the risk of "
-    "--alpha for all of them. Queries with the same bound share their runs.",
-)
 @dask_option
 @engine_options
+@settings_option(SETTINGS, "levels Queue.length")
 @overflow_rule()
 @constant_option()
 @include_option()
@@ -183,16 +165,13 @@ def command(
     form: str | None,
     as_json: bool,
     trace: str | None,
-    wanted_trace: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     certificate: Path | None,
     strategy: str | None,
-    controller: Path | None,
     plans: str | None,
-    ranking: str | None,
-    joint: bool,
     dask: str | None,
     given: dict[str, Any],
-    overflow: Any,  # noqa: ANN401
+    settings: dict[str, Any],
+    overflow: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     constants: dict[str, str],
     include: tuple[Path, ...],
     allow_external: tuple[Path, ...],
@@ -210,15 +189,15 @@ def command(
       ntagen check model.xml --expect
       ntagen check model.xml --expect --format junit > report.xml
       ntagen check game.xml --query "control: A<> Main.Won" --verify --strategy -
-      ntagen check game.xml --query "control: A[] not Main.Lost" --controller safe.c
+      ntagen check game.xml --query "control: A[] not Main.Lost" --strategy safe.c
       ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
       ntagen check game.xml --query "strategy Safe = control: A[] not Main.Lost" \\
                             --query "control: A<> Main.Won under Safe" --strategy -
       ntagen check model.xml --query "bounds{Gate.Open}: x"
-      ntagen check model.xml --query "E<> Gate.Open" --fastest --trace open.json
+      ntagen check model.xml --query "E<> Gate.Open" --trace open.json --set "trace fastest"
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
-      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --relative 0.1
-      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --levels "Queue.length"
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --set "relative 0.1"
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --set "levels Queue.length"
       ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --dask tcp://head:8786
 
     \b
@@ -243,18 +222,19 @@ def command(
     )
     if second_path and query_file:
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
-    criteria = _criteria(ranking)
-    outputs = Outputs(trace, certificate, strategy, controller, plans, criteria)
+    settings = dict(settings)
+    joint, criteria = settings.pop("joint", False), _criteria(settings.pop("ranking", None))
+    outputs = Outputs(trace, certificate, strategy, plans, criteria)
     query_path = query_file or second_path
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
     require_apart(outputs.wanted(), inputs)
     verify = given["verify"]
     options = Options(
         plans="all" if plans else "none",
-        trace=verify or trace is not None or wanted_trace is not None,
-        wanted_trace=wanted_trace or "any",
+        trace=verify or trace is not None or "wanted_trace" in settings,
         certificate=certificate is not None,
-        **given | most_plans(plans),
+        **{name: value for name, value in given.items() if value is not None},
+        **most_plans(plans) | settings,
     )
     shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
     outcomes: list[Outcome] = []
@@ -374,7 +354,7 @@ def _require_one_output(targets: Mapping[str, str | None], option_given: str) ->
 def _why_not_spread(joint: bool, allow_external: Sequence[Path]) -> str:
     """Why no cluster can make the runs of these queries; empty if one can."""
     if joint:
-        return "queries of --joint share their runs"
+        return "queries that are answered jointly share their runs"
     return "libraries are loaded by this machine only" if allow_external else ""
 
 

@@ -20,7 +20,7 @@ from ntagen.cli.course import (
     say_idle_options,
 )
 from ntagen.cli.effects import say_idle
-from ntagen.cli.former_options import SteeringCommand
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.models import include_option
 from ntagen.cli.operator import SignalledOperator, signalled_operator
 from ntagen.cli.report import lines, report, summary
@@ -58,7 +58,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 130 interrupted, 143 ended by SIGTERM."""
 
 
-@click.command("drive", cls=SteeringCommand, epilog=_EPILOG)
+@click.command("drive", cls=Renamed, epilog=_EPILOG)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--needle",

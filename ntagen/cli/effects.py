@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.statistical_options import STATISTICAL
+from ntagen.cli.options import STATISTICAL
 from ntagen.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 _SYMBOLIC_ONLY: Final = {
     "search": "--search has no effect here: games are explored in an order of their own",
-    "wanted_trace": "--shortest and --fastest have no effect here: they choose among the runs of "
-    "symbolic queries",
+    "wanted_trace": "--set 'trace …' has no effect here: it chooses among the runs of symbolic "
+    "queries",
 }
 """For each parameter, the note if all queries are games."""
 
 _GAMES_ONLY: Final = {
-    "guide": "--guide has no effect here: it guides games, and no query is a game",
+    "guide": "--set 'guide …' has no effect here: it guides games, and no query is a game",
     "forced": "--forced has no effect here: it is a rule of games, and no query is a game",
-    "priorities": "--priorities has no effect here: only games and queries under a strategy may "
-    "ignore priorities; in other queries they always count",
+    "priorities": "--set 'priorities …' has no effect here: only games and queries under a "
+    "strategy may ignore priorities; in other queries they always count",
 }
 """For each parameter, the note if no query is a game or under a strategy."""
 
@@ -34,7 +34,6 @@ _NOTHING_WRITTEN: Final = {
     "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
     "certificate",
     "--strategy": "no answer has a strategy; only control queries can have one",
-    "--controller": "no answer has a strategy; only control queries can have one",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }
@@ -61,8 +60,8 @@ def idle_options(
     notes = []
     if all(query.kind in ("control", "control_t*") for query in queries):
         notes += [note for name, note in _SYMBOLIC_ONLY.items() if name in given]
-    elif values["wanted_trace"] and not (values["trace"] or values["verify"]):
-        notes.append("--shortest and --fastest have no effect without --trace")
+    elif "wanted_trace" in given and not (values["trace"] or values["verify"]):
+        notes.append("--set 'trace …' has no effect without --trace")
     if not any(query.is_game or query.uses for query in queries):
         notes += [note for name, note in _GAMES_ONLY.items() if name in given]
     if "threads" in given and not any(_takes_threads(query, values) for query in queries):
@@ -70,7 +69,7 @@ def idle_options(
             "--threads has no effect here: games under partial observation use one thread, and so "
             "do E[], A<> and -->, and searches that are not breadth first"
         )
-    keeps_values = any(values[name] for name in ("strategy", "controller", "plans", "verify"))
+    keeps_values = any(values[name] for name in ("strategy", "plans", "verify"))
     if "reductions" in given and keeps_values and all(query.is_game for query in queries):
         notes.append(
             "--reductions has no effect here: of the reductions games make live-variables only, "
@@ -79,12 +78,11 @@ def idle_options(
     notes += _of_statistics(given, values, queries)
     if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
         notes.append("--allow-write has no effect here: no query saves a strategy")
-    if "max_plans" in given and not values["plans"]:
-        notes.append("--max-plans has no effect without --plans")
-    if "ranking" in given and not values["plans"]:
-        notes.append("--rank has no effect without --plans")
-    elif "ranking" in given and not ranks:
-        notes.append("--rank has no effect here: only plans of environments (.nsl) are ranked")
+    for name in ("max_plans", "ranking"):
+        if name in given and not values["plans"]:
+            notes.append(f"{_spelled(name)} has no effect without --plans")
+    if "ranking" in given and values["plans"] and not ranks:
+        notes.append("--set 'ranking …' has no effect here: only plans of environments are ranked")
     return notes
 
 
@@ -94,20 +92,22 @@ def _of_statistics(
     """A note for each option of statistical queries, if no query takes it."""
     if any(query.is_statistical for query in queries):
         notes = [
-            f"--{name} has no effect without --levels"
+            f"{_spelled(name)} has no effect without --set 'levels …'"
             for name in ("effort", "repetitions")
-            if name in given and values["levels"] is None
+            if name in given and "levels" not in given
         ]
     else:
         notes = [
-            f"--{name.replace('_', '-')} has no effect here: no query is a statistical one"
-            for name in (*STATISTICAL, "joint", "dask")
+            f"{_spelled(name)} has no effect here: no query is a statistical one"
+            for name in STATISTICAL
             if name in given
         ]
         if "seed" in given and values["search"] != "random":
             notes.append("--seed has no effect without --search random or a statistical query")
     if "under_choice" in given and not any(one.is_statistical and one.uses for one in queries):
-        notes.append("--under-choice has no effect here: no statistical query is under a strategy")
+        notes.append(
+            "--set 'under choice …' has no effect here: no statistical query is under a strategy"
+        )
     return notes
 
 
@@ -121,10 +121,17 @@ def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
 
 
 def given_options() -> list[str]:
-    """The names of the parameters that stand on the command line."""
+    """The names of the parameters and settings that stand on the command line."""
     context = click.get_current_context()
     source = click.core.ParameterSource.COMMANDLINE
-    return [name for name in context.params if context.get_parameter_source(name) is source]
+    given = [name for name in context.params if context.get_parameter_source(name) is source]
+    return [*given, *context.params.get("settings", ())]
+
+
+def _spelled(name: str) -> str:
+    """An option or a setting of this name, as it stands on the command line."""
+    is_option = name in click.get_current_context().params
+    return f"--{name}" if is_option else f"--set '{name.replace('_', ' ')} …'"
 
 
 def say_idle(options: Mapping[str, str], why: str) -> None:

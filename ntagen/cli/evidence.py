@@ -1,4 +1,4 @@
-"""Writes the evidence for an answer: traces, certificates, strategies, controllers and plans."""
+"""Writes the evidence for an answer: traces, certificates, strategies and plans."""
 
 from __future__ import annotations
 
@@ -43,7 +43,6 @@ class Outputs:
     trace: str | None
     certificate: Path | None
     strategy: str | None
-    controller: Path | None
     plans: str | None
     ranking: tuple[str, ...]
     limits: ListLimits = field(default_factory=ListLimits)
@@ -55,7 +54,7 @@ class Outputs:
     @property
     def wants_strategy(self) -> bool:
         """Whether a strategy is written in some form."""
-        return self.strategy is not None or self.controller is not None
+        return self.strategy is not None
 
     def missing(self) -> list[str]:
         """The options whose output was asked for and has not been written."""
@@ -68,7 +67,6 @@ class Outputs:
             "--trace": self.trace,
             "--certificate": self.certificate,
             "--strategy": self.strategy,
-            "--controller": self.controller,
             "--plans": self.plans,
         }
 
@@ -117,12 +115,6 @@ def _write_evidence(
             if (pieces := _strategy_pieces(answer, query, outputs.strategy)) is not None:
                 notes += _write_strategy(answer, outputs.strategy, pieces)
                 outputs.written.add("--strategy")
-    if outputs.controller:
-        with doing("the strategy was found; writing its controller"):
-            if (controller := answer.controller_c()) is not None:
-                write_files({outputs.controller: controller})
-                outputs.written.add("--controller")
-                notes.append(f"controller written to {outputs.controller}")
     if outputs.plans and answer.plan_count is not None:
         with doing("writing the plans"):
             notes += _write_plans(answer, query, outputs, outputs.plans, task)
@@ -157,15 +149,18 @@ def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: 
 
 def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str] | None:
     """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
-    is_json = Path(target).suffix == ".json"
-    pieces = answer.strategy_pieces("json" if is_json else "text")
+    suffix = Path(target).suffix
+    if suffix == ".c":
+        controller = answer.controller_c()
+        return None if controller is None else [controller]
+    pieces = answer.strategy_pieces("json" if suffix == ".json" else "text")
     if (first := next(pieces, None)) is None:
         return None
     if target == "-":
         return chain([first], pieces)
-    return (
-        chain([first], pieces, ["\n"]) if is_json else chain([f"{query.text}\n\n", first], pieces)
-    )
+    if suffix == ".json":
+        return chain([first], pieces, ["\n"])
+    return chain([f"{query.text}\n\n", first], pieces)
 
 
 def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[str]:
@@ -174,8 +169,10 @@ def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[
             echo(piece, nl=False)
         return []
     write_files({Path(target): pieces})
-    whose = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
-    return [f"{whose} written to {target}"]
+    what = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
+    if Path(target).suffix == ".c":
+        what = "controller"
+    return [f"{what} written to {target}"]
 
 
 def _write_plans(

@@ -1,21 +1,31 @@
-"""What to write instead of an option that a setting of steering had before ``--set``.
+"""What to write instead of an option that a command had before.
 
 This is for one release: then this file goes, and commands are of click's own class again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import click
 
-from ntagen.cli.steering import Words
+from ntagen.cli.settings import Row, Words
 from ntagen.errors import InputError
-from ntagen.parameters import Parameter
+
+_SWITCH = ("on", "off")
 
 
-class SteeringCommand(click.Command):
-    """A command with ``--set`` that knows the options which it had before."""
+class Renamed(click.Command):
+    """A command that knows the options which it had before: those of its settings, and `former`.
+
+    Args:
+        former: What replaces each other option that is gone; ``{}`` stands for its value.
+    """
+
+    def __init__(self, *args: Any, former: dict[str, str] | None = None, **keywords: Any) -> None:  # noqa: ANN401
+        super().__init__(*args, **keywords)
+        self._former = former or {}
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """The words that are left over, as click has it."""
@@ -23,24 +33,24 @@ class SteeringCommand(click.Command):
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            types = [one.type for one in self.params]
-            settings = [s for one in types if isinstance(one, Words) for s in one.settings]
-            setting = _had_option(error.option_name, settings)
-            if setting is None:
+            option, value = error.option_name, _value_of(error.option_name, words)
+            said = self._former.get(option)
+            if said is None and (setting := self._setting_of(option)) is not None:
+                value = "on" if setting.choices == _SWITCH else value
+                said = f"write --set '{setting.words} {{}}'"
+            if said is None:
                 raise
-            text = f"{setting.words} {_value_of(error.option_name, words)}"
-            said = f"no such option: {error.option_name}; write --set '{text}'"
-            raise InputError(said) from error
+            raise InputError(f"no such option: {option}; {said.format(value)}") from error
 
-
-def _had_option(option: str, settings: Iterable[Parameter]) -> Parameter | None:
-    """The setting whose option it was, if it was one."""
-    said = option.removeprefix("--").replace("-", " ")
-    for one in settings:
-        # `--rank` was the option of `ranking`; all others had their words.
-        if option == one.option or said in (one.words, one.words.removesuffix("ing")):
-            return one
-    return None
+    def _setting_of(self, option: str) -> Row | None:
+        """The setting whose option it was, if it was one."""
+        said = option.removeprefix("--").replace("-", " ")
+        types = [one.type for one in self.params]
+        for one in (s for kind in types if isinstance(kind, Words) for s in kind.settings):
+            # `--rank` was the option of `ranking`; all others had their words.
+            if said in (one.words, one.words.removesuffix("ing")):
+                return one
+        return None
 
 
 def _value_of(option: str, words: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""`ntagen check --joint`: statistical queries that are answered from the same runs."""
+"""`ntagen check --set "joint on"`: statistical queries that are answered from the same runs."""
 
 from __future__ import annotations
 

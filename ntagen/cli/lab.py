@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from ntagen.cli.former_options import SteeringCommand
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.models import include_option
 from ntagen.cli.signals import handled
 from ntagen.cli.steering import say_idle_errors, settings_options
@@ -39,7 +39,7 @@ _RATE_HZ: Final = 40.0
 
 @click.command(
     "simulate",
-    cls=SteeringCommand,
+    cls=Renamed,
     epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.",
 )
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))

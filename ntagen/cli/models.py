@@ -72,18 +72,6 @@ def constant_option() -> Decorator:
     )
 
 
-def rank_option(what: str = "plans") -> Decorator:
-    """The option ``--rank``."""
-    return click.option(
-        "--rank",
-        "ranking",
-        metavar="CRITERION,…",
-        default=None,
-        help=f"How {what} are ranked, the most important criterion first: clearance, reserve, "
-        "rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
-    )
-
-
 def load_model(
     path: Path,
     include: Sequence[Path],

@@ -1,18 +1,19 @@
-"""The options of `ntagen check` that go to the engine as they are: a row for each."""
+"""The options and settings of `ntagen check` that go to the engine as they are: a row for each."""
 
 from __future__ import annotations
 
-import functools
+import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 import click
 
+from ntagen.cli.gathered import gathered
 from ntagen.cli.limits import LIMITS
-from ntagen.cli.rules import Decorator, forced_rule, priority_rule
-from ntagen.cli.statistical_options import STATISTICAL
+from ntagen.cli.quantities import Number, Pair
+from ntagen.cli.rules import Decorator, forced_rule
+from ntagen.cli.settings import Setting
 
 
 class _Threads(click.ParamType[int]):
@@ -75,21 +76,208 @@ class _Reductions(click.ParamType[str]):
         return ",".join(names)
 
 
+_SHARE: Final = Number(0, 1)
+
+RUNS: Final = (
+    Setting(
+        "runs",
+        "N",
+        click.IntRange(min=1),
+        "For Pr and E: make N random runs.  [default: as many as the query says, or as epsilon "
+        "needs]",
+    ),
+    Setting(
+        "alpha",
+        "RISK",
+        _SHARE,
+        "For Pr and E: the risk that the interval misses, or that Pr >= p is rejected wrongly.  "
+        "[default: 0.05]",
+    ),
+    Setting(
+        "epsilon",
+        "WIDTH",
+        _SHARE,
+        "For Pr: make runs until both ends of the interval are so near to the estimate.  "
+        "[default: 0.05]",
+    ),
+    Setting(
+        "seed",
+        "N",
+        click.IntRange(min=0),
+        "For a random search and for statistical queries: the same seed gives the same search and "
+        "the same runs.  [default: 0]",
+    ),
+    Setting(
+        "threads",
+        "N",
+        _Threads(),
+        "The number of threads, or `all` for one per core. Threads share the breadth-first search "
+        "of E<>, A[], sup, inf and bounds, the computation with zones in games, and the random "
+        "runs of Pr and E. Liveness, partial observation, shortest and fastest traces and "
+        "certificates use one thread.  [default: 1]",
+    ),
+)
+"""What random runs depend on, or what makes them faster: options here, settings of pictures."""
+
+_DISCRETISATION: Final = Setting(
+    "discretisation",
+    "STEP",
+    Number(0, math.inf),
+    "Solve equations of clocks in steps of this length.  [default: as their errors need]",
+)
+
+STATISTICAL_SETTINGS: Final = (
+    Setting(
+        "beta",
+        "RISK",
+        _SHARE,
+        "For Pr >= p: the risk that it is accepted wrongly.  [default: 0.05]",
+    ),
+    Setting(
+        "anytime",
+        "on|off",
+        click.BOOL,
+        "For Pr and E: intervals that hold after every run, all together, so that you may look and "
+        "stop when you want. They are wider. For E, bounds of the value must be known.  "
+        "[default: off]",
+    ),
+    Setting(
+        "relative",
+        "PART",
+        _SHARE,
+        "For Pr and E: make runs until both ends of the interval are within this part of the "
+        "estimate. The interval is an anytime one. It never ends for a probability of 0: bound it "
+        "by --runs or --timeout.",
+    ),
+    Setting(
+        "value bounds",
+        "LOW,HIGH",
+        Pair(-math.inf, math.inf),
+        "For E: in every run the value lies between these; then the interval is right for any "
+        "number of runs.  [default: what the ranges of integers in the query say]",
+    ),
+    Setting(
+        "mean interval",
+        "student|bernstein|dkw",
+        click.Choice(["auto", "student", "bernstein", "dkw"]),
+        "What makes the interval of E: Student's distribution, which is right in the limit of many "
+        "runs only; empirical Bernstein intervals, or the band of Dvoretzky, Kiefer and Wolfowitz, "
+        "for values between known bounds.  [default: bernstein if bounds are known, else student]",
+    ),
+    Setting(
+        "levels",
+        "EXPR",
+        click.STRING,
+        "For Pr of a rare event: an expression that says how near a state is to it, such as the "
+        "length of a queue that must not overflow. The estimate is made by importance splitting: "
+        "runs are started again where others came nearer.",
+    ),
+    Setting(
+        "effort",
+        "N",
+        click.IntRange(min=1, max=1_000_000),
+        "With levels: make N parts of runs between two levels.  [default: 1000]",
+    ),
+    Setting(
+        "repetitions",
+        "N",
+        click.IntRange(min=2, max=1_000_000),
+        "With levels: make the interval of N independent repetitions.  [default: 40]",
+    ),
+    Setting(
+        "delta",
+        "WIDTH[,WIDTH]",
+        Pair(0, 1, one_is_enough=True),
+        "For Pr >= p: so near to p nothing is promised; one number for both sides, or one for "
+        "below and one for above.  [default: 0.01]",
+    ),
+    Setting(
+        "odds ratios",
+        "LOW,HIGH",
+        Pair(0, math.inf),
+        "For Pr >= Pr: if the ratio of the odds lies between these, nothing is promised.  "
+        "[default: 0.9,1.1]",
+    ),
+    Setting(
+        "joint",
+        "on|off",
+        click.BOOL,
+        "Answer all Pr and E queries so that all their intervals hold together, with the risk of "
+        "--alpha for all of them. Queries with the same bound share their runs.  [default: off]",
+    ),
+)
+
+STATISTICAL: Final = (
+    *(one.field for one in STATISTICAL_SETTINGS),
+    *("runs", "alpha", "epsilon", "discretisation", "dask"),
+)
+"""The names of options and settings that count for statistical queries only."""
+
+SETTINGS: Final = (
+    *STATISTICAL_SETTINGS,
+    Setting(
+        "under choice",
+        "race|eager|lazy",
+        click.Choice(["race", "eager", "lazy"]),
+        "For Pr, E and simulate under a strategy that lets the controller choose: its processes "
+        "draw delays as without the strategy and may then wait on, until it demands a move (race), "
+        "or the controller moves as soon as it may (eager), or only when it must (lazy).  "
+        "[default: race]",
+    ),
+    Setting(
+        "trace",
+        "shortest|fastest",
+        click.Choice(["any", "shortest", "fastest"]),
+        "With --trace: write the trace with the fewest transitions (if a run never ends, its loop "
+        "counts once), or the one that takes the least time (not for E[], A<> and -->, whose runs "
+        "do not end).",
+        "wanted_trace",
+    ),
+    Setting(
+        "max plans",
+        "N",
+        click.IntRange(min=1),
+        "With --plans: write at most N plans. With 1, the search stops at the first plan.  "
+        "[default: 1000000; no limit for a FILE.jsonl]",
+    ),
+    Setting(
+        "ranking",
+        "CRITERION,…",
+        click.STRING,
+        "With --plans of an environment: how they are ranked, the most important criterion first: "
+        "clearance, reserve, rolls, length, target.  "
+        "[default: as drive { … } says, else clearance,rolls,length]",
+    ),
+    Setting(
+        "guide",
+        "EXPR",
+        click.STRING,
+        "An integer expression of the model, for example a function that says how far a state is "
+        "from the goal: games explore first where it is least. Verdicts do not depend on it.",
+    ),
+    Setting(
+        "priorities",
+        "ignore|keep",
+        click.Choice(["ignore", "keep"]),
+        "Whether priorities of channels and processes count in games and in queries under a "
+        "strategy. In all other queries they count.  [default: ignore, as TIGA does]",
+    ),
+    Setting(
+        "without",
+        "NAME,…",
+        _Heuristics(),
+        "For experiments: switch these heuristics of the engine off. Verdicts do not depend on "
+        "them; time and counts do. A wrong name lists all names.",
+    ),
+)
+"""What ``--set`` takes; all but `joint` and `ranking` are fields of `ntagen.checker.Options`."""
+
 _OPTIONS: Final[dict[str, Decorator]] = {
     "verify": click.option(
         "--verify",
         is_flag=True,
         help="Check each strategy against every move of the opponent, and replay each trace with "
         "its exact times. The check does not use the solver's code.",
-    ),
-    "max_plans": click.option(
-        "--max-plans",
-        metavar="N",
-        type=click.IntRange(min=1),
-        default=1_000_000,
-        show_default=True,
-        help="Write at most N plans. With 1, the search stops at the first plan. With --plans "
-        "FILE.jsonl, all are written unless you give this option.",
     ),
     "search": click.option(
         "--search",
@@ -98,40 +286,8 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         help="The order of the search: breadth first, depth first or random. Verdicts do not "
         "depend on it.  [default: bfs]",
     ),
-    "guide": click.option(
-        "--guide",
-        metavar="EXPR",
-        help="An integer expression of the model, for example a function that says how far a state "
-        "is from the goal: games explore first where it is least. Verdicts do not depend on it.",
-    ),
-    "threads": click.option(
-        "--threads",
-        metavar="N",
-        type=_Threads(),
-        default="1",
-        help="The number of threads, or `all` for one per core. Threads share the breadth-first "
-        "search of E<>, A[], sup, inf and bounds, the computation with zones in games, and the "
-        "random runs of Pr and E. Liveness, partial observation, --shortest, --fastest and "
-        "--certificate use one thread.  "
-        "[default: 1]",
-    ),
-    "seed": click.option(
-        "--seed",
-        type=click.IntRange(min=0),
-        default=0,
-        help="For --search random and statistical queries: the same seed gives the same search and "
-        "the same runs.  [default: 0]",
-    ),
-    **STATISTICAL,
-    "under_choice": click.option(
-        "--under-choice",
-        type=click.Choice(["race", "eager", "lazy"]),
-        default="race",
-        help="For Pr, E and simulate under a strategy that lets the controller choose: its "
-        "processes draw delays as without the strategy and may then wait on, until it demands a "
-        "move (race), or the controller moves as soon as it may (eager), or only when it must "
-        "(lazy).  [default: race]",
-    ),
+    **{one.field: one.option() for one in RUNS},
+    "discretisation": _DISCRETISATION.option(),
     "reductions": click.option(
         "--reductions",
         metavar="all|none|LIST",
@@ -146,19 +302,7 @@ _OPTIONS: Final[dict[str, Decorator]] = {
         "neither a strategy nor plans are asked for). Verdicts do not depend on reductions.  "
         "[default: all]",
     ),
-    "without": click.option(
-        "--without",
-        metavar="NAME[,NAME…]",
-        type=_Heuristics(),
-        default="",
-        help="For experiments: switch these heuristics of the engine off. Verdicts do not depend "
-        "on them; time and counts do. A wrong name lists all names.",
-    ),
     "forced": forced_rule(),
-    "priorities": priority_rule(
-        "Whether priorities of channels and processes count in games and in queries under a "
-        "strategy. In all other queries they count.  [default: ignore, as TIGA does]"
-    ),
     "engine": click.option(
         "--engine",
         type=click.Choice(["jit", "interpreter"]),
@@ -179,21 +323,6 @@ _OPTIONS: Final[dict[str, Decorator]] = {
 }
 """The options on the command line, by their fields of `ntagen.checker.Options`."""
 
-PICTURED: Final[dict[str, Decorator]] = {
-    name: _OPTIONS[name] for name in ("runs", "alpha", "epsilon", "seed", "threads")
-}
-"""Those of random runs that a picture depends on, or that make it faster."""
 
-
-def engine_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds these options; the command gets their values as `given`, by the names of the fields."""
-
-    @functools.wraps(command)
-    def with_given(**values: object) -> int | None:
-        given = {name: values.pop(name) for name in _OPTIONS}
-        return command(given=given, **values)
-
-    decorated: Callable[..., int | None] = with_given
-    for option in reversed(_OPTIONS.values()):
-        decorated = option(decorated)
-    return decorated
+engine_options: Final = gathered("given", _OPTIONS, dict)
+"""Adds these options; the command gets their values as `given`, by the names of the fields."""

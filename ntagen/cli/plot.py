@@ -5,23 +5,28 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.limits import limits
-from ntagen.cli.models import include_option, rank_option
+from ntagen.cli.models import include_option
 from ntagen.cli.plot_models import (
     KINDS,
     MODELS,
     MOST_DRAWN,
     MOST_SEARCHED,
+    OF_GRAPHS,
+    OF_ZONES,
     Wish,
     plot_model,
 )
-from ntagen.cli.plot_runs import NAMES, RunWish, run_options
+from ntagen.cli.plot_runs import NAMES
+from ntagen.cli.plot_runs import SETTINGS as OF_RUNS
+from ntagen.cli.settings import Setting, settings_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
 
@@ -31,11 +36,41 @@ if TYPE_CHECKING:
     from ntagen.scene import Scene
 
 _MCAP_MAGIC: Final = b"\x89MCAP"
+_RANK: Final = "--set 'ranking …'"
+
+SETTINGS: Final = (
+    Setting(
+        "ranking",
+        "CRITERION,…",
+        click.STRING,
+        "Of a scene: how plans are ranked, the most important criterion first: clearance, reserve, "
+        "rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
+    ),
+    Setting(
+        "clocks",
+        "X,Y",
+        click.STRING,
+        "With --as zones: the clocks of the two axes.  "
+        "[default: the first on which decisions depend]",
+    ),
+    Setting(
+        "limit",
+        "N",
+        click.IntRange(min=1),
+        "With --as states or discrete: draw at most this many states. A graph with more is not "
+        f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends "
+        f"in .dot may have {MOST_SEARCHED:,}]",
+    ),
+    *OF_RUNS,
+)
+"""What ``--set`` takes."""
+
 _LIMITS: Final = limits(default="none for a model; of an environment, what drive { … } says")
 
 
 @click.command(
     "plot",
+    cls=Renamed,
     epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
     "3 the engine reached a limit; what random runs say until then is drawn.",
 )
@@ -65,7 +100,6 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     help="In a tissue that answers, draw the strategy in this file, which ntagen check --plans "
     "wrote for this task, and do not look for one.",
 )
-@rank_option()
 @click.option(
     "--as",
     "kind",
@@ -87,41 +121,23 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     "state, for example 'Train(1).Cross n=1'. A clock with a value (x=3/2) is fixed; one without "
     "may have any.",
 )
-@click.option(
-    "--clocks",
-    metavar="X,Y",
-    help="With --as zones: the clocks of the two axes.  [default: the first on which decisions "
-    "depend]",
-)
-@click.option(
-    "--limit",
-    "most_states",
-    metavar="N",
-    type=click.IntRange(min=1),
-    help="With --as states or discrete: draw at most this many states. A graph with more is not "
-    f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends in "
-    f".dot may have {MOST_SEARCHED:,}]",
-)
-@run_options
 @_LIMITS["timeout_s"]
 @_LIMITS["memory_bytes"]
 @include_option()
+@settings_option(SETTINGS, "runs 2000")
 @guarded
 def command(
     source: Path,
     output: Path | None,
     shown: int,
     tree_path: Path | None,
-    ranking: str | None,
     kind: str | None,
     asked: str | None,
     at: str | None,
-    clocks: str | None,
-    most_states: int | None,
     timeout_s: float | None,
     memory_bytes: int | None,
     include: tuple[Path, ...],
-    run_wish: RunWish,
+    settings: dict[str, Any],
 ) -> int:
     """Draw a scene with its plans, a run from its log, or what a query of a model finds.
 
@@ -151,7 +167,7 @@ def command(
       ntagen plot model.xml --query "Pr[<=10](<> Gate.Open)" -o reached.png
       ntagen plot model.xml --query "simulate[<=10; 5]{Gate.Open, x}" -o runs.svg
       ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
-      ntagen plot model.xml --as states --limit 300 -o states.pdf
+      ntagen plot model.xml --as states --set "limit 300" -o states.pdf
     """  # noqa: D301  click wants the control character
     from ntagen.checker.picture.page import kind_of
     from ntagen.plan.rank import parse_ranking
@@ -159,22 +175,23 @@ def command(
 
     if kind is not None or source.suffix.lower() in MODELS:
         _without_scene()
-        wish = Wish(kind, asked, at, clocks, most_states, memory_bytes)
-        path, code = plot_model(source, output, wish, include, run_wish)
+        wish = Wish(kind, asked, at, settings, memory_bytes)
+        path, code = plot_model(source, output, wish, include)
         echo(f"wrote {path}")
         return code
     say_idle(
-        {"asked": "--query", "at": "--at", "clocks": "--clocks", "most_states": "--limit"},
+        {"asked": "--query"} | OF_ZONES | OF_GRAPHS,
         "without --as: the scene is drawn, not its model",
     )
     say_idle(NAMES, "here: no random runs are drawn")
+    ranking = settings.get("ranking")
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
-        say_idle({"ranking": "--rank"}, "here: the plans of a run were ranked during the run")
+        say_idle({"ranking": _RANK}, "here: the plans of a run were ranked during the run")
         say_idle({"tree_path": "--strategy"}, "here: the log of a run contains its strategy")
         say_idle({"include": "--include"}, "here: the log of a run contains its scene")
     elif shown == 0:
-        say_idle({"ranking": "--rank", "tree_path": "--strategy"}, "with --plans 0")
+        say_idle({"ranking": _RANK, "tree_path": "--strategy"}, "with --plans 0")
     path = Path(f"{source.stem or source.name}.png") if output is None else output
     kind_of(path, PAGES)
     require_apart({"-o": path}, {"source": source})
@@ -191,7 +208,7 @@ def command(
 
 def _without_scene() -> None:
     """Says which options have no effect on the picture of a model."""
-    idle = {"shown": "--plans", "tree_path": "--strategy", "ranking": "--rank"}
+    idle = {"shown": "--plans", "tree_path": "--strategy", "ranking": _RANK}
     say_idle(idle, "here: the model is drawn, not a scene")
 
 
@@ -247,7 +264,7 @@ def _of_scene(
     if not task.scene.tissue.is_adversarial:
         say_idle({"tree_path": "--strategy"}, f"in a tissue that is {task.scene.tissue.kind}")
     elif (found := _of_strategy(task.scene, configuration, tree_path)) is not None:
-        say_idle({"ranking": "--rank"}, "here: a strategy against the tissue is drawn, not plans")
+        say_idle({"ranking": _RANK}, "here: a strategy against the tissue is drawn, not plans")
         return found
     with doing("the search for plans"):
         return picture_with_plans(task.scene, engine, shown)

@@ -13,7 +13,7 @@ from ntagen.cli.asked import Asked, queries_of
 from ntagen.cli.effects import say_idle
 from ntagen.cli.guard import current, doing
 from ntagen.cli.models import load_model, pointing_to_explanations
-from ntagen.cli.plot_runs import NAMES, RunWish, plot_runs
+from ntagen.cli.plot_runs import NAMES, plot_runs
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.run_progress import STATISTICAL
 from ntagen.errors import InputError, LimitError, ModelError
@@ -43,6 +43,9 @@ KINDS: Final = {
 GRAPHS: Final = ("states", "discrete")
 """Those that may be written for Graphviz, too."""
 
+OF_ZONES: Final = {"at": "--at", "clocks": "--set 'clocks …'"}
+OF_GRAPHS: Final = {"limit": "--set 'limit …'"}
+
 MOST_DRAWN: Final = 100
 """If no number is given, the picture of a graph has at most this number of states."""
 
@@ -63,17 +66,14 @@ class Wish:
     at: str | None
     """The state of zones, where it differs from the initial one."""
 
-    clocks: str | None
-    """The clocks of zones, with a comma between them."""
-
-    most_states: int | None
-    """How many states a graph may have."""
+    settings: dict[str, Any]
+    """``clocks`` for zones, ``limit`` for graphs, and those of random runs, as far as given."""
 
     memory_bytes: int | None
 
 
 def plot_model(
-    source: Path, path: Path | None, wish: Wish, include: Sequence[Path], runs: RunWish
+    source: Path, path: Path | None, wish: Wish, include: Sequence[Path]
 ) -> tuple[Path, int]:
     """Writes a picture of a model; returns which file it is, and the exit code.
 
@@ -86,12 +86,12 @@ def plot_model(
         with doing("loading the model"):
             model = load_model(source, include).model
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
-            say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
-            say_idle({"most_states": "--limit"}, "without --as states or discrete")
+            say_idle(OF_ZONES, "without --as zones")
+            say_idle(OF_GRAPHS, "without --as states or discrete")
             path = path or Path(f"{source.stem}.svg")
             require_apart({"-o": path}, {"source": source})
             limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
-            return path, plot_runs(model, asked, path, runs, limits)
+            return path, plot_runs(model, asked, path, wish.settings, limits)
         say_idle(NAMES, "here: no random runs are drawn")
         path = path or Path(f"{source.stem}.svg")
         require_apart({"-o": path}, {"source": source})
@@ -123,9 +123,9 @@ def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
     is_graph = wish.kind in GRAPHS
     kind_of(path, ("dot",) if is_graph else ())
     if not is_graph:
-        say_idle({"most_states": "--limit"}, "without --as states or discrete")
+        say_idle(OF_GRAPHS, "without --as states or discrete")
     if wish.kind != "zones":
-        say_idle({"at": "--at", "clocks": "--clocks"}, "without --as zones")
+        say_idle(OF_ZONES, "without --as zones")
     if is_graph or wish.kind == "templates":
         drawn = "templates" if wish.kind == "templates" else "states"
         say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
@@ -147,7 +147,7 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
         InputError: It has more states than the picture may have.
         LimitError: More states would have to be searched for.
     """
-    given = wish.most_states
+    given = wish.settings.get("limit")
     searched = max(MOST_SEARCHED, given or 0)
     try:
         with doing("the search for the states"):
@@ -158,7 +158,8 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
         if str(searched) not in said:
             raise
         raise LimitError(
-            f"{said}\nhint: search for more (--limit), or make constants of the model smaller"
+            f"{said}\nhint: search for more (--set 'limit …'), or make constants of the model "
+            "smaller"
         ) from None
     clocks = wish.kind == "states"
     with doing("drawing the graph"):
@@ -208,7 +209,7 @@ def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
             memory_bytes=wish.memory_bytes,
             progress=report,
         )
-    axes = _axes(wish.clocks)
+    axes = _axes(wish.settings.get("clocks"))
     return strategy.zones(_state(strategy, wish.at), x=axes[0], y=axes[1])
 
 
@@ -218,9 +219,7 @@ def _axes(clocks: str | None) -> tuple[str | None, str | None]:
     names = [] if clocks is None else re.split(r",(?![^(\[]*[)\]])", clocks)
     names = [name.strip() for name in names]
     if len(names) > 2 or not all(names):
-        raise InputError(
-            f"--clocks {clocks!r} is not one clock or two\nhint: write for example x,y"
-        )
+        raise InputError(f"{clocks!r} is not one clock or two\nhint: write for example x,y")
     return names[0] if names else None, names[1] if len(names) > 1 else None
 
 

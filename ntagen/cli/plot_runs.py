@@ -2,80 +2,50 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.asked import Asked
-from ntagen.cli.options import PICTURED
-from ntagen.cli.rules import Decorator
+from ntagen.cli.options import RUNS
 from ntagen.cli.run_progress import progress_of, say_interrupted
+from ntagen.cli.settings import Setting
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError, LimitError, ModelError
-from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
     from ntagen.checker.picture.chart import Chart
 
-NAMES: Final = {"runs": "--runs", "buckets": "--buckets", "width": "--bucket-width"} | {
-    name: f"--{name}" for name in ("seed", "alpha", "epsilon", "threads")
-}
-"""The options that count for random runs only."""
-
-_OPTIONS: Final[dict[str, Decorator]] = {
-    "buckets": click.option(
-        "--buckets",
-        metavar="N",
-        type=click.IntRange(min=1),
-        help="Of random runs: the number of buckets of the histogram.  [default: the square root "
-        "of the number of values, at most 120]",
+SETTINGS: Final = (
+    *RUNS,
+    Setting(
+        "buckets",
+        "N",
+        click.IntRange(min=1),
+        "The number of buckets of the histogram.  [default: the square root of the number of "
+        "values, at most 120]",
     ),
-    "width": click.option(
-        "--bucket-width",
-        "width",
-        metavar="WIDTH",
-        type=float,
-        help="Of random runs: how wide a bucket is, instead.",
-    ),
-}
+    Setting("bucket width", "WIDTH", click.FLOAT, "How wide a bucket is, instead."),
+)
+"""The settings that count for random runs only."""
+
+NAMES: Final = {one.field: f"--set '{one.words} …'" for one in SETTINGS}
+"""How each of them is given."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunWish:
-    """How random runs are made and drawn.
-
-    Attributes:
-        given: Options of `ntagen.checker.Options`.
-        buckets: The number of buckets of a histogram.
-        width: How wide they are.
-    """
-
-    given: dict[str, Any]
-    buckets: int | None
-    width: float | None
-
-
-def run_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options of random runs; the command gets them as `run_wish`."""
-
-    @functools.wraps(command)
-    def with_wish(**values: Any) -> int | None:  # noqa: ANN401  click's values
-        buckets, width = values.pop("buckets"), values.pop("width")
-        given = {name: values.pop(name) for name in PICTURED}
-        return command(run_wish=RunWish(given, buckets, width), **values)
-
-    decorated: Callable[..., int | None] = with_wish
-    for option in reversed([*PICTURED.values(), *_OPTIONS.values()]):
-        decorated = option(decorated)
-    return decorated
-
-
-def plot_runs(model: Model, query: Asked, path: Path, wish: RunWish, limits: dict[str, Any]) -> int:
+def plot_runs(
+    model: Model, query: Asked, path: Path, settings: dict[str, Any], limits: dict[str, Any]
+) -> int:
     """Draws what random runs say; returns the exit code.
+
+    Args:
+        model: The model.
+        query: The query that is answered by random runs.
+        path: The picture.
+        settings: Those of `SETTINGS` that are given, by their names.
+        limits: Those of `ntagen.checker.Options`.
 
     Raises:
         InputError: The query or the name of the picture is wrong, or there is nothing to draw.
@@ -86,10 +56,11 @@ def plot_runs(model: Model, query: Asked, path: Path, wish: RunWish, limits: dic
     from ntagen.checker.picture.page import kind_of
 
     kind_of(path)
+    options = {one.field: settings[one.field] for one in RUNS if one.field in settings}
     code = 0
     try:
         with progress_of(query.text, query.form, quiet=False) as reports:
-            answer = model.check(query.text, **wish.given, **limits, **reports)
+            answer = model.check(query.text, **options, **limits, **reports)
     except Interrupted as interrupted:
         answer = interrupted.answer
         say_interrupted(query.text, 0)
@@ -101,19 +72,19 @@ def plot_runs(model: Model, query: Asked, path: Path, wish: RunWish, limits: dic
         if answer.estimate is None and not answer.trajectories:
             raise LimitError(f"{query.text} was {said} before there was anything to draw")
         echo(f"note: {said}: the picture shows the runs until then", err=True)
-    svg(_chart(answer, wish)).save(path)
+    svg(_chart(answer, settings)).save(path)
     return code
 
 
-def _chart(answer: Answer, wish: RunWish) -> Chart:
+def _chart(answer: Answer, settings: dict[str, Any]) -> Chart:
     distribution = answer.distribution
     if distribution is not None and distribution.count == 0:
         what = "breaks" if distribution.broken else "reaches"
         raise InputError(
             f"none of {distribution.runs:,} runs {what} what {answer.query.strip()} asks, so there "
-            "is nothing to draw\nhint: make more of them (--runs, --epsilon), or longer ones"
+            "is nothing to draw\nhint: make more of them (--set 'runs …'), or longer ones"
         )
-    chart = answer.chart(wish.buckets, wish.width)
+    chart = answer.chart(settings.get("buckets"), settings.get("bucket_width"))
     if chart is None:
         raise InputError(
             f"{answer.query.strip()} shows no run, so there is nothing to draw\n"

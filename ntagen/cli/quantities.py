@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from fractions import Fraction
 from typing import Final
@@ -85,6 +86,57 @@ class _Count(click.ParamType[int]):
         self.fail(
             f"{value!r} is not a whole number from 1; write for example 5000, 10k or 2M", param, ctx
         )
+
+
+class Number(click.ParamType[float]):
+    """A number between two others, which are not included."""
+
+    name = "number"
+
+    def __init__(self, low: float, high: float) -> None:
+        self._low = low
+        self._high = high
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number."""
+        try:
+            number = float(str(value))
+        except ValueError:
+            number = math.nan
+        if not self._low < number < self._high:
+            wanted = (
+                f"a number between {self._low:g} and {self._high:g}"
+                if self._high < math.inf
+                else f"a number greater than {self._low:g}"
+            )
+            self.fail(f"{value!r} is not {wanted}", param, ctx)
+        return number
+
+
+class Pair(click.ParamType[tuple[float, float]]):
+    """Two numbers with a comma between them, the lesser one first; or one number for both."""
+
+    name = "pair"
+
+    def __init__(self, low: float, high: float, *, one_is_enough: bool = False) -> None:
+        self._number = Number(low, high)
+        self._one_is_enough = one_is_enough
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        """The numbers, in their order."""
+        words = str(value).split(",")
+        if len(words) == 1 and self._one_is_enough:
+            words *= 2
+        if len(words) != 2:
+            self.fail(f"{value!r} is not a pair of numbers; write LOW,HIGH", param, ctx)
+        first, second = (self._number.convert(word.strip(), param, ctx) for word in words)
+        if not self._one_is_enough and not first < second:
+            self.fail(f"{value!r}: the first number must be less than the second", param, ctx)
+        return first, second
 
 
 SIZE: Final = _Size("size", _BYTES_PER)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from ntagen.cli.against import answer_of, defended, is_adversarial
 from ntagen.cli.asked import Asked
-from ntagen.cli.effects import given_options
 from ntagen.cli.plan_lists import LINES, ListLimits
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 def most_plans(target: str | None) -> dict[str, int]:
     """Any number of plans, if they are written on lines: they take no memory."""
     is_free = target is not None and Path(target).suffix == LINES
-    return {"max_plans": sys.maxsize} if is_free and "max_plans" not in given_options() else {}
+    return {"max_plans": sys.maxsize} if is_free else {}
 
 
 def list_limits(options: Options, *, quiet: bool) -> ListLimits:

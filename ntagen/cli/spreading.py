@@ -21,7 +21,7 @@ dask_option: Final[Decorator] = click.option(
     metavar="ADDRESS",
     help="For Pr and E: use the workers of the Dask scheduler at this address, as "
     "tcp://host:8786. They must have the same ntagen. Answers are the same as without them. "
-    "The runs of --joint, --levels and simulate are made by this machine.",
+    "Runs with joint or levels (--set) and those of simulate are made by this machine.",
 )
 
 

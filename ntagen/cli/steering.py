@@ -4,43 +4,20 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ntagen.cli.effects import say
 from ntagen.cli.gathered import gathered
 from ntagen.cli.rules import Decorator
+from ntagen.cli.settings import help_option, set_option
 from ntagen.cli.terminal import echo
 from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, PARTS, Given, Parameter
 
 if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
-
     from ntagen.drive.configure import Configuration
     from ntagen.drive.needles import Chosen
-
-
-class Words(click.ParamType[str]):
-    """What can stand in the braces of ``drive { … }``; a shell completes the words of settings."""
-
-    name = "settings"
-
-    def __init__(self, settings: Sequence[Parameter]) -> None:
-        self.settings = settings
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """The settings that begin so, and those of few values with each of them."""
-        from click.shell_completion import CompletionItem
-
-        return [
-            CompletionItem(words, help=one.help)
-            for one in self.settings
-            for words in (one.words, *(f"{one.words} {choice}" for choice in one.choices))
-            if words.startswith(incomplete)
-        ]
 
 
 def settings_options(*own: str, without: Collection[str] = ()) -> Decorator:
@@ -51,35 +28,22 @@ def settings_options(*own: str, without: Collection[str] = ()) -> Decorator:
         without: The settings, by their words, that mean nothing to the command.
     """
     settings = [one for one in PARAMETERS if one.words not in without]
-    options: dict[str, Decorator] = {
-        "texts": click.option(
-            "--set",
-            "texts",
-            metavar="'WORDS VALUE'",
-            type=Words(settings),
-            multiple=True,
-            help="Change a setting, in the words of drive { … } in ENV.nsl, for example "
-            "--set 'initial push 4 mm'. You can give this option several times.",
-        ),
-        "help_settings": click.option(
-            "--help-settings",
-            is_flag=True,
-            is_eager=True,
-            callback=functools.partial(_list, settings),
-            help="Print all settings that --set takes, with units and defaults, and exit.",
-        ),
-    }
+    about = (
+        "Change a setting, in the words of drive { … } in ENV.nsl, for example "
+        "--set 'initial push 4 mm'."
+    )
+    options = {"settings": set_option(settings, about)}
     for one in map(BY_WORDS.__getitem__, own):
         name, unit = one.option.removeprefix("--"), MEASURES[one.kind].unit
         options[name] = click.option(one.option, name, metavar=unit.upper() or "N", help=one.help)
-    return gathered("given", options, functools.partial(_read, own))
+    add = gathered("given", options, functools.partial(_read, own))
+    show = help_option(functools.partial(_list, settings))
+    return lambda command: add(show(command))
 
 
-def _read(
-    own: Sequence[str], *, texts: Sequence[str], help_settings: object, **values: str | None
-) -> tuple[Given, ...]:
+def _read(own: Sequence[str], **values: Any) -> tuple[Given, ...]:  # noqa: ANN401  click's values
     """The settings on the command line; the values of own options are in the order of `own`."""
-    del help_settings  # It has ended the command.
+    texts = values.pop("settings")
     pairs = zip(own, values.values(), strict=True)
     said = [*texts, *(f"{words} {value}" for words, value in pairs if value is not None)]
     if not said:
@@ -90,15 +54,11 @@ def _read(
     return read_settings(said, COMMAND_LINE)
 
 
-def _list(
-    settings: Sequence[Parameter], ctx: click.Context, _option: click.Parameter, wanted: bool
-) -> None:
-    """Prints the settings, part by part, and ends the command."""
-    if not wanted or ctx.resilient_parsing:
-        return
+def _list(settings: Sequence[Parameter], formatter: click.HelpFormatter) -> None:
+    """Writes the settings, part by part."""
     from ntagen.drive.configure import Configuration
 
-    formatter, usual = ctx.make_formatter(), Configuration()
+    usual = Configuration()
     formatter.write_text(
         "Write a setting as --set 'pull 4 mm', or in the braces drive { … } of a task. The command "
         "line also takes a number without its unit."
@@ -112,8 +72,6 @@ def _list(
                     if one.part == part
                 ]
             )
-    echo(formatter.getvalue().rstrip())
-    ctx.exit()
 
 
 known_option = click.option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
-from ntagen.cli.former_options import SteeringCommand
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.steering import known_option, settings_options
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from ntagen.parameters import Given
 
 
-@click.command("sweep", cls=SteeringCommand, epilog=EPILOG)
+@click.command(
+    "sweep", cls=Renamed, former={"--timeout": "write --set 'time limit {}'"}, epilog=EPILOG
+)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--over",

@@ -3,7 +3,7 @@
     python tests/benchmarks/ablation.py [--part NAME] [--member NAME] [--models FOLDER] [--runs 3]
 
 Every member of the benchmark set is asked with all heuristics and with each of them switched off
-(``ntagen check --without NAME``). Printed is, for each heuristic, what it gains at most, with
+(``ntagen check --set 'without NAME'``). Printed is, for each heuristic, what it gains at most, with
 ``KEEP`` if that is at least 15 % of the time or of the states of one member, else ``GO``; below it
 stand the members for which the time or the states differ. A heuristic is asked about the members
 only that it can matter to: searches, games, or all.

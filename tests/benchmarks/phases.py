@@ -222,12 +222,12 @@ CASES = (
     Case("printing a strategy", WORDY_GAME, _asked(_SAFE, "--strategy", "-")),
     Case("writing a strategy", WORDY_GAME, _asked(_SAFE, "--strategy", "out.txt")),
     Case("writing a strategy, JSON", WORDY_GAME, _asked(_SAFE, "--strategy", "out.json")),
-    Case(
-        "writing a controller", GUARD.replace("3000", "400"), _asked(_SAFE, "--controller", "o.c")
-    ),
+    Case("writing a controller", GUARD.replace("3000", "400"), _asked(_SAFE, "--strategy", "o.c")),
     Case("listing plans", TWO_WAYS, _asked("control: A<> P.Goal", "--plans", "out.jsonl")),
     Case("writing plans", TWO_WAYS, _asked("control: A<> P.Goal", "--plans", "out.json")),
-    Case("drawing a graph", GRID, ("--as", "states", "--limit", "20000", "-o", "out.svg"), "plot"),
+    Case(
+        "drawing a graph", GRID, ("--as", "states", "--set", "limit 20000", "-o", "out.svg"), "plot"
+    ),
     Case("drawing a trace", LONG, _asked("E<> n == 300000", "-o", "out.svg"), "plot"),
     Case("drawing templates", lambda: edges(60_000), ("--as", "templates", "-o", "o.svg"), "plot"),
     Case("one random run", WALK, _asked("Pr[<=1000000000](<> P.Never)")),

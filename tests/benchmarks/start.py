@@ -156,7 +156,7 @@ def main() -> None:
             imports = statistics.median(row[2] for row in rows)
             print(f"{rows[0][0]:24} {1e3 * seconds:8.1f} {1e3 * imports:8.1f}")
         check = [sys.executable, "-m", "ntagen", "check", str(given.task)]
-        check += ["--query", QUERY, "--plans", "-", "--max-plans", "1"]
+        check += ["--query", QUERY, "--plans", "-", "--set", "max plans 1"]
         print(f"{'whole process':24} {'wall ms':>8} {'ratio':>8} {'cpu ms':>8} {'ratio':>8}")
         plan = [sys.executable, "-m", "ntagen", "plan", str(given.task)]
         for name, command, measure in [

@@ -380,7 +380,7 @@ def test_dev_stdout_goes_where_standard_output_goes(tmp_path: Path) -> None:
 
 WRITERS = [
     ["check", "game.xta", *QUERY, "--strategy", "{}"],
-    ["check", "game.xta", *QUERY, "--controller", "{}"],
+    ["check", "game.xta", *QUERY, "--strategy", "{}.c"],
     ["check", "game.xta", *QUERY, "--plans", "{}"],
     ["check", "game.xta", "--query", "E<> P.B", "--trace", "{}"],
     ["check", "game.xta", "--query", "A[] x >= 0", "--certificate", "{}"],
@@ -402,7 +402,7 @@ def test_every_command_keeps_modes_and_links_and_leaves_nothing(
     Path("game.xta").write_text(GAME)
     Path("real").mkdir()
     made = {"compile": ["file.xml", "file.q"], "info": ["P.svg"]}.get(arguments[0], ["file"])
-    made = ["file.png"] if arguments[0] == "plot" else made
+    made = {"{}.png": ["file.png"], "{}.c": ["file.c"]}.get(arguments[-1], made)
     if "{}.nsl" in arguments:
         Path("file.nsl").write_text(Path(PAPER).read_text().replace("  ", "   "))
         made = ["file.nsl"] if arguments[0] == "fmt" else made

@@ -112,7 +112,7 @@ def test_options_of_the_file_count(tmp_path: Path, capsys: pytest.CaptureFixture
     path.write_text(XML, "utf-8")
 
     def records(*words: str) -> list[dict[str, Any]]:
-        assert main(["check", str(path), "--joint", "--json", *words]) == 0
+        assert main(["check", str(path), "--set", "joint on", "--json", *words]) == 0
         return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
     first, second = records()
@@ -130,7 +130,7 @@ def test_the_command_line_answers_jointly(
     model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = str(tmp_path / "model.xta")
-    words = ["check", path, "--joint", "--json", "--seed", "3"]
+    words = ["check", path, "--set", "joint on", "--json", "--seed", "3"]
     asked = [*QUERIES[:2], "E<> n == 4", "simulate[<=6; 2]{n}"]
     for query in asked:
         words += ["--query", query]
@@ -142,9 +142,9 @@ def test_the_command_line_answers_jointly(
         assert record["confidence"] == pytest.approx(0.975)
         assert record["value"] == answer.estimate.value
         assert record["lower"] == answer.estimate.lower
-    wrong = ["check", path, "--joint", "--query", QUERIES[0], "--query", "Pr[<=6](<> m)"]
+    wrong = ["check", path, "--set", "joint on", "--query", QUERIES[0], "--query", "Pr[<=6](<> m)"]
     assert main(wrong) == 2
     shown = capsys.readouterr()
     assert shown.out.count("refused") >= 2
-    assert main(["check", path, "--joint", "--query", "E<> n == 4"]) == 0
-    assert "--joint has no effect here" in capsys.readouterr().err
+    assert main(["check", path, "--set", "joint on", "--query", "E<> n == 4"]) == 0
+    assert "--set 'joint …' has no effect here" in capsys.readouterr().err

@@ -81,8 +81,8 @@ def test_what_has_no_levels_is_refused(model: Model) -> None:
 def test_the_command_line_splits(
     model: Model, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["check", str(tmp_path / "model.xta"), "--query", RUIN, "--effort", "100"]
-    assert main([*words, "--levels", "n"]) == 0
+    words = ["check", str(tmp_path / "model.xta"), "--query", RUIN, "--set", "effort 100"]
+    assert main([*words, "--set", "levels n"]) == 0
     assert "interval: importance splitting" in capsys.readouterr().out
     assert main([*words, "--runs", "10"]) == 0
-    assert "--effort has no effect without --levels" in capsys.readouterr().err
+    assert "--set 'effort …' has no effect without --set 'levels …'" in capsys.readouterr().err

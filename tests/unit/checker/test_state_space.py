@@ -103,7 +103,7 @@ def test_a_large_graph_has_no_picture() -> None:
     space = counter(100).state_space()
     assert space._repr_svg_() is None
     with pytest.raises(
-        InputError, match=r"has 101 states, .* have 100\nhint: allow more \(--limit"
+        InputError, match=r"has 101 states, .* have 100\nhint: allow more \(--set 'limit"
     ):
         space.svg()
     assert "101 symbolic states" in space.svg(limit=101).text
@@ -146,15 +146,15 @@ def test_a_limit_says_how_many_states_are_drawn(
     model.write_text(COUNTER.replace("MOST", "150"))
     arguments = ["plot", str(model), "-o", str(path), "--as"]
     assert main([*arguments, "states"]) == 2
-    assert "--limit 151" in capsys.readouterr().err
+    assert "--set 'limit 151'" in capsys.readouterr().err
     assert not path.exists()
     for kind in ("states", "discrete"):
-        assert main([*arguments, kind, "--limit", "150"]) == 2
+        assert main([*arguments, kind, "--set", "limit 150"]) == 2
         assert "has 151 states" in capsys.readouterr().err
-        assert main([*arguments, kind, "--limit", "151"]) == 0
+        assert main([*arguments, kind, "--set", "limit 151"]) == 0
         assert path.read_text().count("<circle") == 152
-    assert main([*arguments, "templates", "--limit", "7"]) == 0
-    assert "--limit has no effect" in capsys.readouterr().err
+    assert main([*arguments, "templates", "--set", "limit 7"]) == 0
+    assert "--set 'limit …' has no effect" in capsys.readouterr().err
 
 
 def test_a_greater_limit_searches_for_more_states(
@@ -164,8 +164,8 @@ def test_a_greater_limit_searches_for_more_states(
     model.write_text(COUNTER.replace("MOST", "10001"))
     arguments = ["plot", str(model), "-o", str(path), "--as", "states"]
     assert main(arguments) == LimitError.exit_code
-    assert "more than 10000 symbolic states\nhint: search for more (--limit)" in (
+    assert "more than 10000 symbolic states\nhint: search for more (--set 'limit …')" in (
         capsys.readouterr().err
     )
-    assert main([*arguments, "--limit", "10002"]) == 0
+    assert main([*arguments, "--set", "limit 10002"]) == 0
     assert "10002 symbolic states" in path.read_text()

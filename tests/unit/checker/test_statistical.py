@@ -344,11 +344,11 @@ def test_the_command_line_and_verifyta_follow_strategies(
     queries = tmp_path / "game.q"
     queries.write_text(f"{SAFE}\n{EARLY}\n", "utf-8")
     arguments = ["check", str(path), "--query", SAFE, "--query", EARLY, "--runs", "50"]
-    assert main([*arguments, "--under-choice", "eager", "--json"]) == 0
+    assert main([*arguments, "--set", "under choice eager", "--json"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[-1])["value"] == 1
-    assert main([*arguments[:4], "--under-choice", "eager"]) == 0
-    assert "--under-choice has no effect here" in capsys.readouterr().err
-    assert main([*arguments, "--under-choice", "clever"]) == 2
+    assert main([*arguments[:4], "--set", "under choice eager"]) == 0
+    assert "--set 'under choice …' has no effect here" in capsys.readouterr().err
+    assert main([*arguments, "--set", "under choice clever"]) == 2
     assert "'clever' is not one of 'race', 'eager', 'lazy'" in capsys.readouterr().err
     assert main(["verifyta", str(path), str(queries), "-s"]) == 0
     out = capsys.readouterr().out

@@ -183,13 +183,13 @@ def test_plot_draws_zones(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     model.write_text(GAME)
     arguments = ["plot", str(model), "--as", "zones", "-o", str(path)]
     query = ["--query", "control: A<> P.Won"]
-    assert main([*arguments, *query, "--at", "P.B y=1/2", "--clocks", "x"]) == 0
+    assert main([*arguments, *query, "--at", "P.B y=1/2", "--set", "clocks x"]) == 0
     assert "What the controller does in ( P.B )" in path.read_text()
     for given, says in (
         (["--at", "P.C"], 'has no location "C"'),
         (["--at", "Q.B"], "'Q.B' is neither a location nor a value\nhint: write Process.Location"),
         (["--at", "x=b"], "'b' of clock x is not an exact number"),
-        (["--clocks", "x,,y"], "'x,,y' is not one clock or two"),
+        (["--set", "clocks x,,y"], "'x,,y' is not one clock or two"),
     ):
         assert main([*arguments, *query, *given]) == 2
         assert says in capsys.readouterr().err

@@ -191,7 +191,7 @@ def test_strategy_is_written_as_a_controller(
     gate: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "controller.c"
-    query = ("--query", "control: A<> Gate.Open", "--controller", path)
+    query = ("--query", "control: A<> Gate.Open", "--strategy", path)
     out, _ = check_run(capsys, 0, gate, *query)
     assert f"controller written to {path}" in out
     assert "control: A<> Gate.Open" in path.read_text()
@@ -206,7 +206,7 @@ def test_a_single_plan_is_found_without_the_others(
 ) -> None:
     options = ("--query", "ReachFinalTR", "--plans", tmp_path / "plans.json", "--json")
     everything, _ = check_run(capsys, 0, PAPER, *options)
-    first, _ = check_run(capsys, 0, PAPER, *options, "--max-plans", 1)
+    first, _ = check_run(capsys, 0, PAPER, *options, "--set", "max plans 1")
     assert json.loads(first)["plans"] == 1
     assert json.loads(first)["stored"] * 10 < json.loads(everything)["stored"]
 
@@ -218,11 +218,11 @@ def test_a_single_plan_leaves_open_whether_there_are_more(
     query = ("--query", "control: A<> Gate.Open", "--plans", path)
     check_run(capsys, 0, gate, *query)
     assert json.loads(path.read_text())["complete"] is True
-    check_run(capsys, 0, gate, *query, "--max-plans", "1")
+    check_run(capsys, 0, gate, *query, "--set", "max plans 1")
     assert json.loads(path.read_text())["complete"] is False
     for wrong in ("0", "last"):
-        _, err = check_run(capsys, 2, gate, *query, "--max-plans", wrong)
-        assert "--max-plans" in err
+        _, err = check_run(capsys, 2, gate, *query, "--set", f"max plans {wrong}")
+        assert "max plans" in err
 
 
 def test_plans_of_an_environment_are_ranked_and_certified(
@@ -405,11 +405,11 @@ system P;
 @pytest.mark.parametrize(
     ("query", "wanted", "moves"),
     [
-        ("E[] !P.Done", "--shortest", 3),
-        ("sup{!P.Done}: n", "--shortest", 2),
-        ("sup{P.Done}: n", "--shortest", 3),
-        ("sup{!P.Done}: n", "--fastest", 2),
-        ("sup{P.Done}: n", "--fastest", 3),
+        ("E[] !P.Done", "shortest", 3),
+        ("sup{!P.Done}: n", "shortest", 2),
+        ("sup{P.Done}: n", "shortest", 3),
+        ("sup{!P.Done}: n", "fastest", 2),
+        ("sup{P.Done}: n", "fastest", 3),
     ],
 )
 def test_shortest_and_fastest_traces_of_values_and_of_runs_without_end(
@@ -417,7 +417,8 @@ def test_shortest_and_fastest_traces_of_values_and_of_runs_without_end(
 ) -> None:
     model, trace = tmp_path / "loop.xta", tmp_path / "trace.json"
     model.write_text(LOOP)
-    out, _ = check_run(capsys, 0, model, "--query", query, wanted, "--trace", str(trace), "--json")
+    options = ("--set", f"trace {wanted}", "--trace", trace, "--json")
+    out, _ = check_run(capsys, 0, model, "--query", query, *options)
     assert json.loads(out)["message"] is None
     document = json.loads(trace.read_text())
     (only,) = document.get("traces", [document])
@@ -429,7 +430,9 @@ def test_runs_without_end_take_no_least_time(
 ) -> None:
     model = tmp_path / "loop.xta"
     model.write_text(LOOP)
-    out, _ = check_run(capsys, 0, model, "--query", "E[] !P.Done", "--fastest", "--json")
+    out, _ = check_run(
+        capsys, 0, model, "--query", "E[] !P.Done", "--set", "trace fastest", "--json"
+    )
     assert "a run that never ends takes no least time" in json.loads(out)["message"]
 
 
@@ -644,10 +647,14 @@ system P;
             "--threads has no effect here: games under partial observation",
         ),
         ("control: A<> P.There", ["--search", "dfs"], "--search has no effect here: games"),
-        ("control: A<> P.There", ["--shortest"], "--shortest and --fastest have no effect here"),
-        ("E<> P.There", ["--shortest"], "--shortest and --fastest have no effect without --trace"),
+        ("control: A<> P.There", ["--set", "trace shortest"], "--set 'trace …' has no effect here"),
+        (
+            "E<> P.There",
+            ["--set", "trace shortest"],
+            "--set 'trace …' has no effect without --trace",
+        ),
         ("E<> P.There", ["--forced", "neutral"], "--forced has no effect here"),
-        ("E<> P.There", ["--priorities", "keep"], "--priorities has no effect here"),
+        ("E<> P.There", ["--set", "priorities keep"], "--set 'priorities …' has no effect here"),
         ("E<> P.There", ["--seed", "3"], "--seed has no effect without --search random"),
         ("E<> P.There", ["--search", "dfs", "--threads", "2"], "--threads has no effect here"),
         ("E[] not P.Lost", ["--threads", "2"], "--threads has no effect here"),
@@ -656,8 +663,16 @@ system P;
             ["--verify", "--reductions", "none"],
             "--reductions has no effect here: of the reductions games make live-variables only",
         ),
-        ("control: A<> P.There", ["--max-plans", "3"], "--max-plans has no effect without"),
-        ("control: A<> P.There", ["--rank", "rolls"], "--rank has no effect without --plans"),
+        (
+            "control: A<> P.There",
+            ["--set", "max plans 3"],
+            "--set 'max plans …' has no effect without",
+        ),
+        (
+            "control: A<> P.There",
+            ["--set", "ranking rolls"],
+            "--set 'ranking …' has no effect without --plans",
+        ),
     ],
 )
 def test_options_without_an_effect_are_named(
@@ -675,7 +690,6 @@ def test_options_without_an_effect_are_named(
     ("query", "option", "why"),
     [
         ("E<> P.There", "--strategy", "no answer has a strategy"),
-        ("E<> P.There", "--controller", "no answer has a strategy"),
         ("control: A<> P.There", "--trace", "no answer has a trace"),
         ("control: A<> P.There", "--certificate", "only an E<>"),
         ("E<> P.There", "--plans", "plans are listed for control: A<>"),

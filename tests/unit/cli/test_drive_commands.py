@@ -253,7 +253,7 @@ def test_plot_draws_a_scene_and_a_run(
         ("nowhere.nsl", ["nowhere.nsl"]),
         ("no such file", ["nowhere.mcap"]),
         ("unknown kind of picture", [PAPER, "-o", "scene.bmp"]),
-        ("unknown ranking criterion", [PAPER, "--rank", ""]),
+        ("unknown ranking criterion", [PAPER, "--set", "ranking beauty"]),
         ("--plans", [PAPER, "--plans", "-1"]),
     ],
 )
@@ -268,7 +268,10 @@ def test_plot_refuses_bad_input(
     [
         (["drive", PAPER, "--seed", "1", "--quiet"], "--seed has no effect without --noise or"),
         (["drive", PAPER, "--json", "--quiet"], "--quiet has no effect with --json"),
-        (["plot", PAPER, "--plans", "0", "--rank", "rolls"], "--rank has no effect with --plans 0"),
+        (
+            ["plot", PAPER, "--plans", "0", "--set", "ranking rolls"],
+            "--set 'ranking …' has no effect with --plans 0",
+        ),
     ],
 )
 def test_options_without_an_effect_are_named(

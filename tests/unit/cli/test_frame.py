@@ -116,7 +116,7 @@ def test_the_help_waits_for_no_library() -> None:
     assert run.stdout == "set()\n"
 
 
-@pytest.mark.parametrize("words", [["plan"], ["check", "--plans", "-", "--max-plans", "1"]])
+@pytest.mark.parametrize("words", [["plan"], ["check", "--plans", "-", "--set", "max plans 1"]])
 def test_a_first_plan_waits_for_no_library(words: list[str]) -> None:
     heavy = {"matplotlib", "numpy", "rich", "scipy", "msgspec", "google"}
     arguments = [words[0], str(ROOT / "examples" / "paper.nsl"), *words[1:]]

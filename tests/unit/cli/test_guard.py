@@ -124,7 +124,7 @@ def test_a_stop_before_there_is_an_answer(
     [
         ("--strategy", "out.json", "the strategy was found; writing it"),
         ("--strategy", "out.txt", "the strategy was found; writing it"),
-        ("--controller", "out.c", "the strategy was found; writing its controller"),
+        ("--strategy", "out.c", "the strategy was found; writing it"),
         ("--plans", "out.json", "writing the plans"),
         ("--trace", "out.xml", "writing the trace"),
         ("--certificate", "out.jsonl", "writing the certificate"),

@@ -63,3 +63,33 @@ def test_verifyta_reads_them_too(path: str, capsys: pytest.CaptureFixture[str]) 
     assert capsys.readouterr().out.count("(99% CI)") == 2
     assert main(["verifyta", "-a", "0.1", path]) == 0
     assert capsys.readouterr().out.count("(90% CI)") == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--set", "beta 3"], "--set 'beta RISK': '3' is not a number between 0 and 1"),
+        (["--set", "levels"], "--set 'levels EXPR': no value"),
+        (["--set", "levles n"], "there is no setting 'levles n'; did you mean 'levels'?"),
+        (["--set", "beta 0.1", "--set", "beta 0.2"], "the setting 'beta' is given twice"),
+        (
+            ["--value-bounds=0,20"],
+            "no such option: --value-bounds; write --set 'value bounds 0,20'",
+        ),
+        (["--anytime"], "no such option: --anytime; write --set 'anytime on'"),
+        (["--rank", "rolls"], "no such option: --rank; write --set 'ranking rolls'"),
+        (["--shortest"], "no such option: --shortest; write --set 'trace shortest'"),
+        (["--controller", "a.c"], "no such option: --controller; write --strategy a.c"),
+    ],
+)
+def test_settings_are_checked_and_former_options_say_what_replaces_them(
+    capsys: pytest.CaptureFixture[str], words: list[str], says: str
+) -> None:
+    assert main(["check", "model.xta", *words]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_all_settings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    for command, words in (("check", "mean interval"), ("plot", "bucket width")):
+        assert main([command, "--help-settings"]) == 0
+        assert f"\n  {words} " in capsys.readouterr().out

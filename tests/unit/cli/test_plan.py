@@ -120,5 +120,5 @@ def test_static_tissue_has_no_probabilities(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_other_commands_do_not_rank_by_probability(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["check", CHANCE, "--plans", "-", "--rank", "probability"]) == 2
+    assert cli.main(["check", CHANCE, "--plans", "-", "--set", "ranking probability"]) == 2
     assert "by `ntagen plan` only" in capsys.readouterr().err

@@ -240,8 +240,19 @@ def test_plot_draws_random_runs(path: str, tmp_path: Path, ending: str, query: s
 
 def test_plot_takes_buckets_and_runs(path: str, tmp_path: Path) -> None:
     picture = tmp_path / "picture.svg"
-    words = ["plot", path, "--query", REACHED, "-o", str(picture), "--runs", "500", "--seed", "3"]
-    assert main([*words, "--buckets", "10"]) == 0
+    words = [
+        "plot",
+        path,
+        "--query",
+        REACHED,
+        "-o",
+        str(picture),
+        "--set",
+        "runs 500",
+        "--set",
+        "seed 3",
+    ]
+    assert main([*words, "--set", "buckets 10"]) == 0
     root = ET.fromstring(picture.read_text("utf-8"))
     titles = [one.text or "" for one in root.iter("{http://www.w3.org/2000/svg}title")]
     assert sum(re.match(r"[\d.]+ to [\d.]+: ", one) is not None for one in titles) == 10
@@ -257,7 +268,7 @@ def test_plot_takes_buckets_and_runs(path: str, tmp_path: Path) -> None:
         (["--query", "simulate[<=1; 5]{n} : 2 : n > 100"], "shows no run"),
         (["--query", "E<> Q.B", "--as", "runs"], "is not answered by random runs"),
         (["--query", REACHED, "--as", "gantt"], "has no trace"),
-        (["--query", REACHED, "--buckets", "3", "--bucket-width", "1"], "not both"),
+        (["--query", REACHED, "--set", "buckets 3", "--set", "bucket width 1"], "not both"),
     ],
 )
 def test_plot_refuses_what_cannot_be_drawn(
@@ -283,5 +294,5 @@ def test_plot_draws_what_there_is_at_a_limit(
         capsys.readouterr().err
     )
     assert picture.exists()
-    assert main(["plot", path, "--query", "E<> Q.B", "--runs", "3", "-o", str(picture)]) == 0
-    assert "--runs has no effect here: no random runs are drawn" in capsys.readouterr().err
+    assert main(["plot", path, "--query", "E<> Q.B", "--set", "runs 3", "-o", str(picture)]) == 0
+    assert "--set 'runs …' has no effect here: no random runs are drawn" in capsys.readouterr().err

@@ -53,7 +53,9 @@ def test_trace_holds_until_a_wait_is_changed(
     lamp: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trace = tmp_path / "trace.json"
-    check_exit(0, "check", lamp, "--query", "E<> Lamp.Dim", "--fastest", "--trace", trace)
+    check_exit(
+        0, "check", lamp, "--query", "E<> Lamp.Dim", "--set", "trace fastest", "--trace", trace
+    )
     check_exit(0, "verify", lamp, trace)
     assert "trace replayed: 2 states, 1 moves" in capsys.readouterr().out
     file = json.loads(trace.read_text())
@@ -150,16 +152,17 @@ def test_names_that_nothing_knows_are_refused(
 
 
 def test_shortest_and_fastest_traces_differ(lamp: Path, tmp_path: Path) -> None:
-    def found(option: str) -> tuple[int, float]:
+    def found(wanted: str) -> tuple[int, float]:
         trace = tmp_path / "trace.json"
+        options = ("--set", f"trace {wanted}", "--trace", trace)
         lamp.write_text(DETOUR)
-        check_exit(0, "check", lamp, "--query", "E<> P.End", option, "--trace", trace)
+        check_exit(0, "check", lamp, "--query", "E<> P.End", *options)
         run = json.loads(trace.read_text())["run"]
         waits = sum(step["wait"] for step in run["steps"]) + run["end"]["wait"]
         return len(run["steps"]), waits / run["ticks_per_unit"]
 
-    assert found("--shortest") == (1, 10)
-    assert found("--fastest") == (3, 2)
+    assert found("shortest") == (1, 10)
+    assert found("fastest") == (3, 2)
 
 
 def test_traces_of_values_are_all_replayed(

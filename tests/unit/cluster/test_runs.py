@@ -119,7 +119,7 @@ def test_runs_under_a_strategy_are_those_of_one_machine(
 ) -> None:
     path = tmp_path / "game.xta"
     path.write_text(GAME, "utf-8")
-    words = ["check", str(path), "--json", "--epsilon", "0.01", "--under-choice", choice]
+    words = ["check", str(path), "--json", "--epsilon", "0.01", "--set", f"under choice {choice}"]
     for query in [KEPT_SAFE, EARLY, "E[<=3; 5000](max: n) under Safe"]:
         words += ["--query", query]
     assert main(words) == 0
@@ -194,8 +194,11 @@ def test_what_is_made_here_is_said(
         "note: simulate[<=3]{n}: runs are made by this machine: only the runs of Pr and E are made "
         "by a cluster"
     ]
-    assert main(["check", str(path), "--query", REACHED, "--dask", "tcp://x:1", "--joint"]) == 0
-    assert "queries of --joint share their runs" in capsys.readouterr().err
+    assert (
+        main(["check", str(path), "--query", REACHED, "--dask", "tcp://x:1", "--set", "joint on"])
+        == 0
+    )
+    assert "queries that are answered jointly share their runs" in capsys.readouterr().err
 
 
 @pytest.mark.slow

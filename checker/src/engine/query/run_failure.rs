@@ -207,7 +207,7 @@ fn help_for(failure: &Failure, query: &Query) -> &'static str {
         Failure::Weight(..) => "make all weights 0 or greater",
         Failure::NoWeight(..) => "make one of them positive, or guard the edge",
         Failure::TimeLock(_) => "widen its invariant, or give it an edge that is enabled in time",
-        Failure::ValueOutOfBounds(_) => "give wider ones: --value-bounds LOW,HIGH",
+        Failure::ValueOutOfBounds(_) => "give wider ones: --set 'value bounds LOW,HIGH'",
         Failure::InvariantBroken(_) => "guard the edges that lead there",
         Failure::Zeno(_) => "let time pass in every loop, or bound the run by its moves: [#<=1000]",
         Failure::ImpossibleDemand => {

@@ -222,7 +222,7 @@ pub(in crate::engine) fn contradiction(
         MeanMethod::Auto if !is_sequential => None,
         _ if !has_bounds => Some((
             "such an interval of a mean needs bounds of the value, and none are known",
-            "give them: --value-bounds LOW,HIGH",
+            "give them: --set 'value bounds LOW,HIGH'",
         )),
         _ => None,
     }

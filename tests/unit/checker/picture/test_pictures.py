@@ -165,8 +165,8 @@ def test_templates_stand_below_each_other(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     model, path = ROOT / "examples" / "models" / "train_gate.xta", tmp_path / "templates.svg"
-    assert main(["plot", str(model), "--as", "templates", "-o", str(path), "--limit", "3"]) == 0
-    assert "--limit has no effect" in capsys.readouterr().err
+    assert main(["plot", str(model), "--as", "templates", "-o", str(path), "--set", "limit 3"]) == 0
+    assert "--set 'limit …' has no effect" in capsys.readouterr().err
     whole = ET.fromstring(path.read_text("utf-8"))
     inner = whole.findall(f"{SVG}svg")
     titles = [one.findtext(f"{SVG}title") for one in inner]
