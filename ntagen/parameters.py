@@ -492,7 +492,6 @@ PARAMETERS: Final = (
         "The least confidence with which a push stays clear of critical regions until it is looked "
         "at, and the tip is in the target.",
         is_above=True,
-        option="--accept",
         most=1.0,
         sample="0.98",
     ),

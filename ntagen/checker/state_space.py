@@ -82,8 +82,8 @@ class StateSpace:
             few = "" if clocks is False else "leave out the clocks (--as discrete), "
             raise InputError(
                 f"the graph has {count} states, and the picture may have {limit}\n"
-                f"hint: allow more (--set 'limit {count}'), make constants of the model smaller, {few}"
-                "or write a file that ends in .dot, for Graphviz"
+                f"hint: allow more (--set 'limit {count}'), make constants of the model smaller, "
+                f"{few}or write a file that ends in .dot, for Graphviz"
             )
         return Svg(draw(diagram))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
 
 def _places(
     _ctx: click.Context, _option: click.Parameter, texts: tuple[str, ...]
-) -> tuple[Vector, ...]:
-    """Positions, each written as three numbers with commas."""
-    found = []
+) -> tuple[Vector | Path, ...]:
+    """Positions, each written as three numbers with commas, and the files of scenes."""
+    found: list[Vector | Path] = []
     for text in texts:
+        if text.endswith(".nsl"):
+            found.append(Path(text))
+            continue
         try:
             x, y, z = (float(part) for part in text.split(","))
         except ValueError:
@@ -35,7 +39,10 @@ def _places(
 
 
 @click.command(
-    "calibrate", epilog="Exit codes: 0 done, 2 the points are rejected, 70 internal error."
+    "calibrate",
+    cls=Renamed,
+    former={"--scene": "write --at {}"},
+    epilog="Exit codes: 0 done, 2 the points are rejected, 70 internal error.",
 )
 @click.argument("tracker_points", metavar="POINTS", type=click.Path(path_type=Path))
 @click.argument(
@@ -67,17 +74,11 @@ def _places(
 @click.option(
     "--at",
     "places",
-    metavar="X,Y,Z",
+    metavar="X,Y,Z|ENV.nsl",
     multiple=True,
     callback=_places,
-    help="Estimate the error at this position in the scene, in mm. It can be given many times.",
-)
-@click.option(
-    "--scene",
-    "environment",
-    metavar="ENV.nsl",
-    type=click.Path(path_type=Path),
-    help="Estimate the error at the targets and critical regions of this scene.",
+    help="Estimate the error at this position in the scene, in mm, or at the targets and critical "
+    "regions of this scene. It can be given many times.",
 )
 @click.option(
     "-o",
@@ -94,8 +95,7 @@ def command(
     source: str | None,
     target: str | None,
     by_order: bool,
-    places: tuple[Vector, ...],
-    environment: Path | None,
+    places: tuple[Vector | Path, ...],
     output: Path | None,
     as_json: bool,
 ) -> int:
@@ -110,12 +110,12 @@ def command(
 
     The output has the residual of each pair, and its residual after a fit to all others. FRE is the
     root mean square of the first. TRE, the expected error of the registration at a place, is what
-    counts: see it with --at or --scene. A set that is mirrored, on a line, in another unit or
+    counts: see it with --at. A set that is mirrored, on a line, in another unit or
     paired wrongly is refused.
 
     \b
     Examples:
-      ntagen calibrate examples/calibration.csv --scene examples/paper.nsl -o registration.json
+      ntagen calibrate examples/calibration.csv --at examples/paper.nsl -o registration.json
       ntagen calibrate measured.csv image.fcsv --frame tracker --to LPS -o registration.json
     """  # noqa: D301  click wants the control character
     from ntagen.tracking.registration import register
@@ -128,7 +128,7 @@ def command(
         if any(str(file) in str(error) for file in files):
             raise
         raise InputError(f"{' and '.join(map(str, files))}: {error}") from error
-    errors = _errors(fit, places, environment)
+    errors = _errors(fit, places)
     document = to_json(fit)
     if output is not None:
         inputs = {f"file of points {number}": file for number, file in enumerate(files, start=1)}
@@ -170,14 +170,15 @@ def _pairs(
     return pair(first, second, by_order=by_order)
 
 
-def _errors(fit: Fit, places: tuple[Vector, ...], environment: Path | None) -> list[dict[str, Any]]:
-    """The estimated errors at places of the scene."""
-    wanted = [("centre of the points", fit.center_mm)]
-    wanted += [(", ".join(f"{number:g}" for number in place), place) for place in places]
-    if environment is not None:
-        from ntagen.nsl import load
+def _errors(fit: Fit, places: tuple[Vector | Path, ...]) -> list[dict[str, Any]]:
+    """The estimated errors at places of the scene, positions first."""
+    from ntagen.nsl import load
 
-        scene = load(environment)
+    wanted = [("centre of the points", fit.center_mm)]
+    for place in places:
+        if not isinstance(place, Path):
+            wanted.append((", ".join(f"{number:g}" for number in place), place))
+    for scene in (load(place) for place in places if isinstance(place, Path)):
         wanted += [(one.name, one.center_mm) for one in (*scene.targets, *scene.criticals)]
     return [
         {"at": name, "position_mm": list(place), "tre_mm": fit.tre_mm(place)}

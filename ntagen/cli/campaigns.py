@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 _LOST: Final = 1
 """The exit code if some runs could not be made."""
 
+FORMER: Final = {"--quiet": "progress goes to standard error"}
+
 EPILOG: Final = """\
 Exit codes: 0 all runs were made, 1 some could not be made or the driver broke in them, 2 the input
 is wrong or a result cannot be written, 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
@@ -37,14 +39,12 @@ class How:
         dask: The address of a Dask scheduler, or None.
         resume: Whether finished runs are kept.
         logs: Whether each run has a log.
-        quiet: Whether no progress is printed.
     """
 
     workers: int | None
     dask: str | None
     resume: bool
     logs: bool
-    quiet: bool
 
 
 _OPTIONS: Final = (
@@ -66,7 +66,6 @@ _OPTIONS: Final = (
         help="Go on with an experiment that was interrupted. Finished runs are kept.",
     ),
     click.option("--no-logs", is_flag=True, help="Write no log of each run."),
-    click.option("--quiet", is_flag=True, help="Print no progress, only the table."),
 )
 
 
@@ -80,10 +79,9 @@ def campaign_options(command: Callable[..., int | None]) -> Callable[..., int | 
         dask: str | None,
         resume: bool,
         no_logs: bool,
-        quiet: bool,
         **values: object,
     ) -> int | None:
-        return command(how=How(workers, dask, resume, not no_logs, quiet), **values)
+        return command(how=How(workers, dask, resume, not no_logs), **values)
 
     decorated: Callable[..., int | None] = with_how
     for option in reversed(_OPTIONS):
@@ -103,7 +101,7 @@ def made(experiment: Experiment, folder: Path, how: How) -> Campaign:
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is no folder\nhint: choose another one with -o")
     try:
-        with _progress(how.quiet) as notify:
+        with _progress() as notify:
             campaign = carry_out(
                 experiment,
                 folder,
@@ -147,11 +145,9 @@ def _conclude(document: Mapping[str, Any]) -> None:
 
 
 @contextlib.contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+def _progress() -> Iterator[Callable[[Progress], None]]:
     """Gives what shows the progress: a bar on a terminal, else a line for each tenth."""
-    if quiet:
-        yield lambda _: None
-    elif sys.stderr.isatty():
+    if sys.stderr.isatty():
         with _bar() as show:
             yield show
     else:

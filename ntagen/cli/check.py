@@ -36,7 +36,7 @@ from ntagen.cli.rules import overflow_rule
 from ntagen.cli.run_progress import progress_of, say_interrupted
 from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached
-from ntagen.cli.spreading import Spreading, dask_option
+from ntagen.cli.spreading import Spreading
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
@@ -148,7 +148,6 @@ class _CheckCommand(Renamed):
     "in exact kinematics. FILE.jsonl has one plan on each line, in the order of the model: it is "
     "written while the plans are certified, and millions of them take no memory.",
 )
-@dask_option
 @engine_options
 @settings_option(SETTINGS, "levels Queue.length")
 @overflow_rule()
@@ -168,7 +167,6 @@ def command(
     certificate: Path | None,
     strategy: str | None,
     plans: str | None,
-    dask: str | None,
     given: dict[str, Any],
     settings: dict[str, Any],
     overflow: Any,  # noqa: ANN401  click gives a str where the engine wants literals
@@ -198,7 +196,7 @@ def command(
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
       ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --set "relative 0.1"
       ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --set "levels Queue.length"
-      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --dask tcp://head:8786
+      ntagen check model.xml --query "Pr[<=10](<> Queue.Full)" --set "dask tcp://head:8786"
 
     \b
     A trace is a run with exact times, which an independent replay has checked. Each step says when
@@ -224,6 +222,7 @@ def command(
         raise click.UsageError(f"two files of queries: {query_file} and {second_path}; give one")
     settings = dict(settings)
     joint, criteria = settings.pop("joint", False), _criteria(settings.pop("ranking", None))
+    dask = settings.pop("dask", None)
     outputs = Outputs(trace, certificate, strategy, plans, criteria)
     query_path = query_file or second_path
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})

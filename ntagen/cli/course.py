@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from ntagen.plan.closed_loop import Segment
     from ntagen.scene import Scene
 
+NO_STRATEGY: Final = Path("none")
+"""What stands for the file of a strategy if plans are followed."""
+
 _OPTIONS: Final = {
-    "by": "--by",
     "tree_path": "--strategy",
     "only_guaranteed": "--only-guaranteed",
     "tissue": "--tissue",
@@ -35,13 +37,11 @@ class Wanted:
     """What the command line says.
 
     Attributes:
-        by: ``strategy`` or ``plans``; None if nothing is said.
-        tree_path: The file of the strategy; None if it is to be found.
+        tree_path: The file of the strategy, or `NO_STRATEGY`; None if it is to be found.
         only_guaranteed: Whether the run ends where nothing is guaranteed any more.
         tissue: What a simulated tissue does; None if nothing is said.
     """
 
-    by: str | None = None
     tree_path: Path | None = None
     only_guaranteed: bool = False
     tissue: str | None = None
@@ -50,20 +50,16 @@ class Wanted:
 course_options = gathered(
     "wanted",
     {
-        "by": click.option(
-            "--by",
-            type=click.Choice(["strategy", "plans"]),
-            help="What is followed in a tissue that answers (tissue adversarial): a strategy that "
-            "wins whatever the tissue picks, or plans for the expected tissue, which are made anew "
-            "when the needle leaves them.  [default: strategy; plans if there is none]",
-        ),
         "tree_path": click.option(
             "--strategy",
             "tree_path",
-            metavar="FILE.json",
+            metavar="FILE.json|none",
             type=click.Path(path_type=Path),
-            help="Follow the strategy in this file, which ntagen check --plans wrote for this "
-            "task. Without it, the strategy is found before the needle enters.",
+            help="In a tissue that answers (tissue adversarial), follow the strategy in this file, "
+            "which ntagen check --plans wrote for this task; or none, but plans for the expected "
+            "tissue, which are made anew when the needle leaves them.  [default: a strategy that "
+            "wins whatever the tissue picks is found before the needle enters; plans if there is "
+            "none]",
         ),
         "only_guaranteed": click.option(
             "--only-guaranteed",
@@ -118,11 +114,11 @@ def course_of(
     from ntagen.drive.following import Course
     from ntagen.drive.trees import load_tree
 
-    if wanted.by == "plans":
-        if wanted.tree_path is not None or wanted.only_guaranteed:
+    if wanted.tree_path == NO_STRATEGY:
+        if wanted.only_guaranteed:
             raise InputError(
                 "plans have no guarantee against the tissue\n"
-                "hint: leave out --by plans, or --strategy and --only-guaranteed"
+                "hint: leave out --strategy none or --only-guaranteed"
             )
         return None
     if wanted.tree_path is not None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.effects import say_idle
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.lab import command as simulate
 from ntagen.cli.plugins import check_plugin, installed, is_plugin
 from ntagen.cli.plugins import command as test
@@ -27,10 +28,20 @@ if TYPE_CHECKING:
     from ntagen.grbl.port import Port
 
 _MOST_MM: Final = 10.0
-_STEPPERS_ONLY: Final = {
-    **{"baud_rate": "--baud", "length_mm": "--move", "axis": "--axis"},
-    "yes": "--yes",
-}
+_STEPPERS_ONLY: Final = {"motion": "--move", "yes": "--yes"}
+
+
+class _Motion(click.ParamType[tuple[str, float]]):
+    """An axis, X if none is named, and how far it is moved, in mm."""
+
+    name = "motion"
+    _length: Final = click.FloatRange(min=0.0, max=_MOST_MM, min_open=True)
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, float]:
+        axis, _, length = str(value).rpartition(":")
+        return axis or "X", float(self._length(length, param, ctx))
 
 
 @click.group("device")
@@ -50,18 +61,20 @@ command.add_command(test)
 
 
 @command.command(
-    "check", epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready."
+    "check",
+    cls=Renamed,
+    former={"--baud": "write grbl:PORT,baud={}", "--axis": "write --move {}:MM"},
+    epilog="Exit codes: 0 it is ready, 2 the command line is wrong, 5 it is not ready.",
 )
 @click.argument("device", metavar="grbl:PORT|grbl+sim|TASK.nsl|openigtlink:HOST:PORT|PLUGIN")
-@click.option("--baud", "baud_rate", default=115_200, show_default=True, help="The port's speed.")
 @click.option(
     "--move",
-    "length_mm",
-    metavar="MM",
-    type=click.FloatRange(min=0.0, max=_MOST_MM, min_open=True),
-    help=f"Also move an axis by this length, at most {_MOST_MM:g} mm, and back, after you agree.",
+    "motion",
+    metavar="[AXIS:]MM",
+    type=_Motion(),
+    help=f"Also move an axis (X by itself) by this length, at most {_MOST_MM:g} mm, and back, "
+    "after you agree.",
 )
-@click.option("--axis", default="X", show_default=True, help="The axis for --move.")
 @click.option(
     "--listen",
     "listen_s",
@@ -75,9 +88,7 @@ command.add_command(test)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def check(
     device: str,
-    baud_rate: int,
-    length_mm: float | None,
-    axis: str,
+    motion: tuple[str, float] | None,
     listen_s: float,
     yes: bool,
     as_json: bool,
@@ -111,17 +122,17 @@ def check(
     axes = None
     if device.endswith(".nsl"):
         device, axes = _described(Path(device))
-    with _port(device, baud_rate) as port:
+    with _port(device) as port:
         findings = inspect(port, axes)
         if not as_json:
             _tell(device, findings)
-        moved = length_mm is not None and _agreed(length_mm, axis, yes=yes)
-        if moved and length_mm is not None:
-            _move(port, axis, length_mm)
+        moved = motion if motion is not None and _agreed(*motion, yes=yes) else None
+        if moved is not None:
+            _move(port, *moved)
     if as_json:
-        echo(json.dumps(asdict(findings) | {"moved_mm": length_mm if moved else 0.0}))
-    elif moved:
-        echo(f"moved {axis} by {length_mm:g} mm and back")
+        echo(json.dumps(asdict(findings) | {"moved_mm": 0.0 if moved is None else moved[1]}))
+    elif moved is not None:
+        echo(f"moved {moved[0]} by {moved[1]:g} mm and back")
     else:
         echo("nothing was moved")
     if not findings.stands:
@@ -141,7 +152,7 @@ def _described(path: Path) -> tuple[str, Axes]:
 
 
 @contextlib.contextmanager
-def _port(device: str, baud_rate: int) -> Iterator[Port]:
+def _port(device: str) -> Iterator[Port]:
     """The port of a device, as long as it is needed."""
     from ntagen.grbl.port import SerialPort
 
@@ -161,12 +172,12 @@ def _port(device: str, baud_rate: int) -> Iterator[Port]:
                 "hint: write grbl:PORT, for example grbl:/dev/ttyACM0, or grbl+sim, or "
                 f"openigtlink:HOST:PORT; installed plugins: {installed()}"
             )
-        port = SerialPort(name, baud_rate)
+        port = SerialPort(name)
         stack.callback(port.close)
         yield port
 
 
-def _agreed(length_mm: float, axis: str, *, yes: bool) -> bool:
+def _agreed(axis: str, length_mm: float, *, yes: bool) -> bool:
     """Whether the user wants the motion."""
     return yes or click.confirm(
         f"Move {axis} by {length_mm:g} mm and back? Take the needle out of the tissue first.",

@@ -58,7 +58,15 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 130 interrupted, 143 ended by SIGTERM."""
 
 
-@click.command("drive", cls=Renamed, epilog=_EPILOG)
+@click.command(
+    "drive",
+    cls=Renamed,
+    former={
+        "--baud": "write --needle grbl:PORT,baud={}",
+        "--by": "write --strategy none for plans",
+    },
+    epilog=_EPILOG,
+)
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
     "--needle",
@@ -67,15 +75,9 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Which needle to steer. Three are simulations: virtual bends exactly as planned, phantom "
     "drifts, lags and is measured as real needles are, and grbl+sim is a phantom behind an "
     "emulated stepper controller. grbl:PORT is a real needle behind a controller with the axes "
-    "that the task describes; grbl alone takes the port from the task, too. PLUGIN:ARGUMENT is a "
-    "real needle of another package (docs/plugins.md).",
-)
-@click.option(
-    "--baud",
-    "baud_rate",
-    default=115_200,
-    show_default=True,
-    help="The speed of the port of a real needle.",
+    "that the task describes (grbl:PORT,baud=9600 says how fast the port is); grbl alone takes the "
+    "port from the task, too. PLUGIN:ARGUMENT is a real needle of another package "
+    "(docs/plugins.md).",
 )
 @click.option(
     "--confirm",
@@ -109,11 +111,10 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="Print all settings and where each comes from, and do not drive.",
 )
 @include_option()
-@settings_options("seed", "noise", "time limit", "accept")
+@settings_options("seed", "noise", "time limit")
 def command(
     environment: Path,
     needle: str,
-    baud_rate: int,
     confirm: bool,
     tracker: str | None,
     registration: str | None,
@@ -186,7 +187,7 @@ def command(
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
         run = _Run(environment, task, configuration, known, tracking, wanted, course)
         if is_real:
-            setup = stack.enter_context(_real_needle(run, needle, baud_rate))
+            setup = stack.enter_context(_real_needle(run, needle))
             log = stack.enter_context(_log(log_path, run))
             result = _drive_real(run, setup, log, terminal, operator)
         else:
@@ -223,7 +224,6 @@ def _say_idle(configuration: Configuration, given: Sequence[Given], *, picks: bo
     if needle.is_real:
         say_idle_settings(given, {"seed"}, "with a real needle")
         return
-    say_idle({"baud_rate": "--baud"}, "with a simulated needle")
     if needle.parameters is None and not (errors.noise_mm or errors.roll_rad or picks):
         say_idle_settings(given, {"seed"}, "without --noise or --set 'roll error …'")
 
@@ -255,9 +255,7 @@ class _Terminal:
 
 
 @contextlib.contextmanager
-def _real_needle(
-    run: _Run, needle: str, baud_rate: int
-) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
+def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
     """What moves a real needle, and what measures it."""
     from ntagen.drive.needles import REAL
     from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
@@ -268,10 +266,9 @@ def _real_needle(
     if name == REAL:
         device = described(run.task, run.environment)
         axes = axes_for(device, scene.needle, settings)
-        port = SerialPort(argument or device.port, baud_rate)
+        port = SerialPort(argument or device.port)
         opening = opened_steppers(port, axes, scene.needle, settings)
     else:
-        say_idle({"baud_rate": "--baud"}, "with a plugin")
         opening = opened_plugin(name, argument, scene.needle, settings)
     with (
         opening as actuator,

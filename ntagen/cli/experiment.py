@@ -6,10 +6,11 @@ from pathlib import Path
 
 import click
 
-from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
+from ntagen.cli.campaigns import EPILOG, FORMER, How, campaign_options, ended, made
+from ntagen.cli.former_options import Renamed
 
 
-@click.command("experiment", epilog=EPILOG)
+@click.command("experiment", cls=Renamed, former=FORMER, epilog=EPILOG)
 @click.argument("file", metavar="FILE.toml", type=click.Path(path_type=Path))
 @click.option(
     "--runs",

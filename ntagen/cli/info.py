@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
 from ntagen.cli.limits import bounded
 from ntagen.cli.models import include_option, load_model, pointing_to_explanations
 from ntagen.cli.terminal import echo, safe, table_console
-from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,19 +29,17 @@ ROWS_SHOWN: Final = 40
 """A table shows at most this many rows; the JSON object has all."""
 
 
-@click.command("info", epilog="Exit codes: 0 done, 2 the input is wrong, 3 stopped by a limit.")
+@click.command(
+    "info",
+    cls=Renamed,
+    former={"--svg": "`ntagen plot MODEL --as templates` draws them"},
+    epilog="Exit codes: 0 done, 2 the input is wrong, 3 stopped by a limit.",
+)
 @click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
-@click.option(
-    "--svg",
-    "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    help="Write a picture of each template to this folder; it is made if it does not exist.",
-)
 @include_option()
 @bounded
-def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path, ...]) -> None:
+def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
     """Show what is in a model: templates, processes, variables, clocks, channels, features.
 
     MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta).
@@ -50,7 +48,6 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
     Examples:
       ntagen info model.xml
       ntagen info model.xml --json | jq .features
-      ntagen info model.xta --svg pictures
 
     For an environment, it also shows each region (its volume, its bounds, and its distance from
     the straight way between the tip and the middle of the last target; negative if it is in the
@@ -87,8 +84,6 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
         from ntagen.drive.configure import configure
 
         configuration = configure(loaded.task.given, loaded.task.scene)
-    if folder is not None:
-        write_files(_pictures(model.templates, folder))
     if as_json:
         with doing("describing the model"):
             text = model.facts_json()
@@ -108,8 +103,6 @@ def command(path: Path, as_json: bool, folder: Path | None, include: tuple[Path,
     _show(path, model)
     if loaded.task is not None and configuration is not None:
         _show_task(loaded.task, configuration)
-    if folder is not None:
-        echo(f"{_count(len(model.templates), 'picture')} written to {folder}")
 
 
 def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
@@ -146,10 +139,6 @@ def _show_task(task: Task, configuration: Configuration) -> None:
             echo(str(device))
     echo("settings of ntagen drive, and where they come from:")
     show_settings(configuration)
-
-
-def _pictures(templates: Sequence[Template], folder: Path) -> dict[Path, str]:
-    return {folder / f"{template.name}.svg": template.svg() for template in templates}
 
 
 def _show(path: Path, model: Model) -> None:

@@ -19,6 +19,7 @@ from ntagen.cli.signals import handled
 from ntagen.cli.steering import say_idle_errors, settings_options
 from ntagen.cli.terminal import echo
 from ntagen.drive.steppers import axes_for, described
+from ntagen.lab.lab import RATE_HZ
 from ntagen.lab.speeds import FASTEST, SLOWEST
 
 if TYPE_CHECKING:
@@ -34,12 +35,15 @@ if TYPE_CHECKING:
 _LOOK_S: Final = 0.1
 """How often it is asked whether the lab should end."""
 
-_RATE_HZ: Final = 40.0
-
 
 @click.command(
     "simulate",
     cls=Renamed,
+    former={
+        "--help-settings": "`ntagen drive --help-settings` prints them",
+        "--rate": f"a lab publishes {RATE_HZ:g} samples a second",
+        "--listen-port": "the port that is free is printed, also with --json",
+    },
     epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.",
 )
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
@@ -60,23 +64,6 @@ _RATE_HZ: Final = 40.0
     help="How many times as fast time passes in the lab, for axes, needle and tracker.",
 )
 @click.option(
-    "--rate",
-    "rate_hz",
-    metavar="N",
-    default=_RATE_HZ,
-    show_default=True,
-    type=click.FloatRange(min=0.1, max=1000.0),
-    help="Samples of tracker and force in a second of the lab's time; 500 a second at most.",
-)
-@click.option(
-    "--listen-port",
-    metavar="PORT",
-    default=0,
-    show_default=True,
-    type=click.IntRange(0, 65535),
-    help="The tracker's port on this machine; 0 for any that is free.",
-)
-@click.option(
     "--until-idle",
     "until_idle_s",
     metavar="SECONDS",
@@ -85,13 +72,11 @@ _RATE_HZ: Final = 40.0
 )
 @click.option("--json", "as_json", is_flag=True, help="Print two JSON objects, nothing else.")
 @include_option()
-@settings_options("seed")
+@settings_options("seed", listed=False)
 def command(
     environment: Path,
     needle: str,
     speed: float,
-    rate_hz: float,
-    listen_port: int,
     until_idle_s: float | None,
     as_json: bool,
     include: tuple[Path, ...],
@@ -133,9 +118,7 @@ def command(
     closing = _Closing(until_idle_s)
     with (
         handled({signal.SIGINT: closing.close, signal.SIGTERM: closing.close}),
-        Lab(
-            task.scene, placed, axes=axes, speed=speed, rate_hz=rate_hz, listen_port=listen_port
-        ) as lab,
+        Lab(task.scene, placed, axes=axes, speed=speed) as lab,
     ):
         words = ["ntagen", "drive", str(environment), *_of_lab(lab)]
         for path in include:

@@ -17,13 +17,10 @@ def _whole(_ctx: click.Context, _param: click.Parameter, value: float | None) ->
     return None if value is None else int(value)
 
 
-def limits(
-    about: Callable[[str], str] = lambda text: text, default: str = "no limit"
-) -> dict[str, Decorator]:
+def limits(default: str = "no limit") -> dict[str, Decorator]:
     """The options by their fields of `ntagen.checker.Options`.
 
     Args:
-        about: Makes the help of an option from what it does.
         default: What holds without the option.
     """
     return {
@@ -31,10 +28,8 @@ def limits(
             "--states",
             metavar="N",
             type=COUNT,
-            help=about(
-                "Stop a search after this many stored states, for example 10k or 2M.  "
-                f"[default: {default}]"
-            ),
+            help="Stop a search after this many stored states, for example 10k or 2M.  "
+            f"[default: {default}]",
         ),
         "memory_bytes": click.option(
             "--memory",
@@ -42,20 +37,16 @@ def limits(
             metavar="SIZE",
             type=SIZE,
             callback=_whole,
-            help=about(
-                "Stop what takes this much memory, for example 4GiB: a search by its states, all "
-                f"else by what the process takes.  [default: {default}]"
-            ),
+            help="Stop what takes this much memory, for example 4GiB: a search by its states, all "
+            f"else by what the process takes.  [default: {default}]",
         ),
         "timeout_s": click.option(
             "--timeout",
             "timeout_s",
             metavar="TIME",
             type=TIME,
-            help=about(
-                "Stop after this time, with reading, writing and drawing, for example 60s or 2min; "
-                f"a number without a unit is in seconds.  [default: {default}]"
-            ),
+            help="Stop after this time, with reading, writing and drawing, for example 60s or "
+            f"2min; a number without a unit is in seconds.  [default: {default}]",
         ),
     }
 
@@ -76,15 +67,3 @@ def bounded(command: Callable[..., int | None]) -> Callable[..., int | None]:
     for name in ("memory_bytes", "timeout_s"):
         decorated = LIMITS[name](decorated)
     return decorated
-
-
-def limit_options(of: str) -> Decorator:
-    """The same options where they limit one of several things; `of` says which one."""
-
-    def decorate(command: Callable[..., int | None]) -> Callable[..., int | None]:
-        options = limits(lambda text: f"For {of}: {text[0].lower()}{text[1:]}")
-        for option in reversed(options.values()):
-            command = option(command)
-        return command
-
-    return decorate

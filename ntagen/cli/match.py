@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.effects import say_idle
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.match_tables import show
 from ntagen.cli.models import include_option, show_warnings
 from ntagen.cli.quantities import LENGTH
@@ -26,11 +26,28 @@ if TYPE_CHECKING:
     from ntagen.traces.prediction import Prediction
     from ntagen.traces.reading import Columns
 
-_FIRST: Final = "20mm"
+_STARTS: Final = ("free", "fit", "model")
+
+
+class _Start(click.ParamType[tuple[Any, float]]):
+    """What is known of the start, and the length of the first part that says it, in mm."""
+
+    name = "start"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[Any, float]:
+        start, _, length = str(value).partition(":")
+        if start not in _STARTS:
+            self.fail(f"{start!r} is not one of {', '.join(_STARTS)}", param, ctx)
+        return start, LENGTH.convert(length or "20mm", param, ctx)
 
 
 @click.command(
-    "match", epilog="Exit codes: 0 done, 2 the environment or a trace is wrong, 70 internal error."
+    "match",
+    cls=Renamed,
+    former={"--first": "write --start fit:{} or --start model:{}"},
+    epilog="Exit codes: 0 done, 2 the environment or a trace is wrong, 70 internal error.",
 )
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.argument(
@@ -38,21 +55,13 @@ _FIRST: Final = "20mm"
 )
 @click.option(
     "--start",
-    type=click.Choice(["free", "fit", "model"]),
+    metavar="free|fit|model[:LENGTH]",
+    type=_Start(),
     default="free",
     show_default=True,
     help="What is known of the start: nothing (free); its pose by a circle fit of the first part "
     "(fit), as in the paper; or its position alone, and the model chooses the orientation on a "
     "grid of 1 deg (model), as in the work before it.",
-)
-@click.option(
-    "--first",
-    "first_mm",
-    metavar="LENGTH",
-    type=LENGTH,
-    default=_FIRST,
-    show_default=True,
-    help="The length of the first part for --start fit and --start model.",
 )
 @click.option(
     "--radius",
@@ -111,8 +120,7 @@ _FIRST: Final = "20mm"
 def command(
     environment: Path,
     traces: tuple[Path, ...],
-    start: Any,  # noqa: ANN401  one of the choices
-    first_mm: float,
+    start: tuple[Any, float],
     radius: Any,  # noqa: ANN401  one of the choices
     rolls: int | None,
     from_mm: float,
@@ -141,13 +149,11 @@ def command(
     from ntagen.traces.matching import Options
     from ntagen.traces.reading import Columns
 
-    if start == "free":
-        say_idle({"first_mm": "--first"}, "with --start free")
     if output is not None:
         _require_picture(output, environment, traces)
     task = load_task(environment, include=include)
     show_warnings([warning.render() for warning in task.warnings])
-    options = Options(start=start, radius=radius, rolls=rolls, first_mm=first_mm)
+    options = Options(start=start[0], radius=radius, rolls=rolls, first_mm=start[1])
     part_mm = (math.inf if until_mm is None else until_mm, from_mm)
     found = []
     for path in traces:

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from ntagen.plan.rank import Candidate
     from ntagen.scene import Scene
 
-_OPTIONS: Final = {"among": "--among", "runs": "--runs", "seed": "--seed"}
+_OPTIONS: Final = {"runs": "--runs", "seed": "--seed"}
 
 _AMONG: Final = 10
-"""How many plans are ranked by their probability, if no number is given."""
+"""How many plans are ranked by their probability, if only the best is wanted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,6 @@ class Wanted:
     """What is to be known of plans.
 
     Attributes:
-        among: How many plans are compared; None if no number is given.
         runs: How many are made of each.
         seed: That of the runs.
         by_odds: Whether plans are ranked by their probability.
@@ -38,7 +37,6 @@ class Wanted:
         shown: How many plans are shown.
     """
 
-    among: int | None
     runs: int
     seed: int
     by_odds: bool = False
@@ -48,7 +46,7 @@ class Wanted:
     @property
     def looked_for(self) -> int:
         """How many plans are looked for; of all of them runs are made."""
-        return max(self.shown, self.among or _AMONG) if self.by_odds else self.shown
+        return _AMONG if self.by_odds and self.shown == 1 else self.shown
 
     def checked(self, scene: Scene, count: int, *, by_odds: bool) -> Wanted:
         """The same for a scene, of which `count` plans are to be shown.
@@ -64,20 +62,12 @@ class Wanted:
             )
         if not is_random:
             say_idle(_OPTIONS, f"in a tissue that is {scene.tissue.kind}")
-        elif not by_odds:
-            say_idle({"among": "--among"}, "without --rank probability")
         return replace(self, by_odds=by_odds, is_random=is_random, shown=count)
 
 
 odds_options = gathered(
     "wanted",
     {
-        "among": click.option(
-            "--among",
-            metavar="N",
-            type=click.IntRange(min=1),
-            help="For --rank probability: how many plans are compared.  [default: 10]",
-        ),
         "runs": click.option(
             "--runs",
             metavar="N",

@@ -205,11 +205,19 @@ STATISTICAL_SETTINGS: Final = (
         "Answer all Pr and E queries so that all their intervals hold together, with the risk of "
         "--alpha for all of them. Queries with the same bound share their runs.  [default: off]",
     ),
+    Setting(
+        "dask",
+        "ADDRESS",
+        click.STRING,
+        "For Pr and E: use the workers of the Dask scheduler at this address, as tcp://host:8786. "
+        "They must have the same ntagen. Answers are the same as without them. Joint runs, those "
+        "with levels and those of simulate are made by this machine.",
+    ),
 )
 
 STATISTICAL: Final = (
     *(one.field for one in STATISTICAL_SETTINGS),
-    *("runs", "alpha", "epsilon", "discretisation", "dask"),
+    *("runs", "alpha", "epsilon", "discretisation"),
 )
 """The names of options and settings that count for statistical queries only."""
 
@@ -270,7 +278,7 @@ SETTINGS: Final = (
         "them; time and counts do. A wrong name lists all names.",
     ),
 )
-"""What ``--set`` takes; all but `joint` and `ranking` are fields of `ntagen.checker.Options`."""
+"""What ``--set`` takes: fields of `ntagen.checker.Options`, and `joint`, `dask` and `ranking`."""
 
 _OPTIONS: Final[dict[str, Decorator]] = {
     "verify": click.option(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.models import include_option
 from ntagen.cli.odds import Wanted, odds_lines, odds_options, rate, with_odds
 from ntagen.cli.quantities import TIME
@@ -28,6 +29,8 @@ STOPPED: Final = 3
 
 @click.command(
     "plan",
+    cls=Renamed,
+    former={"--among": "write --best {}"},
     epilog="Exit codes: 0 a plan was found, 1 it is proved that there is none, 2 the input is "
     "rejected, 3 the budget ended before either, 4 run-time error in the model.",
 )
@@ -39,7 +42,8 @@ STOPPED: Final = 3
     default=1,
     show_default=True,
     type=click.IntRange(min=1),
-    help="So many plans are wanted.",
+    help="So many plans are wanted. With --rank probability, so many are compared; for the "
+    "best one, 10.",
 )
 @click.option(
     "--within",

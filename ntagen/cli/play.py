@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.effects import say_idle
-from ntagen.cli.guard import Guard, doing
-from ntagen.cli.limits import limit_options
+from ntagen.cli.former_options import Renamed
+from ntagen.cli.guard import doing
 from ntagen.cli.models import constant_option, include_option, load_model, pointing_to_explanations
 from ntagen.cli.progress import shown_progress
 from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
@@ -24,12 +24,16 @@ from ntagen.files import require_apart
 if TYPE_CHECKING:
     from ntagen.checker import Model
 
+_SEARCH_FIRST: Final = "`ntagen check --strategy FILE.json` has it; then play --strategy FILE.json"
+
 DEFEATED: Final = 1
 """Exit code where the strategy did not keep its promise."""
 
 
 @click.command(
     "play",
+    cls=Renamed,
+    former=dict.fromkeys(("--states", "--memory", "--timeout"), _SEARCH_FIRST),
     epilog="Exit codes: 0 done, 1 the strategy lost or has no next move, 2 the input is "
     "rejected, 3 stopped by a limit, 4 run-time error in the model.",
 )
@@ -46,7 +50,8 @@ DEFEATED: Final = 1
     "asked",
     metavar="TEXT|NAME",
     help="A control query, or the name of a query of the model. The winner's strategy is "
-    "synthesised first.  [default: the model's only control query]",
+    "synthesised first. If that takes long, let `ntagen check --strategy` do it, with limits.  "
+    "[default: the model's only control query]",
 )
 @click.option(
     "--auto",
@@ -69,7 +74,6 @@ DEFEATED: Final = 1
 @forced_rule()
 @priority_rule("Whether priorities of channels and processes count.  [default: ignore]")
 @overflow_rule()
-@limit_options("--query")
 @constant_option()
 @include_option()
 def command(
@@ -82,9 +86,6 @@ def command(
     forced: Any,  # noqa: ANN401  click gives a str where the engine wants literals
     priorities: Any,  # noqa: ANN401
     overflow: Any,  # noqa: ANN401
-    states: int | None,
-    memory_bytes: int | None,
-    timeout_s: float | None,
     constants: dict[str, str],
     include: tuple[Path, ...],
 ) -> int:
@@ -118,12 +119,9 @@ def command(
         raise InputError("give either --strategy or --query: the file says which query it answers")
     if steps is None:
         say_idle({"seed": "--seed"}, "without --auto")
-    if strategy_path:
-        say_idle({"states": "--states"}, "with --strategy: there is no search")
     inputs = {"model": model_path} | ({"strategy": strategy_path} if strategy_path else {})
     require_apart({"--log": log}, inputs)
-    # The play itself takes as long as the user wants.
-    with pointing_to_explanations(True), Guard(timeout_s, memory_bytes) as guard:
+    with pointing_to_explanations(True):
         with doing("loading the model"):
             model = load_model(model_path, include, overflow, constants).model
         if strategy_path:
@@ -134,13 +132,7 @@ def command(
             quiet = steps is not None
             with doing("the search for a strategy"), shown_progress(query, quiet=quiet) as report:
                 strategy = model.synthesize(
-                    query,
-                    forced=forced,
-                    priorities=priorities,
-                    states=states,
-                    memory_bytes=memory_bytes,
-                    timeout_s=guard.left_s(),
-                    progress=report,
+                    query, forced=forced, priorities=priorities, progress=report
                 )
         session = Session(strategy)
     try:

@@ -279,7 +279,7 @@ def _of_strategy(
 
     course = course_of(Wanted(tree_path=tree_path), scene, configuration, lambda: None)
     if course is None or course.tree is None:
-        lack = "" if course is None else course.lack
+        lack = "no strategy is wanted" if course is None else course.lack
         echo(f"note: {lack}; plans for the expected tissue are drawn", err=True)
         return None
     return picture_of_strategy(scene, course.tree)

@@ -7,12 +7,18 @@ from pathlib import Path
 
 import click
 
+from ntagen.cli.former_options import Renamed
 from ntagen.cli.quantities import SIZE, TIME
 from ntagen.cli.terminal import echo
 from ntagen.files import read_file
 
 
-@click.command("serve", epilog="Exit codes: 2 the port or a file is wrong, 130 ended by Ctrl-C.")
+@click.command(
+    "serve",
+    cls=Renamed,
+    former={"--open": "open the address that is printed"},
+    epilog="Exit codes: 2 the port or a file is wrong, 130 ended by Ctrl-C.",
+)
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 @click.option(
     "--port",
@@ -20,12 +26,6 @@ from ntagen.files import read_file
     type=click.IntRange(0, 65535),
     default=0,
     help="The port to listen on.  [default: any that is free]",
-)
-@click.option(
-    "--open",
-    "opens",
-    is_flag=True,
-    help="Open the page in the browser.",
 )
 @click.option(
     "--timeout",
@@ -57,7 +57,6 @@ from ntagen.files import read_file
 def command(
     file: Path | None,
     port: int,
-    opens: bool,
     timeout_s: float,
     memory_bytes: float,
     upload_bytes: float,
@@ -71,7 +70,7 @@ def command(
     \b
     Examples:
       ntagen serve
-      ntagen serve model.xml --open
+      ntagen serve model.xml
       ntagen serve --port 8080 --timeout 10min --memory 4GiB
     """  # noqa: D301  click wants the control character
     from ntagen.serve.limits import Limits
@@ -90,8 +89,6 @@ def command(
             server.open(file.name, data)
         echo(f"open {server.address}")
         echo("Ctrl-C ends the server", err=True)
-        if opens:
-            click.launch(server.address)
         server.serve()
     finally:
         server.end()

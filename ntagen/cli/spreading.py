@@ -1,28 +1,19 @@
-"""`ntagen check --dask`: random runs that the workers of a Dask cluster make."""
+"""`ntagen check --set "dask ADDRESS"`: random runs that the workers of a Dask cluster make."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ntagen.cli.asked import Asked
 from ntagen.cli.effects import say
-from ntagen.cli.rules import Decorator
 
 if TYPE_CHECKING:
     from ntagen.checker import Model, Options
     from ntagen.cluster.runs import DaskRuns
-
-dask_option: Final[Decorator] = click.option(
-    "--dask",
-    metavar="ADDRESS",
-    help="For Pr and E: use the workers of the Dask scheduler at this address, as "
-    "tcp://host:8786. They must have the same ntagen. Answers are the same as without them. "
-    "Runs with joint or levels (--set) and those of simulate are made by this machine.",
-)
 
 
 class Spreading:

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
     from ntagen.drive.needles import Chosen
 
 
-def settings_options(*own: str, without: Collection[str] = ()) -> Decorator:
+def settings_options(*own: str, without: Collection[str] = (), listed: bool = True) -> Decorator:
     """Adds ``--set`` and ``--help-settings``; the command gets the values as `given`.
 
     Args:
         own: The settings, by their words, that also have an option of their own.
         without: The settings, by their words, that mean nothing to the command.
+        listed: Whether there is a ``--help-settings``.
     """
     settings = [one for one in PARAMETERS if one.words not in without]
     about = (
@@ -37,6 +38,8 @@ def settings_options(*own: str, without: Collection[str] = ()) -> Decorator:
         name, unit = one.option.removeprefix("--"), MEASURES[one.kind].unit
         options[name] = click.option(one.option, name, metavar=unit.upper() or "N", help=one.help)
     add = gathered("given", options, functools.partial(_read, own))
+    if not listed:
+        return add
     show = help_option(functools.partial(_list, settings))
     return lambda command: add(show(command))
 

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ntagen.cli.campaigns import EPILOG, How, campaign_options, ended, made
+from ntagen.cli.campaigns import EPILOG, FORMER, How, campaign_options, ended, made
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.steering import known_option, settings_options
 from ntagen.cli.terminal import echo
-from ntagen.errors import InputError
 from ntagen.parameters import SEED
 
 if TYPE_CHECKING:
@@ -19,7 +18,14 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    "sweep", cls=Renamed, former={"--timeout": "write --set 'time limit {}'"}, epilog=EPILOG
+    "sweep",
+    cls=Renamed,
+    former={
+        **FORMER,
+        "--timeout": "write --set 'time limit {}'",
+        "--figure": "the folder has sweep.png and sweep.svg",
+    },
+    epilog=EPILOG,
 )
 @click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
 @click.option(
@@ -59,12 +65,6 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     help="The folder for all results.  [default: the names of the task and the setting]",
 )
-@click.option(
-    "--figure",
-    metavar="FILE.png|pdf|svg",
-    type=click.Path(path_type=Path),
-    help="The file of the picture.  [default: sweep.png in the folder]",
-)
 @campaign_options
 @settings_options(without=(SEED,))
 def command(
@@ -75,7 +75,6 @@ def command(
     needle: str,
     known: str,
     folder: Path | None,
-    figure: Path | None,
     how: How,
     given: tuple[Given, ...],
 ) -> int:
@@ -103,7 +102,6 @@ def command(
 
     docs/experiments.md says how to read the picture, and how to sweep several tasks at once.
     """  # noqa: D301  click wants the control character
-    from ntagen.checker.picture.page import kind_of
     from ntagen.experiment.one_sweep import quantity_of, sweep_of_task
     from ntagen.experiment.pictures import sensitivity
     from ntagen.nsl import load_task
@@ -122,11 +120,9 @@ def command(
         settings={one.parameter.words: one.parameter.written(one.value) for one in given},
     )
     folder = folder or Path(f"{environment.stem}-{parameter.words.replace(' ', '-')}")
-    figure = figure or folder / "sweep.png"
-    kind_of(figure)
-    if not figure.parent.is_dir() and figure.parent != folder:
-        raise InputError(f"there is no folder {figure.parent}\nhint: choose another --figure")
     campaign = made(experiment, folder, how)
     (sweep,) = campaign.document["sweeps"]
-    save(sensitivity(campaign.document, sweep), figure)
-    return ended(campaign, folder, figure)
+    figures = [folder / "sweep.png", folder / "sweep.svg"]
+    for figure in figures:
+        save(sensitivity(campaign.document, sweep), figure)
+    return ended(campaign, folder, *figures)

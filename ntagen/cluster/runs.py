@@ -47,7 +47,7 @@ _LOOK_S: Final = 0.1
 _MODELS_KEPT: Final = 4
 """So many models are kept by each thread of a worker."""
 
-_ADVICE: Final = "start the cluster again, or ask without --dask"
+_ADVICE: Final = "start the cluster again, or ask without it"
 
 
 @dataclass(frozen=True, slots=True)

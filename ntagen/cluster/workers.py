@@ -114,6 +114,6 @@ def distributed() -> Any:  # noqa: ANN401  an optional package
         return importlib.import_module("distributed")
     except ImportError as error:
         raise InputError(
-            "--dask needs the packages dask and distributed, which are not installed\n"
+            "a cluster needs the packages dask and distributed, which are not installed\n"
             "hint: pip install 'ntagen[cluster]'"
         ) from error

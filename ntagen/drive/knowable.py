@@ -38,7 +38,7 @@ def require_knowable(settings: Settings, scene: Scene) -> None:
         f"deviation); it would be in there with a confidence of {confidence:.3f}, and "
         f"{settings.accept:g} is asked for\n"
         f"hint: a target that is {math.ceil(100.0 * needed_mm) / 100.0:g} mm deep would do, "
-        f"a tracker with less noise, or --accept {math.floor(100.0 * confidence) / 100.0:g}"
+        f"a tracker with less noise, or --set 'accept {math.floor(100.0 * confidence) / 100.0:g}'"
     )
 
 

@@ -43,7 +43,7 @@ class Lack:
         if self.confidence is not None:
             return Event.NONE_HOLDS, (
                 f"no plan is sure enough to stay clear of critical regions: the confidence of the "
-                f"best one is {self.confidence:.3f}; --accept says which one is enough"
+                f"best one is {self.confidence:.3f}; --set 'accept …' says which one is enough"
             )
         if self.found:
             return Event.NONE_HOLDS, "no plan of the model holds in exact kinematics"

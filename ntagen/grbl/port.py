@@ -57,20 +57,20 @@ class SerialPort:
 
     Args:
         name: The device, for example ``/dev/ttyACM0``, or an address that pyserial understands,
-            for example ``socket://host:23``.
-        baud_rate: Its speed.
+            for example ``socket://host:23``. ``,baud=9600`` behind it says how fast it is, if not
+            as fast as `BAUD_RATE`.
 
     Raises:
         DeviceError: It cannot be opened.
     """
 
-    def __init__(self, name: str, baud_rate: int = BAUD_RATE) -> None:
-        self._name = name
+    def __init__(self, name: str) -> None:
+        self._name, _, baud_rate = name.partition(",baud=")
         self._opened_s = time.monotonic()
         try:
             self._serial = serial.serial_for_url(
-                name,
-                baudrate=baud_rate,
+                self._name,
+                baudrate=int(baud_rate or BAUD_RATE),
                 timeout=0,
                 write_timeout=_WRITE_TIMEOUT_S,
                 exclusive=True,

@@ -232,7 +232,8 @@ class _Matcher:
         if np.sum(first) < 3:
             raise InputError(
                 f"{trace.samples.name}: there are fewer than 3 points on the first "
-                f"{self._options.first_mm:g} mm\nhint: give a greater length for --first"
+                f"{self._options.first_mm:g} mm\nhint: give a greater length, "
+                f"as in --start {self._options.start}:40mm"
             )
         prior = CurvaturePrior(self._expected_per_mm, CURVATURE_STD_RATIO * self._expected_per_mm)
         circle = fit_circle(trace.points_mm[first], ERROR_MM, prior)

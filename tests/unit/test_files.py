@@ -389,7 +389,6 @@ WRITERS = [
     ["drive", PAPER, "--quiet", "--log", "{}"],
     ["fmt", "{}.nsl"],
     ["compile", "{}.nsl", "-o", "."],
-    ["info", "game.xta", "--svg", "."],
 ]
 """Every command that writes a file."""
 
@@ -401,7 +400,7 @@ def test_every_command_keeps_modes_and_links_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     Path("game.xta").write_text(GAME)
     Path("real").mkdir()
-    made = {"compile": ["file.xml", "file.q"], "info": ["P.svg"]}.get(arguments[0], ["file"])
+    made = {"compile": ["file.xml", "file.q"]}.get(arguments[0], ["file"])
     made = {"{}.png": ["file.png"], "{}.c": ["file.c"]}.get(arguments[-1], made)
     if "{}.nsl" in arguments:
         Path("file.nsl").write_text(Path(PAPER).read_text().replace("  ", "   "))

@@ -71,7 +71,7 @@ def test_without_a_file_the_strategy_is_found_first(
 ) -> None:
     assert main(["drive", str(folder / "task.nsl"), "--tissue", "worst", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["guarantee"]["held"] is True
-    assert main(["drive", str(folder / "task.nsl"), "--by", "plans", "--json"]) == 0
+    assert main(["drive", str(folder / "task.nsl"), "--strategy", "none", "--json"]) == 0
     kept = json.loads(capsys.readouterr().out)["guarantee"]
     assert (kept["by"], kept["held"], kept["branches"]) == ("plans", False, None)
 
@@ -129,8 +129,8 @@ def test_options_that_contradict_each_other_are_refused(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     task = str(folder / "task.nsl")
-    check_refused(capsys, "no guarantee", task, "--by", "plans", "--only-guaranteed")
-    check_refused(capsys, "nothing is the worst", task, "--by", "plans", "--tissue", "worst")
+    check_refused(capsys, "no guarantee", task, "--strategy", "none", "--only-guaranteed")
+    check_refused(capsys, "nothing is the worst", task, "--strategy", "none", "--tissue", "worst")
     other = folder / "other.nsl"
     other.write_text(TASK.replace("radius 7 mm", "radius 7.5 mm"))
     tree = str(folder / "tree.json")

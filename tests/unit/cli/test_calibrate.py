@@ -43,7 +43,7 @@ def test_a_table_is_printed_and_a_file_is_written(
 ) -> None:
     output = tmp_path / "r.json"
     scene = str(ROOT / "examples" / "paper.nsl")
-    assert main(["calibrate", str(both), "--scene", scene, "--at", "1,2,3", "-o", str(output)]) == 0
+    assert main(["calibrate", str(both), "--at", scene, "--at", "1,2,3", "-o", str(output)]) == 0
     said = capsys.readouterr()
     assert said.err == ""
     lines = said.out.splitlines()
@@ -114,7 +114,7 @@ def test_doubtful_sets_are_warned_about(
         (["--to", "LPS"], "nothing says how LPS lies in it"),
         (["--at", "1,2"], "'1,2' is not a position"),
         (["--at", "1,2,nan"], "'1,2,nan' is not a position"),
-        (["--scene", "none.nsl"], "none.nsl"),
+        (["--at", "none.nsl"], "none.nsl"),
     ],
 )
 def test_wrong_options_are_refused(
@@ -128,7 +128,7 @@ def test_wrong_options_are_refused(
 
 def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     examples = ROOT / "examples"
-    arguments = [str(examples / "calibration.csv"), "--scene", str(examples / "paper.nsl")]
+    arguments = [str(examples / "calibration.csv"), "--at", str(examples / "paper.nsl")]
     assert main(["calibrate", *arguments, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["warnings"] == []

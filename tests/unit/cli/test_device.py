@@ -54,7 +54,7 @@ def test_a_device_moves_only_when_that_is_agreed(capsys: pytest.CaptureFixture[s
         assert emulator.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
         # The standard input of tests is empty, which is no agreement.
         assert main(["device", "check", device, "--move", "1"]) != 0
-        assert main(["device", "check", device, "--move", "1", "--axis", "A", "--yes"]) == 5
+        assert main(["device", "check", device, "--move", "A:1", "--yes"]) == 5
     assert "no axis A" in capsys.readouterr().err
 
 

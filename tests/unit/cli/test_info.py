@@ -87,9 +87,11 @@ def test_environments_are_models_too(capsys: pytest.CaptureFixture[str]) -> None
 def test_pictures_are_written(
     capsys: pytest.CaptureFixture[str], worker: Path, tmp_path: Path
 ) -> None:
-    out, _ = info_run(capsys, 0, worker, "--svg", tmp_path / "pictures")
-    assert "1 picture written to" in out
-    assert ET.parse(tmp_path / "pictures" / "Worker.svg").getroot().tag.endswith("svg")
+    picture = tmp_path / "Worker.svg"
+    assert main(["plot", str(worker), "--as", "templates", "-o", str(picture)]) == 0
+    assert ET.parse(picture).getroot().tag.endswith("svg")
+    assert main(["info", str(worker), "--svg", str(tmp_path)]) == 2
+    assert "`ntagen plot MODEL --as templates`" in capsys.readouterr().err
 
 
 def test_long_tables_are_cut(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

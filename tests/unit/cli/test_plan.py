@@ -84,15 +84,15 @@ def test_plans_are_ranked_by_probability(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "plans.json"
-    arguments = ["--within", "1min", "--runs", "300", "--best", "2", "--among", "3"]
+    arguments = ["--within", "1min", "--runs", "300", "--best", "3"]
     assert cli.main(["plan", CHANCE, "--rank", "probability", *arguments, "-o", str(path)]) == 0
     out = capsys.readouterr().out
     assert "compared: the 3 best plans by reserve" in out
     assert "300 random runs of each of 3 plans" in out
-    assert out.count("reaches the target") == 2
+    assert out.count("reaches the target") == 3
     plans = json.loads(path.read_text("utf-8"))["plans"]
     values = [plan["chance"]["reach"]["value"] for plan in plans]
-    assert len(values) == 2
+    assert len(values) == 3
     assert values == sorted(values, reverse=True)
     best = plans[0]["chance"]
     assert best["is_apart"] is False

@@ -173,10 +173,9 @@ def test_options_without_an_effect_are_named(
     assert main(["play", str(machine), "--strategy", strategy, "--auto", "2", "--seed", "3"]) == 0
     assert capsys.readouterr().err == ""
     player.silence()
-    assert main(["play", str(machine), "--strategy", strategy, "--seed", "3", "--states", "9"]) == 0
+    assert main(["play", str(machine), "--strategy", strategy, "--seed", "3"]) == 0
     err = capsys.readouterr().err
     assert "note: --seed has no effect without --auto\n" in err
-    assert "note: --states has no effect with --strategy: there is no search\n" in err
 
 
 def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Player) -> None:
@@ -195,14 +194,19 @@ def test_wrong_strategy_is_defeated(machine: Path, tmp_path: Path, player: Playe
     assert "The strategy has no next move: it has no decision here." in out
 
 
-def test_synthesis_has_limits(tmp_path: Path, player: Player) -> None:
+def test_a_search_with_limits_is_a_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     model = tmp_path / "counter.xta"
     model.write_text(
         "int n; process P() { state L; init L;"
         "trans L -> L { guard n < 30000; assign n++; }, L -> L { guard n > 0; assign n--; }; }"
         "system P;"
     )
-    player(model, "--query", "control: A<> n == 30000", "--states", "100", code=3)
+    words = [str(model), "--query", "control: A<> n == 30000", "--states", "100"]
+    assert main(["check", *words, "--strategy", str(tmp_path / "s.json")]) == 3
+    assert main(["play", *words]) == 2
+    assert "no such option: --states; `ntagen check --strategy" in capsys.readouterr().err
 
 
 def test_game_is_found_by_name_or_alone(tmp_path: Path, player: Player) -> None:

@@ -101,7 +101,7 @@ def test_json_is_that_of_one_machine(
         words += ["--query", query]
     code = main(words)
     here = lines(capsys.readouterr().out)
-    assert main([*words, "--dask", cluster.scheduler_address]) == code
+    assert main([*words, "--set", f"dask {cluster.scheduler_address}"]) == code
     assert lines(capsys.readouterr().out) == here
     assert len(here) == 5
     assert here[0]["runs"] > 20_000
@@ -124,7 +124,7 @@ def test_runs_under_a_strategy_are_those_of_one_machine(
         words += ["--query", query]
     assert main(words) == 0
     here = lines(capsys.readouterr().out)
-    assert main([*words, "--dask", cluster.scheduler_address]) == 0
+    assert main([*words, "--set", f"dask {cluster.scheduler_address}"]) == 0
     said = capsys.readouterr()
     assert "by this machine" not in said.err
     assert lines(said.out) == here
@@ -186,7 +186,7 @@ def test_what_is_made_here_is_said(
 ) -> None:
     path = tmp_path / "model.xta"
     path.write_text(MODEL, "utf-8")
-    words = ["check", str(path), "--dask", cluster.scheduler_address]
+    words = ["check", str(path), "--set", f"dask {cluster.scheduler_address}"]
     words += ["--query", "simulate[<=3]{n}", "--query", REACHED, "--query", "E<> Q.B"]
     assert main(words) == 0
     said = capsys.readouterr().err
@@ -194,10 +194,8 @@ def test_what_is_made_here_is_said(
         "note: simulate[<=3]{n}: runs are made by this machine: only the runs of Pr and E are made "
         "by a cluster"
     ]
-    assert (
-        main(["check", str(path), "--query", REACHED, "--dask", "tcp://x:1", "--set", "joint on"])
-        == 0
-    )
+    words = ["check", str(path), "--query", REACHED, "--set", "dask tcp://x:1"]
+    assert main([*words, "--set", "joint on"]) == 0
     assert "queries that are answered jointly share their runs" in capsys.readouterr().err
 
 
@@ -209,8 +207,8 @@ def test_workers_are_waited_for(tmp_path: Path, capsys: pytest.CaptureFixture[st
     path.write_text(MODEL, "utf-8")
     with distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address=None) as empty:
         address = empty.scheduler_address
-        words = ["check", str(path), "--query", REACHED, "--dask", address, "--timeout", "500ms"]
-        assert main(words) == 3
+        words = ["check", str(path), "--query", REACHED, "--set", f"dask {address}"]
+        assert main([*words, "--timeout", "500ms"]) == 3
     said = capsys.readouterr()
     assert (
         said.err == f"note: the Dask cluster at {address} has no workers yet, and is waited for\n"
@@ -223,8 +221,11 @@ def test_without_statistical_queries_it_has_no_effect(
 ) -> None:
     path = tmp_path / "model.xta"
     path.write_text(MODEL, "utf-8")
-    assert main(["check", str(path), "--query", "E<> Q.B", "--dask", "tcp://x:1"]) == 0
-    assert "--dask has no effect here: no query is a statistical one" in capsys.readouterr().err
+    assert main(["check", str(path), "--query", "E<> Q.B", "--set", "dask tcp://x:1"]) == 0
+    assert (
+        "--set 'dask …' has no effect here: no query is a statistical one"
+        in capsys.readouterr().err
+    )
 
 
 def test_without_dask_there_is_a_hint(
@@ -233,7 +234,7 @@ def test_without_dask_there_is_a_hint(
     monkeypatch.setitem(sys.modules, "distributed", None)
     path = tmp_path / "model.xta"
     path.write_text(MODEL, "utf-8")
-    assert main(["check", str(path), "--query", REACHED, "--dask", "tcp://127.0.0.1:9"]) == 2
+    assert main(["check", str(path), "--query", REACHED, "--set", "dask tcp://127.0.0.1:9"]) == 2
     assert "hint: pip install 'ntagen[cluster]'" in capsys.readouterr().err
 
 

@@ -33,7 +33,8 @@ def test_what_would_do_does() -> None:
         configured(to_a_target(0.5), noise="2mm")
     found = re.search(
         r"'T' is too small .* 0\.5 mm deep.* known to ([\d.]+) mm at best.*confidence of ([\d.]+), "
-        r"and 0\.98 is asked for\nhint: a target that is ([\d.]+) mm deep .* --accept ([\d.]+)\n"
+        r"and 0\.98 is asked for\nhint: a target that is ([\d.]+) mm deep .* "
+        r"--set 'accept ([\d.]+)'\n"
         r"note: `noise`: noise$",
         str(caught.value),
         re.DOTALL,
@@ -75,7 +76,7 @@ def test_a_confidence_that_is_none_is_refused(
 ) -> None:
     path = tmp_path / "task.nsl"
     path.write_text(Task(to_a_target(5.0)).to_nsl())
-    assert main(["drive", str(path), "--needle", "phantom", "--accept", accept]) == 2
+    assert main(["drive", str(path), "--needle", "phantom", "--set", f"accept {accept}"]) == 2
     said = capsys.readouterr().err
     assert "greater than 0 and less than 1" in said or "write for example `accept 0.98`" in said
     path.write_text(path.read_text().rstrip().removesuffix("}") + f"drive {{ accept {accept} }} }}")
