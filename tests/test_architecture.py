@@ -385,3 +385,15 @@ def test_commands_print_by_the_terminal_module_only() -> None:
                 ):
                     wrong.append(f"{path.relative_to(PACKAGE)}:{node.lineno}: console.print")
     assert wrong == []
+
+
+def test_the_commands_on_models_know_no_needle() -> None:
+    """What one of them says of a task, it imports when it has one."""
+    folder = PACKAGE / "cli" / "models"
+    rooms = tuple(f"ntagen.{room}" for room in ("cli.needle", *NEEDLE))
+    wrong = []
+    for path in sorted(folder.glob("*.py")):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith(rooms):
+                wrong.append(f"{path.name}: {node.module}")
+    assert wrong == []

@@ -2,7 +2,7 @@
 
 `Model.check` takes them as keywords, `Model.answer` as one value. To add an option, add a field
 here, a field to ``Options`` in ``checker/src/engine/options.rs``, and a row to
-``checker/src/python/options.rs``; for the command line, a row to ``ntagen/cli/options.py``.
+``checker/src/python/options.rs``; for the command line, a row to ``ntagen/cli/models/options.py``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 """The command line: one module a command, and the only place that prints or exits.
 
-A command is ``ntagen/cli/NAME.py`` with a click command called ``command``. Its module is imported
-only when the command runs, so that ``ntagen --help`` does not wait for libraries. A command returns
-its exit code (nothing means 0). If it raises an error, this module prints one message.
+Commands on models are in ``models``, which knows no needle, those on tasks and needles in
+``needle``; what both use, and the commands for both, are here. The module of a command has a click
+command called ``command``. It is imported only when the command runs, so that ``ntagen --help``
+does not wait for libraries. A command returns its exit code (nothing means 0). If it raises an
+error, this module prints one message.
 
 Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
 evidence does not hold), 2 the input or the command line is wrong, 3 stopped by a limit, 4 run-time
@@ -15,7 +17,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib
-import importlib.util
 import io
 import os
 import re
@@ -34,27 +35,33 @@ from ntagen.version import VERSION
 __all__ = ["main", "verifyta"]
 
 COMMANDS: Final = {
-    "compile": "Turn an environment into a UPPAAL model and its queries.",
-    "check": "Answer the queries of a model or an environment.",
-    "plan": "Find the best plans of a task within a budget of time.",
-    "verify": "Check a trace, certificate or strategy independently.",
-    "play": "Play a timed game against a strategy.",
-    "info": "Show what is in a model or an environment.",
-    "explain": "Explain a diagnostic: what it means and how to fix it.",
-    "plot": "Draw a scene, its plans, a run or a model.",
-    "serve": "Show models, tasks and runs on a page in the browser.",
-    "drive": "Steer a needle to the target and log the run.",
-    "experiment": "Drive many simulated runs, and make a table of them.",
-    "sweep": "Show how much of an error a task stands.",
-    "calibrate": "Find where the scene lies for a tracker, from pairs of points.",
-    "device": "Try a device before it drives a needle.",
-    "match": "Find the actions that explain measured traces of the tip.",
-    "replay": "Repeat the decisions of a logged run and compare them.",
-    "verifyta": "Stand in for UPPAAL's verifyta: its options, output and files.",
-    "fmt": "Format environment files.",
-    "lsp": "Answer an editor about environment files.",
+    "compile": ("needle.compile", "Turn an environment into a UPPAAL model and its queries."),
+    "check": ("models.check", "Answer the queries of a model or an environment."),
+    "plan": ("needle.plan", "Find the best plans of a task within a budget of time."),
+    "verify": ("models.verify", "Check a trace, certificate or strategy independently."),
+    "play": ("models.play", "Play a timed game against a strategy."),
+    "info": ("models.info", "Show what is in a model or an environment."),
+    "explain": ("explain", "Explain a diagnostic: what it means and how to fix it."),
+    "plot": ("plot", "Draw a scene, its plans, a run or a model."),
+    "serve": ("serve", "Show models, tasks and runs on a page in the browser."),
+    "drive": ("needle.drive", "Steer a needle to the target and log the run."),
+    "experiment": ("needle.experiment", "Drive many simulated runs, and make a table of them."),
+    "sweep": ("needle.sweep", "Show how much of an error a task stands."),
+    "calibrate": (
+        "needle.calibrate",
+        "Find where the scene lies for a tracker, from pairs of points.",
+    ),
+    "device": ("needle.device", "Try a device before it drives a needle."),
+    "match": ("needle.match", "Find the actions that explain measured traces of the tip."),
+    "replay": ("needle.replay", "Repeat the decisions of a logged run and compare them."),
+    "verifyta": (
+        "models.verifyta",
+        "Stand in for UPPAAL's verifyta: its options, output and files.",
+    ),
+    "fmt": ("needle.fmt", "Format environment files."),
+    "lsp": ("needle.lsp", "Answer an editor about environment files."),
 }
-"""The commands in the order of the help, each with its line there."""
+"""The commands in the order of the help, each with its module below here and its line there."""
 
 INTERNAL_ERROR: Final = 70
 PIPE_CLOSED: Final = 141
@@ -77,23 +84,19 @@ class _CommandTable(click.Group):
     """The commands of `COMMANDS`. Each is imported when it is used."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return [name for name in COMMANDS if importlib.util.find_spec(_module(name))]
+        return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        # Only this one is looked for: looking for all takes milliseconds.
-        if cmd_name not in COMMANDS or not importlib.util.find_spec(_module(cmd_name)):
+        if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(_module(cmd_name)).command
+        command: click.Command = importlib.import_module(
+            f"{__name__}.{COMMANDS[cmd_name][0]}"
+        ).command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name]) for name in self.list_commands(ctx)])
-
-
-def _module(command: str) -> str:
-    """The module of a command."""
-    return f"ntagen.cli.{command}"
+            formatter.write_dl([(name, line) for name, (_, line) in COMMANDS.items()])
 
 
 def _show_version(ctx: click.Context, _option: click.Parameter, wanted: bool) -> None:

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.effects import say_idle
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.limits import limits
-from ntagen.cli.models import include_option
-from ntagen.cli.plot_models import (
+from ntagen.cli.loading import include_option
+from ntagen.cli.models.plot_models import (
     KINDS,
     MODELS,
     MOST_DRAWN,
@@ -24,8 +23,9 @@ from ntagen.cli.plot_models import (
     Wish,
     plot_model,
 )
-from ntagen.cli.plot_runs import NAMES
-from ntagen.cli.plot_runs import SETTINGS as OF_RUNS
+from ntagen.cli.models.plot_runs import NAMES
+from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
+from ntagen.cli.notes import say_idle
 from ntagen.cli.settings import Setting, settings_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
@@ -274,7 +274,7 @@ def _of_strategy(
     scene: Scene, configuration: Configuration, tree_path: Path | None
 ) -> Picture | None:
     """The picture of the strategy against the tissue; None, and the reason, if there is none."""
-    from ntagen.cli.course import Wanted, course_of
+    from ntagen.cli.needle.answering_tissue import Wanted, course_of
     from ntagen.plot.strategy import picture_of_strategy
 
     course = course_of(Wanted(tree_path=tree_path), scene, configuration, lambda: None)

@@ -20,7 +20,8 @@ import time
 from pathlib import Path
 
 from ntagen import checker
-from ntagen.cli.plan_lists import ListLimits, write_lines
+from ntagen.cli.models.plan_lists import ListLimits
+from ntagen.cli.needle.task_questions import write_certified
 from ntagen.nsl import load_task
 from ntagen.plan.certify import certify
 from ntagen.plan.extract import pages_of
@@ -67,7 +68,7 @@ def main() -> None:
         answer = model.check(STRATEGY_QUERY, plans="all", max_plans=1 << 62, guide=GUIDE)
         engine_s, engine_mb = time.perf_counter() - start, peak_mb()
         file = Path(folder) / "plans.jsonl"
-        written = write_lines(answer, file, ListLimits(), task)
+        written = write_certified(answer, file, ListLimits(), task)
         whole_s, whole_mb, file_bytes = time.perf_counter() - start, peak_mb(), file.stat().st_size
     count = answer.plan_count or 0
     print("\n".join(written.notes[1:]))

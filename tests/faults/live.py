@@ -138,7 +138,7 @@ class Bench:
         """The settings that fit the needle, as after a calibration."""
         if self._needle == "virtual":
             return ["--set", "force noise 0 N"]
-        from ntagen.cli.lab import _fitting
+        from ntagen.cli.needle.lab import _fitting
         from ntagen.drive.configure import configure
         from ntagen.nsl import load_task
 

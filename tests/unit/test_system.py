@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ntagen import system
-from ntagen.cli.operator import signalled_operator
+from ntagen.cli.needle.operator import signalled_operator
 from ntagen.errors import InputError
 from ntagen.files import GrowingFile, open_file
 from ntagen.grbl.port import SerialPort

@@ -12,10 +12,11 @@ import pytest
 
 from ntagen import checker, system
 from ntagen.cli import main
-from ntagen.cli.asked import Asked
-from ntagen.cli.evidence import Outputs, backed
 from ntagen.cli.guard import Guard, resident_bytes
-from ntagen.cli.outcomes import Outcome
+from ntagen.cli.models.evidence import Outputs, backed
+from ntagen.cli.models.outcomes import Outcome
+from ntagen.cli.models.queries import Asked
+from ntagen.cli.models.questions import Questions
 from ntagen.cli.signals import Ending, Limit, LimitReached, Terminated, handled
 from ntagen.errors import LimitError
 from ntagen.files import GrowingFile, abandon, write_files
@@ -50,8 +51,9 @@ def stop_in(monkeypatch: pytest.MonkeyPatch) -> Stop:
                 raise LimitReached(limit, f"{now} was stopped by the {limit} limit")
             yield
 
-        for module in ("check", "evidence", "info", "plot", "plot_models", "verify"):
-            monkeypatch.setattr(f"ntagen.cli.{module}.doing", doing)
+        for module in ("check", "evidence", "info", "plot_models", "verify"):
+            monkeypatch.setattr(f"ntagen.cli.models.{module}.doing", doing)
+        monkeypatch.setattr("ntagen.cli.plot.doing", doing)
 
     return stop
 
@@ -185,11 +187,11 @@ def test_what_the_engine_did_not_come_to_is_no_success(model: str) -> None:
     loaded = load_file(Path(model))
     answer = loaded.model.check(WIN)
     assert answer.stopped == ()
-    nothing = Outputs(None, None, None, None, None, ())
+    nothing = Outputs(None, None, None, None, ())
     outcome = Outcome(Asked(None, WIN, None), answer)
-    assert backed(outcome, nothing, loaded, verify=True).code == 0
+    assert backed(outcome, nothing, Questions(loaded.model), verify=True).code == 0
     answer.stopped = (("check", "time"),)
-    stopped = backed(outcome, nothing, loaded, verify=True)
+    stopped = backed(outcome, nothing, Questions(loaded.model), verify=True)
     assert (stopped.code, stopped.stop) == (3, "time")
 
 

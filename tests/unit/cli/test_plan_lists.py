@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from ntagen import checker
-from ntagen.cli import plan_lists
-from ntagen.cli.plan_lists import ListLimits, write_lines
+from ntagen.cli.models import plan_lists
+from ntagen.cli.models.plan_lists import ListLimits, write_lines
 from tests.unit.cli.test_check import PAPER, check_run
 
 GRID = """
@@ -143,6 +143,6 @@ def test_an_interruption_leaves_whole_lines(
                 yield line
 
     with pytest.raises(KeyboardInterrupt):
-        write_lines(Interrupted(), path, ListLimits(), None)  # type: ignore[arg-type]
+        write_lines(Interrupted(), path, ListLimits())  # type: ignore[arg-type]
     assert len([json.loads(line) for line in path.read_text().splitlines()]) == 8
     assert "interrupted after 8 plans" in capsys.readouterr().err

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from ntagen import nsl
-from ntagen.cli.fmt import command
+from ntagen.cli.needle.fmt import command
 from ntagen.errors import InputError
 
 SMALLEST = """environment e {

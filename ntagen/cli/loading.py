@@ -1,0 +1,151 @@
+"""Shared by the commands on models: loading with warnings, and pointing to `ntagen explain`."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from ntagen.cli.notes import say_idle
+from ntagen.cli.rules import Decorator
+from ntagen.cli.terminal import echo, echo_message
+from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.checker import OverflowRule
+    from ntagen.loading import Loaded
+
+WARNINGS_SHOWN: Final = 10
+"""At most this many warnings are printed: a model may have the same one in many templates."""
+
+
+def include_option() -> Decorator:
+    """The option ``--include``."""
+    return click.option(
+        "--include",
+        metavar="DIR",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        help="Allow an environment to include files below this folder too, not only below its own. "
+        "You can give this option several times.",
+    )
+
+
+def external_option() -> Decorator:
+    """The option ``--allow-external``."""
+    return click.option(
+        "--allow-external",
+        metavar="PATH",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        help="Allow a UPPAAL model to import this library, or those of this folder, in statistical "
+        "queries. Their code runs with your rights, so allow only what you trust. You can give "
+        "this option several times.",
+    )
+
+
+def constant_option() -> Decorator:
+    """The option ``--constant``: pairs of a name and a value."""
+
+    def pairs(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
+        values = {}
+        for one in given:
+            name, sign, value = one.partition("=")
+            if not (name.strip() and sign and value.strip()):
+                raise click.BadParameter(f"{one!r} is not NAME=VALUE, such as N=4")
+            values[name.strip()] = value.strip()
+        return values
+
+    return click.option(
+        "--constant",
+        "constants",
+        metavar="NAME=VALUE",
+        multiple=True,
+        callback=pairs,
+        help="Give a constant of the model another value, such as N=4; that of a template is "
+        "TEMPLATE.NAME=VALUE. You can give this option several times.",
+    )
+
+
+def load_model(
+    path: Path,
+    include: Sequence[Path],
+    overflow: OverflowRule = "wrap",
+    constants: Mapping[str, str] | None = None,
+    allow_external: Sequence[Path] = (),
+) -> Loaded:
+    """Loads the model of a file. Prints warnings to standard error.
+
+    Args:
+        path: The file.
+        include: The folders below which an environment may include files, besides its own.
+        overflow: What happens if a result of integer arithmetic does not fit into 32 bits.
+        constants: Other values for constants of the model.
+        allow_external: The libraries that the model may import, or their folders.
+
+    Raises:
+        InputError: The file or a value is wrong.
+        OSError: The file cannot be read.
+    """
+    from ntagen.loading import load_file
+
+    loaded = load_file(path, include=include, allow_external=allow_external)
+    if loaded.task is None:
+        say_idle({"include": "--include"}, "here: only environments (.nsl) include files")
+    else:
+        say_idle({"allow_external": "--allow-external"}, "here: environments import no libraries")
+    if constants:
+        if loaded.task is not None:
+            raise InputError(
+                "--constant is for UPPAAL models, and an environment has none\n"
+                "hint: change the values in the environment itself"
+            )
+        loaded = replace(loaded, model=loaded.model.with_constants(constants))
+    loaded.model.overflow = overflow
+    found = loaded.model.warnings
+    if loaded.task is not None:
+        # The true tip in a tissue with chance is meant to be known to random runs only.
+        found = tuple(warning for warning in found if _LEFT_OUT not in warning)
+    show_warnings((*loaded.warnings, *found))
+    return loaded
+
+
+_LEFT_OUT: Final = "warning[W0213]"
+"""The warning that a double is left out of symbolic queries."""
+
+
+def show_warnings(warnings: Sequence[str]) -> None:
+    """Prints warnings to standard error."""
+    for warning in warnings[:WARNINGS_SHOWN]:
+        echo_message(warning.rstrip())
+    if len(warnings) > WARNINGS_SHOWN:
+        rest = len(warnings) - WARNINGS_SHOWN
+        echo(f"… and {rest} more warning{'s' * (rest > 1)}", err=True)
+
+
+@contextlib.contextmanager
+def pointing_to_explanations(wanted: bool) -> Iterator[None]:
+    """Adds to a rejection the command that explains its first diagnostic, if `wanted`."""
+    try:
+        yield
+    except InputError as error:
+        if not wanted:
+            raise
+        raise InputError(with_pointer(str(error))) from error
+
+
+def with_pointer(rejection: str) -> str:
+    """A rejection with the command that explains its first diagnostic, if it has one."""
+    pointer = pointer_to_page(rejection)
+    return f"{rejection}\n{pointer}" if pointer else rejection
+
+
+def pointer_to_page(rejection: str) -> str:
+    """The command that explains the first diagnostic of a text; empty if it has none."""
+    code = re.search(r"\berror\[([A-Z]\d+)\]", rejection)
+    return f"for an example and how to fix it: ntagen explain {code[1]}" if code else ""

@@ -1,0 +1,64 @@
+"""`ntagen check --set "dask ADDRESS"`: random runs that the workers of a Dask cluster make."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ntagen.cli.models.queries import Asked
+from ntagen.cli.notes import say
+
+if TYPE_CHECKING:
+    from ntagen.checker import Model, Options
+    from ntagen.cluster.runs import DaskRuns
+
+
+class Spreading:
+    """Spreads the runs of queries over a cluster, or makes all of them here.
+
+    Args:
+        address: The address of the scheduler; None without a cluster.
+        queries: The queries that will be asked.
+        options: How they will be asked.
+        why_not: Why no runs can be made elsewhere, whatever the query; empty if they can.
+
+    Raises:
+        InputError: The cluster cannot be used.
+    """
+
+    def __init__(
+        self, address: str | None, queries: Sequence[Asked], options: Options, why_not: str
+    ) -> None:
+        self._reasons: dict[str, str | None] = {}
+        self._cluster: DaskRuns | None = None
+        if address is None:
+            return
+        from ntagen.cluster.runs import DaskRuns, why_here
+
+        for query in queries:
+            if query.form is not None and query.form.is_statistical:
+                self._reasons[query.text] = why_not or why_here(query.text, options)
+        say(
+            [
+                f"{text}: runs are made by this machine: {reason}"
+                for text, reason in self._reasons.items()
+                if reason is not None
+            ]
+        )
+        if None in self._reasons.values():
+            self._cluster = DaskRuns(address)
+            click.get_current_context().call_on_close(self._cluster.close)
+            if not self._cluster.has_workers:
+                say([f"the Dask cluster at {address} has no workers yet, and is waited for"])
+
+    @contextlib.contextmanager
+    def source(self, model: Model, query: Asked, options: Options) -> Iterator[dict[str, Any]]:
+        """Gives the options of `ntagen.checker.Options` by which runs come from the cluster."""
+        if self._cluster is None or self._reasons.get(query.text, "other") is not None:
+            yield {}
+            return
+        with self._cluster.runs_of(model, query.text, options) as source:
+            yield {"run_source": source}

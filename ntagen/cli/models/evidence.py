@@ -1,0 +1,164 @@
+"""Writes the evidence for an answer: traces, certificates, strategies and plans."""
+
+from __future__ import annotations
+
+from dataclasses import field, replace
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ntagen.cli.guard import doing
+from ntagen.cli.models.outcomes import Outcome
+from ntagen.cli.models.plan_lists import ListLimits
+from ntagen.cli.models.queries import Asked
+from ntagen.cli.signals import LimitReached
+from ntagen.cli.terminal import echo
+from ntagen.files import write_files
+from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from ntagen.checker import Answer, Model
+    from ntagen.cli.models.questions import Questions
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where evidence is written; ``None`` is nowhere."""
+
+    trace: str | None
+    certificate: Path | None
+    strategy: str | None
+    plans: str | None
+    ranking: tuple[str, ...]
+    limits: ListLimits = field(default_factory=ListLimits)
+    written: set[str] = field(default_factory=set)
+    """The options whose output has been written."""
+    stops: dict[str, str] = field(default_factory=dict)
+    """By query: ``time`` or ``memory`` if that limit ended a list of plans."""
+
+    @property
+    def wants_strategy(self) -> bool:
+        """Whether a strategy is written in some form."""
+        return self.strategy is not None
+
+    def missing(self) -> list[str]:
+        """The options whose output was asked for and has not been written."""
+        wanted = self.wanted().items()
+        return [name for name, target in wanted if target and name not in self.written]
+
+    def wanted(self) -> dict[str, str | Path | None]:
+        """Where the output of each option is written."""
+        return {
+            "--trace": self.trace,
+            "--certificate": self.certificate,
+            "--strategy": self.strategy,
+            "--plans": self.plans,
+        }
+
+
+def backed(outcome: Outcome, outputs: Outputs, questions: Questions, *, verify: bool) -> Outcome:
+    """Writes the evidence of an answer; the outcome with notes about it, and the limit that came.
+
+    Args:
+        outcome: The answer to a query.
+        outputs: What is wanted, and where.
+        questions: How the model was asked.
+        verify: Whether the notes begin with what checks have covered.
+    """
+    answer, query = outcome.answer, outcome.query
+    if answer is None:
+        return outcome
+    notes = list(answer.verification if verify else ())
+    stop: str | None = answer.stopped[0][1] if answer.stopped else None
+    try:
+        _write_evidence(answer, query, outputs, questions, notes)
+    except LimitReached as reached:
+        notes.append(f"{reached}; not written: {', '.join(outputs.missing())}")
+        stop = reached.limit
+    stop = outputs.stops.get(query.text, stop)
+    return replace(outcome, notes=tuple(notes), stop=stop)
+
+
+def _write_evidence(
+    answer: Answer, query: Asked, outputs: Outputs, questions: Questions, notes: list[str]
+) -> None:
+    """Writes what was asked for, and adds a line for the user about each output to `notes`."""
+    if outputs.trace:
+        with doing("writing the trace"):
+            if (trace := answer.trace_json()) is not None:
+                notes += _write_trace(answer, query, outputs.trace, trace, questions.model)
+                outputs.written.add("--trace")
+    if outputs.certificate:
+        with doing("writing the certificate"):
+            if (states := answer.certificate_states) is not None:
+                write_files({outputs.certificate: answer.certificate_pieces()})
+                outputs.written.add("--certificate")
+                notes.append(f"certificate of {states} states written to {outputs.certificate}")
+    if outputs.strategy:
+        with doing("the strategy was found; writing it"):
+            if (pieces := _strategy_pieces(answer, query, outputs.strategy)) is not None:
+                notes += _write_strategy(answer, outputs.strategy, pieces)
+                outputs.written.add("--strategy")
+    if outputs.plans and answer.plan_count is not None:
+        with doing("writing the plans"):
+            written = questions.write_plans(answer, outputs.plans, outputs)
+            notes += written.notes
+            outputs.written.add("--plans")
+            if (stop := written.stop or answer.plans_stop) is not None:
+                outputs.stops[query.text] = stop
+
+
+def _write_trace(
+    answer: Answer, query: Asked, target: str, as_json: str, model: Model
+) -> list[str]:
+    if target == "-":
+        echo(f"{query.text} is {answer.verdict}:")
+        for line in answer.trace_lines():
+            echo(line)
+        return []
+    path = Path(target)
+    write_files({path: _trace_file(answer, query, path.suffix, as_json, model)})
+    return [f"trace written to {path}"]
+
+
+def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: Model) -> str:
+    """The trace in the form that the end of the file's name asks for."""
+    from ntagen.verifyta.trace_xml import trace_xml_text
+    from ntagen.verifyta.xtr import xtr_text
+
+    if suffix == ".json":
+        return f"{as_json}\n"
+    if suffix in (".xtr", ".xml"):
+        return (xtr_text if suffix == ".xtr" else trace_xml_text)(model, answer) or ""
+    text = "\n".join([f"{query.text} is {answer.verdict}", "", *answer.trace_lines()])
+    return f"{text}\n"
+
+
+def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str] | None:
+    """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
+    suffix = Path(target).suffix
+    if suffix == ".c":
+        controller = answer.controller_c()
+        return None if controller is None else [controller]
+    pieces = answer.strategy_pieces("json" if suffix == ".json" else "text")
+    if (first := next(pieces, None)) is None:
+        return None
+    if target == "-":
+        return chain([first], pieces)
+    if suffix == ".json":
+        return chain([first], pieces, ["\n"])
+    return chain([f"{query.text}\n\n", first], pieces)
+
+
+def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[str]:
+    if target == "-":
+        for piece in pieces:
+            echo(piece, nl=False)
+        return []
+    write_files({Path(target): pieces})
+    what = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
+    if Path(target).suffix == ".c":
+        what = "controller"
+    return [f"{what} written to {target}"]

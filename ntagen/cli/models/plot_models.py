@@ -1,0 +1,279 @@
+"""The pictures of `ntagen plot` that show models: traces, zones of strategies, state spaces."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from ntagen.checker.picture.page import kind_of
+from ntagen.cli.guard import current, doing
+from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.models.plot_runs import NAMES, plot_runs
+from ntagen.cli.models.queries import Asked, queries_of
+from ntagen.cli.models.run_progress import STATISTICAL
+from ntagen.cli.notes import say_idle
+from ntagen.cli.progress import shown_progress
+from ntagen.errors import InputError, LimitError, ModelError
+from ntagen.files import require_apart
+from ntagen.values import dataclass
+
+if TYPE_CHECKING:
+    from ntagen.checker import Model
+    from ntagen.checker.picture.page import Svg
+    from ntagen.checker.runs import Run
+    from ntagen.checker.strategy import Strategy
+
+MODELS: Final = (".xml", ".xta", ".ta")
+"""The endings of UPPAAL models."""
+
+KINDS: Final = {
+    "runs": "what the random runs of Pr, E or simulate say",
+    "gantt": "the trace of a query as a chart, where each process is when",
+    "sequence": "the trace, and what passes between the processes",
+    "zones": "what the strategy of a game does over two clocks, in one state",
+    "templates": "the templates, as UPPAAL's editor shows them",
+    "states": "the state space of a small model as a graph",
+    "discrete": "the same without clocks",
+}
+"""The pictures of a model, each with what it shows."""
+
+GRAPHS: Final = ("states", "discrete")
+"""Those that may be written for Graphviz, too."""
+
+OF_ZONES: Final = {"at": "--at", "clocks": "--set 'clocks …'"}
+OF_GRAPHS: Final = {"limit": "--set 'limit …'"}
+
+MOST_DRAWN: Final = 100
+"""If no number is given, the picture of a graph has at most this number of states."""
+
+MOST_SEARCHED: Final = 10_000
+"""If no greater number is given, at most this number of symbolic states is searched for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is to be drawn of a model."""
+
+    kind: str | None
+    """One of `KINDS`; ``None`` leaves it to the query."""
+
+    asked: str | None
+    """The text or name of a query."""
+
+    at: str | None
+    """The state of zones, where it differs from the initial one."""
+
+    settings: dict[str, Any]
+    """``clocks`` for zones, ``limit`` for graphs, and those of random runs, as far as given."""
+
+    memory_bytes: int | None
+
+
+def plot_model(
+    source: Path, path: Path | None, wish: Wish, include: Sequence[Path]
+) -> tuple[Path, int]:
+    """Writes a picture of a model; returns which file it is, and the exit code.
+
+    Raises:
+        InputError: The model, the query or the name of the picture is wrong, or there is nothing
+            to draw.
+        LimitError: The search reached a limit.
+    """
+    with pointing_to_explanations(True):
+        with doing("loading the model"):
+            model = load_model(source, include).model
+        if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
+            say_idle(OF_ZONES, "without --as zones")
+            say_idle(OF_GRAPHS, "without --as states or discrete")
+            path = path or Path(f"{source.stem}.svg")
+            require_apart({"-o": path}, {"source": source})
+            limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
+            return path, plot_runs(model, asked, path, wish.settings, limits)
+        say_idle(NAMES, "here: no random runs are drawn")
+        path = path or Path(f"{source.stem}.svg")
+        require_apart({"-o": path}, {"source": source})
+        _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
+        return path, 0
+
+
+def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
+    """The query that is answered by random runs, if it is one.
+
+    Raises:
+        InputError: Random runs are wanted, and the query has none.
+    """
+    if wish.kind is None and wish.asked is None and len(model.queries) != 1:
+        return None
+    query = _query(model, wish)
+    if query.form is not None and query.form.kind in STATISTICAL:
+        return query
+    if wish.kind == "runs":
+        raise InputError(
+            f"{query.text} is not answered by random runs\n"
+            "hint: ask for Pr[…](…), E[…](…) or simulate[…]{…}"
+        )
+    return None
+
+
+def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
+    """Writes a picture of a model that does not show random runs."""
+    is_graph = wish.kind in GRAPHS
+    kind_of(path, ("dot",) if is_graph else ())
+    if not is_graph:
+        say_idle(OF_GRAPHS, "without --as states or discrete")
+    if wish.kind != "zones":
+        say_idle(OF_ZONES, "without --as zones")
+    if is_graph or wish.kind == "templates":
+        drawn = "templates" if wish.kind == "templates" else "states"
+        say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
+    if is_graph:
+        _plot_graph(model, path, wish)
+        return
+    if wish.kind == "templates":
+        with doing("drawing the templates"):
+            _templates(model).save(path)
+        return
+    with doing("drawing the picture"):
+        _drawn(model, wish).save(path)
+
+
+def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
+    """Writes the graph of a state space.
+
+    Raises:
+        InputError: It has more states than the picture may have.
+        LimitError: More states would have to be searched for.
+    """
+    given = wish.settings.get("limit")
+    searched = max(MOST_SEARCHED, given or 0)
+    try:
+        with doing("the search for the states"):
+            left_s = current().left_s()
+            space = model.state_space(searched, timeout_s=left_s, memory_bytes=wish.memory_bytes)
+    except LimitError as error:
+        said = str(error).partition("\n")[0]
+        if str(searched) not in said:
+            raise
+        raise LimitError(
+            f"{said}\nhint: search for more (--set 'limit …'), or make constants of the model "
+            "smaller"
+        ) from None
+    clocks = wish.kind == "states"
+    with doing("drawing the graph"):
+        space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
+
+
+def _templates(model: Model) -> Svg:
+    from ntagen.checker.picture.svg import draw_all
+
+    return draw_all(model.templates)
+
+
+def _drawn(model: Model, wish: Wish) -> Svg:
+    query = _query(model, wish)
+    if wish.kind == "zones":
+        return _zones(model, query, wish)
+    run = _trace(model, query, wish)
+    return run.gantt() if wish.kind == "gantt" else run.sequence()
+
+
+def _query(model: Model, wish: Wish) -> Asked:
+    """The query that was asked for, or the only one of the model that can be drawn."""
+    if wish.asked is None and not model.queries:
+        raise InputError("the model has no queries\nhint: give one with --query")
+    queries = queries_of(model, () if wish.asked is None else (wish.asked,), None)
+    if wish.kind == "zones" and wish.asked is None:
+        queries = [query for query in queries if query.form and query.form.is_game]
+        if not queries:
+            raise InputError(
+                "no query of the model is a game, so there is no strategy to draw\n"
+                "hint: give one with --query: control: A<> p, control: A[] p, …"
+            )
+    if len(queries) > 1:
+        names = "\n".join(f"  {query.name or query.text}" for query in queries[:10])
+        raise InputError(
+            f"the model has {len(queries)} queries\nhint: choose one with --query:\n{names}"
+        )
+    return queries[0]
+
+
+def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
+    """The zones of the strategy of a game."""
+    with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
+        strategy = model.synthesize(
+            query.text,
+            timeout_s=current().left_s(),
+            memory_bytes=wish.memory_bytes,
+            progress=report,
+        )
+    axes = _axes(wish.settings.get("clocks"))
+    return strategy.zones(_state(strategy, wish.at), x=axes[0], y=axes[1])
+
+
+def _axes(clocks: str | None) -> tuple[str | None, str | None]:
+    """The clocks of both axes, as far as they are given."""
+    # A name may have commas of its own, in the brackets of its process: Train(1,2).x.
+    names = [] if clocks is None else re.split(r",(?![^(\[]*[)\]])", clocks)
+    names = [name.strip() for name in names]
+    if len(names) > 2 or not all(names):
+        raise InputError(f"{clocks!r} is not one clock or two\nhint: write for example x,y")
+    return names[0] if names else None, names[1] if len(names) > 1 else None
+
+
+def _state(strategy: Strategy, given: str | None) -> dict[str, dict[str, Any]]:
+    """The state of `--at`: the initial one, but for what is given."""
+    first = strategy.play().state
+    places, variables = dict(first.locations), dict(first.variables)
+    clocks: dict[str, str] = {}
+    for word in (given or "").split():
+        name, equals, value = word.partition("=")
+        process, dot, location = word.rpartition(".")
+        if equals and name in first.clocks:
+            clocks[name] = value
+        elif equals and name in variables:
+            variables[name] = _number(word, value)
+        elif not equals and dot and process in places:
+            places[process] = location
+        else:
+            known = ", ".join([*places, *variables, *first.clocks])
+            raise InputError(
+                f"--at: {word!r} is neither a location nor a value\n"
+                f"hint: write Process.Location or name=value; the names are {known}"
+            )
+    return {"locations": places, "variables": variables, "clocks": clocks}
+
+
+def _number(word: str, value: str) -> int | float:
+    try:
+        return float(value) if "." in value else int(value)
+    except ValueError:
+        raise InputError(f"--at: {word!r} gives no number\nhint: write for example n=1") from None
+
+
+def _trace(model: Model, query: Asked, wish: Wish) -> Run:
+    """The trace of a query, with exact times."""
+    with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
+        answer = model.check(
+            query.text,
+            trace=True,
+            timeout_s=current().left_s(),
+            memory_bytes=wish.memory_bytes,
+            progress=report,
+        )
+    if answer.verdict == "error":
+        raise ModelError(answer.message or "the model has a run-time error")
+    if answer.verdict == "unknown":
+        raise LimitError(f"the search was stopped by the {answer.limit_text}")
+    run = answer.trace
+    if run is not None:
+        return run
+    if answer.trace_json():
+        why = (answer.trace_text() or "").rpartition("No exact times: ")[2].strip()
+        raise InputError(f"the trace of {query.text} has no exact times: {why}")
+    raise InputError(
+        f"{query.text} is {answer.verdict}, and has no trace\n"
+        "hint: E<> p that is satisfied and A[] p that is not have one"
+    )

@@ -1,0 +1,1 @@
+"""The commands on needles: tasks and their plans, runs, experiments, devices and trackers."""

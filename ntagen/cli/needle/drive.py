@@ -1,0 +1,405 @@
+"""`ntagen drive`: steers a needle to the target, and logs the run."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from ntagen.cli.former_options import Renamed
+from ntagen.cli.loading import include_option
+from ntagen.cli.needle.answering_tissue import (
+    Wanted,
+    course_of,
+    course_options,
+    guarantee_of,
+    maker,
+    picks_at_random,
+    say_idle_options,
+)
+from ntagen.cli.needle.operator import SignalledOperator, signalled_operator
+from ntagen.cli.needle.report import lines, report, summary
+from ntagen.cli.needle.steering import (
+    known_option,
+    say_idle_errors,
+    say_idle_settings,
+    settings_options,
+    show_settings,
+)
+from ntagen.cli.needle.tracker import (
+    Sense,
+    Tracking,
+    opened,
+    opened_live,
+    tracker_options,
+    tracking_of,
+)
+from ntagen.cli.notes import say_idle
+from ntagen.cli.signals import TERMINATED
+from ntagen.cli.terminal import echo
+from ntagen.drive.states import State
+from ntagen.errors import InputError, ModelError, NtagenError
+from ntagen.files import require_apart
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from ntagen.drive.configure import Configuration
+    from ntagen.drive.device import LiveSensor, WatchedActuator
+    from ntagen.drive.following import Course
+    from ntagen.drive.outcome import Driven
+    from ntagen.drive.records import Journal
+    from ntagen.nsl import Task
+    from ntagen.parameters import Given
+    from ntagen.plan.synthesise import Synthesiser
+    from ntagen.scene import Scene
+
+_EPILOG: Final = """\
+Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
+4 no strategy that holds in exact kinematics, or nothing is guaranteed any more
+(--only-guaranteed), 5 device fault, 6 no strategy that ends in time, 70 internal error,
+130 interrupted, 143 ended by SIGTERM."""
+
+
+@click.command(
+    "drive",
+    cls=Renamed,
+    former={
+        "--baud": "write --needle grbl:PORT,baud={}",
+        "--by": "write --strategy none for plans",
+    },
+    epilog=_EPILOG,
+)
+@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@click.option(
+    "--needle",
+    default="virtual",
+    show_default=True,
+    help="Which needle to steer. Three are simulations: virtual bends exactly as planned, phantom "
+    "drifts, lags and is measured as real needles are, and grbl+sim is a phantom behind an "
+    "emulated stepper controller. grbl:PORT is a real needle behind a controller with the axes "
+    "that the task describes (grbl:PORT,baud=9600 says how fast the port is); grbl alone takes the "
+    "port from the task, too. PLUGIN:ARGUMENT is a real needle of another package "
+    "(docs/plugins.md).",
+)
+@click.option(
+    "--confirm",
+    is_flag=True,
+    help="Ask before each plan that is followed, and before the needle is pulled back for one.",
+)
+@tracker_options
+@course_options
+@known_option
+@click.option(
+    "--breath-phase",
+    "breath_phase_deg",
+    metavar="DEG",
+    type=click.FloatRange(0.0, 360.0),
+    help="The phase of the breath at the start, if regions move: from 0 to 360 degrees; by default "
+    "0. A simulation moves its regions by the same clock.",
+)
+@click.option(
+    "--log",
+    "log_path",
+    metavar="RUN.mcap",
+    type=click.Path(path_type=Path),
+    help="The file to write the log of the run to; an existing file is replaced.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+@click.option("--quiet", is_flag=True, help="Print only how the run ended.")
+@click.option(
+    "--settings",
+    "only_settings",
+    is_flag=True,
+    help="Print all settings and where each comes from, and do not drive.",
+)
+@include_option()
+@settings_options("seed", "noise", "time limit")
+def command(
+    environment: Path,
+    needle: str,
+    confirm: bool,
+    tracker: str | None,
+    registration: str | None,
+    known: str,
+    breath_phase_deg: float | None,
+    log_path: Path | None,
+    as_json: bool,
+    quiet: bool,
+    only_settings: bool,
+    include: tuple[Path, ...],
+    given: tuple[Given, ...],
+    wanted: Wanted,
+) -> int:
+    """Steer a needle to the target and log the run.
+
+    The driver pushes a little, estimates where the needle is and how it bends, finds a safe
+    strategy, and follows its best plan while it measures. If the needle deviates or the force
+    rises, the driver stops, pulls back, and looks for a new strategy with what it has learned.
+
+    In a tissue that answers (tissue adversarial), the driver follows a strategy that wins whatever
+    the tissue picks, and says up to which depth its guarantee held. A phantom or real needle is led
+    by such a strategy as soon as one wins against all that the estimate leaves open.
+
+    Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
+    once. Two runs cannot write the same log at the same time.
+
+    \b
+    Examples:
+      ntagen drive examples/paper.nsl --log run.mcap
+      ntagen drive examples/paper.nsl --seed 1 --noise 0.1mm --known none
+      ntagen drive examples/paper.nsl --needle phantom --seed 1
+      ntagen drive examples/paper.nsl --set "pull 8 mm" --set "force sensing off"
+      ntagen drive examples/paper.nsl --tracker openigtlink+sim
+      ntagen drive task.nsl --needle grbl:/dev/ttyACM0 --confirm --log run.mcap \\
+        --tracker openigtlink:localhost:18944:Needle --registration registration.json
+      ntagen drive examples/answering/answering.nsl --tissue between --seed 1 --only-guaranteed
+      ntagen drive examples/paper.nsl --settings
+
+    \b
+    --set takes what can stand in the braces drive { … } of ENV.nsl, and wins over them.
+    """  # noqa: D301  click wants the control character
+    from ntagen.drive.configure import configure
+    from ntagen.drive.knowledge import told
+    from ntagen.drive.needles import LAB
+    from ntagen.nsl import load_task
+
+    if needle == LAB:
+        raise InputError(
+            "a needle in a lab is driven by its port and its tracker\n"
+            "hint: `ntagen device simulate ENV.nsl` opens a lab, and prints the command"
+        )
+    if as_json:
+        say_idle({"quiet": "--quiet"}, "with --json")
+    task = load_task(environment, include=include)
+    for warning in task.warnings:
+        echo(warning.render(), err=True)
+    task = _breathing(task, breath_phase_deg)
+    configuration = configure((*task.given, *given), task.scene, known, needle)
+    is_real = configuration.needle.is_real
+    _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
+    say_idle_options(task.scene, configuration)
+    if only_settings:
+        show_settings(configuration)
+        return 0
+    tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
+    terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
+    entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
+    # A tracker or a port that cannot be reached must not cost an earlier log.
+    with signalled_operator() as operator, contextlib.ExitStack() as stack:
+        course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
+        run = _Run(environment, task, configuration, known, tracking, wanted, course)
+        if is_real:
+            setup = stack.enter_context(_real_needle(run, needle))
+            log = stack.enter_context(_log(log_path, run))
+            result = _drive_real(run, setup, log, terminal, operator)
+        else:
+            sense = stack.enter_context(opened(tracking, entry, watches_force=watches_force))
+            log = stack.enter_context(_log(log_path, run))
+            result = _drive(run, sense, log, terminal, operator)
+    if as_json:
+        guarantee = guarantee_of(result, task.scene, course)
+        ended = summary(result, configuration, known, log_path)
+        echo(json.dumps(ended | {"guarantee": guarantee}))
+    else:
+        report(result, task.scene, log_path, short=quiet)
+    if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
+        return TERMINATED
+    return _exit_code(result.ended.outcome)
+
+
+def _breathing(task: Task, phase_deg: float | None) -> Task:
+    """The task with another phase of the breath at the start."""
+    breath = task.scene.breath
+    if phase_deg is None:
+        return task
+    if breath is None:
+        say_idle({"breath_phase_deg": "--breath-phase"}, "where no region moves")
+        return task
+    clock_s = phase_deg / 360.0 * breath.period_s
+    return replace(task, scene=task.scene.at_clock(clock_s))
+
+
+def _say_idle(configuration: Configuration, given: Sequence[Given], *, picks: bool) -> None:
+    """Tells what has no effect on this needle, in a tissue that may pick at random."""
+    needle, errors = configuration.needle, configuration.errors
+    say_idle_errors(needle, given)
+    if needle.is_real:
+        say_idle_settings(given, {"seed"}, "with a real needle")
+        return
+    if needle.parameters is None and not (errors.noise_mm or errors.roll_rad or picks):
+        say_idle_settings(given, {"seed"}, "without --noise or --set 'roll error …'")
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What is driven: the file, its task, the settings, what is known, what measures."""
+
+    environment: Path
+    task: Task
+    configuration: Configuration
+    known: str
+    tracking: Tracking
+    wanted: Wanted
+    course: Course | None
+
+    @property
+    def scene(self) -> Scene:
+        """The true scene."""
+        return self.task.scene
+
+
+@dataclass(frozen=True, slots=True)
+class _Terminal:
+    """What the terminal is used for: to tell the run, and to ask the operator."""
+
+    speaks: bool
+    confirms: bool
+
+
+@contextlib.contextmanager
+def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
+    """What moves a real needle, and what measures it."""
+    from ntagen.drive.needles import REAL
+    from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
+    from ntagen.grbl.port import SerialPort
+
+    settings, scene = run.configuration.settings, run.scene
+    name, _, argument = needle.partition(":")
+    if name == REAL:
+        device = described(run.task, run.environment)
+        axes = axes_for(device, scene.needle, settings)
+        port = SerialPort(argument or device.port)
+        opening = opened_steppers(port, axes, scene.needle, settings)
+    else:
+        opening = opened_plugin(name, argument, scene.needle, settings)
+    with (
+        opening as actuator,
+        opened_live(
+            run.tracking,
+            scene.needle.tip,
+            actuator.now_s,
+            watches_force=settings.force_sensing,
+            force_varies=settings.force_noise_n > 0.0,
+        ) as sensor,
+    ):
+        yield actuator, sensor
+
+
+def _drive_real(
+    run: _Run,
+    setup: tuple[WatchedActuator, LiveSensor],
+    log: list[Journal],
+    terminal: _Terminal,
+    operator: SignalledOperator,
+) -> Driven:
+    from ntagen.drive.real import drive
+
+    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
+        return drive(
+            run.scene,
+            *setup,
+            synthesise,
+            run.configuration.settings,
+            journal,
+            known=run.known,
+            listen=operator.listen,
+            agree=agree,
+            course=run.course,
+        )
+
+
+def _drive(
+    run: _Run,
+    sense: Sense | None,
+    log: list[Journal],
+    terminal: _Terminal,
+    operator: SignalledOperator,
+) -> Driven:
+    from ntagen.drive.simulate import simulate
+
+    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
+        return simulate(
+            run.scene,
+            synthesise,
+            run.configuration.settings,
+            journal,
+            known=run.known,
+            errors=run.configuration.errors,
+            make=maker(run.wanted, run.scene, run.configuration, run.course),
+            seed=run.configuration.seed,
+            sense=sense,
+            listen=operator.listen,
+            agree=agree,
+            course=run.course,
+        )
+
+
+@contextlib.contextmanager
+def _around(
+    run: _Run, log: list[Journal], terminal: _Terminal, operator: SignalledOperator
+) -> Iterator[tuple[Synthesiser, Journal, Callable[[str], None]]]:
+    """What a run needs besides the needle: what finds plans, what records, and who agrees."""
+    from ntagen.drive.records import Journals
+    from ntagen.drive.simulate import synthesiser_for
+
+    settings = run.configuration.settings
+    # The log has the strategies; nobody else asks for them.
+    synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
+    agree = operator.agree if terminal.confirms else _agrees
+    with contextlib.ExitStack() as stack:
+        shown = []
+        if terminal.speaks:
+            moves = not terminal.confirms
+            shown.append(stack.enter_context(lines(settings.ranking, moves=moves)))
+        try:
+            yield synthesise, Journals(*log, *shown), agree
+        except ModelError as error:
+            # The model is ours: its exit code would say that no strategy holds.
+            raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
+
+
+def _agrees(_: str) -> None:
+    """Agrees to all: nobody is asked."""
+
+
+@contextlib.contextmanager
+def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
+    """The journal that writes the log, if one is wanted."""
+    if path is None:
+        yield []
+        return
+    from ntagen.drive.knowledge import told
+    from ntagen.drive.log import TREE, Log
+    from ntagen.drive.log_facts import facts_of
+
+    # Mistakes on the command line must be found before an earlier log is replaced.
+    told(run.scene, run.known)
+    require_apart({"--log": path}, {"environment": run.environment})
+    metadata, attachments = facts_of(
+        run.environment, run.scene, run.configuration, run.known, run.tracking.text
+    )
+    if run.course is not None:
+        from ntagen.drive.trees import COURSE, course_to_log
+
+        metadata[COURSE], tree = course_to_log(run.course)
+        attachments |= {} if tree is None else {TREE: tree}
+    with Log(path, metadata, attachments) as log:
+        yield [log]
+
+
+def _exit_code(outcome: str) -> int:
+    return {
+        State.TARGET_REACHED: 0,
+        State.NO_STRATEGY: 1,
+        State.NONE_HOLDS: 4,
+        State.NO_TIME_LEFT: 6,
+        State.NOT_GUARANTEED: 4,
+        State.TIMED_OUT: 3,
+        State.FAULTED: 5,
+        State.INTERRUPTED: 130,
+    }[State(outcome)]
