@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -240,11 +240,14 @@ def command(
     questions = questions_about(loaded)
     forms = [query.form for query in todo if query.form]
     values = click.get_current_context().params | settings
-    say(idle_options(given_options(), values, forms, ranks=questions.ranks_plans))
+    named = given_options()
+    say(idle_options(named, values, forms, ranks=questions.ranks_plans))
     spreading = Spreading(dask, todo, options, _why_not_spread(joint, allow_external))
     shown.loaded(model_path, loaded.model)
-    together = joint_answers(loaded.model, todo, options, quiet=not is_human) if joint else {}
-    run = _Run(questions, options, outputs, spreading, shown, expect, not is_human)
+    together = (
+        joint_answers(loaded.model, todo, options, named, quiet=not is_human) if joint else {}
+    )
+    run = _Run(questions, options, named, outputs, spreading, shown, expect, not is_human)
     try:
         outcomes = run.outcomes(todo, together)
     except _WrongEvidenceError as wrong:
@@ -293,6 +296,8 @@ class _Run:
 
     questions: Questions
     options: Options
+    given: Collection[str]
+    """The options and settings on the command line, which win over those of a file."""
     outputs: Outputs
     spreading: Spreading
     shown: Format
@@ -381,7 +386,7 @@ class _Run:
         if known is not None:
             return known
         fields: dict[str, Any] = {"timeout_s": left_s, "folder": query.folder}
-        fields |= of_model(query.options, given_options())
+        fields |= of_model(query.options, self.given)
         fields |= self.questions.options(query, self.options)
         wanted = replace(self.options, strategy=is_used or self.outputs.wants_strategy, **fields)
         model = self.questions.model

@@ -6,9 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import click
-
-from ntagen.cli.models.options import STATISTICAL
+from ntagen.cli.models.options import OPTIONS, STATISTICAL
 
 if TYPE_CHECKING:
     from ntagen.checker import QueryForm
@@ -121,8 +119,7 @@ def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
 
 def _spelled(name: str) -> str:
     """An option or a setting of this name, as it stands on the command line."""
-    is_option = name in click.get_current_context().params
-    return f"--{name}" if is_option else f"--set '{name.replace('_', ' ')} …'"
+    return f"--{name}" if name in OPTIONS else f"--set '{name.replace('_', ' ')} …'"
 
 
 def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:

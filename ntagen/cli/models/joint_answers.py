@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ntagen.cli.models.queries import Asked
-from ntagen.cli.notes import given_options
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError
 from ntagen.verifyta.statistical import of_model
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def joint_answers(
-    model: Model, queries: Sequence[Asked], options: Options, *, quiet: bool
+    model: Model, queries: Sequence[Asked], options: Options, given: Collection[str], *, quiet: bool
 ) -> dict[int, Answer | InputError]:
     """The answers to the statistical queries among these, by their places in the list.
 
@@ -27,12 +26,12 @@ def joint_answers(
         model: The model.
         queries: All queries.
         options: How they are to be answered, unless the file says otherwise of a query.
+        given: The options and settings on the command line, which win over those of the file.
         quiet: Whether no progress is shown.
     """
     places = [place for place, query in enumerate(queries) if _is_joint(query)]
     if not places:
         return {}
-    given = given_options()
     with shown_progress(f"{len(places)} queries together", quiet=quiet) as report:
         options = replace(options, progress=report)
         asked = [

@@ -280,7 +280,7 @@ SETTINGS: Final = (
 )
 """What ``--set`` takes: fields of `ntagen.checker.Options`, and `joint`, `dask` and `ranking`."""
 
-_OPTIONS: Final[dict[str, Decorator]] = {
+OPTIONS: Final[dict[str, Decorator]] = {
     "verify": click.option(
         "--verify",
         is_flag=True,
@@ -332,5 +332,5 @@ _OPTIONS: Final[dict[str, Decorator]] = {
 """The options on the command line, by their fields of `ntagen.checker.Options`."""
 
 
-engine_options: Final = gathered("given", _OPTIONS, dict)
+engine_options: Final = gathered("given", OPTIONS, dict)
 """Adds these options; the command gets their values as `given`, by the names of the fields."""
