@@ -47,17 +47,11 @@ COMMANDS: Final = {
     "drive": ("needle.drive", "Steer a needle to the target and log the run."),
     "experiment": ("needle.experiment", "Drive many simulated runs, and make a table of them."),
     "sweep": ("needle.sweep", "Show how much of an error a task stands."),
-    "calibrate": (
-        "needle.calibrate",
-        "Find where the scene lies for a tracker, from pairs of points.",
-    ),
+    "calibrate": ("needle.calibrate", "Find where a scene lies for a tracker, by pairs of points."),
     "device": ("needle.device", "Try a device before it drives a needle."),
     "match": ("needle.match", "Find the actions that explain measured traces of the tip."),
     "replay": ("needle.replay", "Repeat the decisions of a logged run and compare them."),
-    "verifyta": (
-        "models.verifyta",
-        "Stand in for UPPAAL's verifyta: its options, output and files.",
-    ),
+    "verifyta": ("models.verifyta", "Stand in for UPPAAL's verifyta: its options, output, files."),
     "fmt": ("needle.fmt", "Format environment files."),
     "lsp": ("needle.lsp", "Answer an editor about environment files."),
 }

@@ -6,12 +6,15 @@ This is for one release: then this file goes, and commands are of click's own cl
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ntagen.cli.settings import Row, Words
+from ntagen.cli.settings import Setting, Words
 from ntagen.errors import InputError
+
+if TYPE_CHECKING:
+    from ntagen.parameters import Parameter
 
 _SWITCH = ("on", "off")
 
@@ -42,7 +45,7 @@ class Renamed(click.Command):
                 raise
             raise InputError(f"no such option: {option}; {said.format(value)}") from error
 
-    def _setting_of(self, option: str) -> Row | None:
+    def _setting_of(self, option: str) -> Setting | Parameter | None:
         """The setting whose option it was, if it was one."""
         said = option.removeprefix("--").replace("-", " ")
         types = [one.type for one in self.params]

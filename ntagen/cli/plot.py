@@ -40,22 +40,19 @@ _RANK: Final = "--set 'ranking …'"
 
 SETTINGS: Final = (
     Setting(
-        "ranking",
-        "CRITERION,…",
+        "ranking CRITERION,…",
         click.STRING,
         "Of a scene: how plans are ranked, the most important criterion first: clearance, reserve, "
         "rolls, length, target.  [default: as drive { … } says, else clearance,rolls,length]",
     ),
     Setting(
-        "clocks",
-        "X,Y",
+        "clocks X,Y",
         click.STRING,
         "With --as zones: the clocks of the two axes.  "
         "[default: the first on which decisions depend]",
     ),
     Setting(
-        "limit",
-        "N",
+        "limit N",
         click.IntRange(min=1),
         "With --as states or discrete: draw at most this many states. A graph with more is not "
         f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends "

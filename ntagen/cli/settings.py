@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import functools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,25 +16,7 @@ from ntagen.values import dataclass
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-
-class Row(Protocol):
-    """What is shown of a setting."""
-
-    @property
-    def words(self) -> str:
-        """Its words before the value."""
-
-    @property
-    def form(self) -> str:
-        """How it is written."""
-
-    @property
-    def choices(self) -> Sequence[str]:
-        """Its values, if they are few."""
-
-    @property
-    def help(self) -> str:
-        """What it is, as a sentence."""
+    from ntagen.parameters import Parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,15 +24,13 @@ class Setting:
     """A setting that only the command line has; those of steering are in `ntagen.parameters`.
 
     Attributes:
-        words: Its words before the value.
-        value: How a value is written.
+        form: How it is written: its words, and the value.
         type: What reads a value.
         help: What it is, as a sentence.
         name: The name of the value for the command; by default the words.
     """
 
-    words: str
-    value: str
+    form: str
     type: click.ParamType[Any]
     help: str
     name: str = ""
@@ -61,9 +41,9 @@ class Setting:
         return self.name or self.words.replace(" ", "_")
 
     @property
-    def form(self) -> str:
-        """How it is written."""
-        return f"{self.words} {self.value}"
+    def words(self) -> str:
+        """Its words before the value."""
+        return self.form.rpartition(" ")[0]
 
     @property
     def choices(self) -> Sequence[str]:
@@ -72,7 +52,8 @@ class Setting:
 
     def option(self) -> Decorator:
         """The same as an option of its own."""
-        return click.option(f"--{self.words}", metavar=self.value, type=self.type, help=self.help)
+        words, _, value = self.form.partition(" ")
+        return click.option(f"--{words}", metavar=value, type=self.type, help=self.help)
 
 
 class Words(click.ParamType[str]):
@@ -80,7 +61,7 @@ class Words(click.ParamType[str]):
 
     name = "settings"
 
-    def __init__(self, settings: Sequence[Row]) -> None:
+    def __init__(self, settings: Sequence[Setting | Parameter]) -> None:
         self.settings = settings
 
     def shell_complete(
@@ -97,7 +78,7 @@ class Words(click.ParamType[str]):
         ]
 
 
-def set_option(settings: Sequence[Row], about: str, **more: Any) -> Decorator:  # noqa: ANN401
+def set_option(settings: Sequence[Setting | Parameter], about: str, **more: Any) -> Decorator:  # noqa: ANN401
     """The option ``--set``; `about` is the start of its help, and `more` is for click."""
     return click.option(
         "--set",

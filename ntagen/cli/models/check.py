@@ -386,9 +386,10 @@ class _Run:
         if known is not None:
             return known
         fields: dict[str, Any] = {"timeout_s": left_s, "folder": query.folder}
+        fields["strategy"] = is_used or self.outputs.strategy is not None
         fields |= of_model(query.options, self.given)
         fields |= self.questions.options(query, self.options)
-        wanted = replace(self.options, strategy=is_used or self.outputs.wants_strategy, **fields)
+        wanted = replace(self.options, **fields)
         model = self.questions.model
         with (
             doing(f"the search for the answer to {query.text.strip()}"),

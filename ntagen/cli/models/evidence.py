@@ -38,11 +38,6 @@ class Outputs:
     stops: dict[str, str] = field(default_factory=dict)
     """By query: ``time`` or ``memory`` if that limit ended a list of plans."""
 
-    @property
-    def wants_strategy(self) -> bool:
-        """Whether a strategy is written in some form."""
-        return self.strategy is not None
-
     def missing(self) -> list[str]:
         """The options whose output was asked for and has not been written."""
         wanted = self.wanted().items()

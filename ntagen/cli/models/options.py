@@ -80,36 +80,31 @@ _SHARE: Final = Number(0, 1)
 
 RUNS: Final = (
     Setting(
-        "runs",
-        "N",
+        "runs N",
         click.IntRange(min=1),
         "For Pr and E: make N random runs.  [default: as many as the query says, or as epsilon "
         "needs]",
     ),
     Setting(
-        "alpha",
-        "RISK",
+        "alpha RISK",
         _SHARE,
         "For Pr and E: the risk that the interval misses, or that Pr >= p is rejected wrongly.  "
         "[default: 0.05]",
     ),
     Setting(
-        "epsilon",
-        "WIDTH",
+        "epsilon WIDTH",
         _SHARE,
         "For Pr: make runs until both ends of the interval are so near to the estimate.  "
         "[default: 0.05]",
     ),
     Setting(
-        "seed",
-        "N",
+        "seed N",
         click.IntRange(min=0),
         "For a random search and for statistical queries: the same seed gives the same search and "
         "the same runs.  [default: 0]",
     ),
     Setting(
-        "threads",
-        "N",
+        "threads N",
         _Threads(),
         "The number of threads, or `all` for one per core. Threads share the breadth-first search "
         "of E<>, A[], sup, inf and bounds, the computation with zones in games, and the random "
@@ -120,94 +115,81 @@ RUNS: Final = (
 """What random runs depend on, or what makes them faster: options here, settings of pictures."""
 
 _DISCRETISATION: Final = Setting(
-    "discretisation",
-    "STEP",
+    "discretisation STEP",
     Number(0, math.inf),
     "Solve equations of clocks in steps of this length.  [default: as their errors need]",
 )
 
 STATISTICAL_SETTINGS: Final = (
     Setting(
-        "beta",
-        "RISK",
+        "beta RISK",
         _SHARE,
         "For Pr >= p: the risk that it is accepted wrongly.  [default: 0.05]",
     ),
     Setting(
-        "anytime",
-        "on|off",
+        "anytime on|off",
         click.BOOL,
         "For Pr and E: intervals that hold after every run, all together, so that you may look and "
         "stop when you want. They are wider. For E, bounds of the value must be known.  "
         "[default: off]",
     ),
     Setting(
-        "relative",
-        "PART",
+        "relative PART",
         _SHARE,
         "For Pr and E: make runs until both ends of the interval are within this part of the "
         "estimate. The interval is an anytime one. It never ends for a probability of 0: bound it "
         "by --runs or --timeout.",
     ),
     Setting(
-        "value bounds",
-        "LOW,HIGH",
+        "value bounds LOW,HIGH",
         Pair(-math.inf, math.inf),
         "For E: in every run the value lies between these; then the interval is right for any "
         "number of runs.  [default: what the ranges of integers in the query say]",
     ),
     Setting(
-        "mean interval",
-        "student|bernstein|dkw",
+        "mean interval student|bernstein|dkw",
         click.Choice(["auto", "student", "bernstein", "dkw"]),
         "What makes the interval of E: Student's distribution, which is right in the limit of many "
         "runs only; empirical Bernstein intervals, or the band of Dvoretzky, Kiefer and Wolfowitz, "
         "for values between known bounds.  [default: bernstein if bounds are known, else student]",
     ),
     Setting(
-        "levels",
-        "EXPR",
+        "levels EXPR",
         click.STRING,
         "For Pr of a rare event: an expression that says how near a state is to it, such as the "
         "length of a queue that must not overflow. The estimate is made by importance splitting: "
         "runs are started again where others came nearer.",
     ),
     Setting(
-        "effort",
-        "N",
+        "effort N",
         click.IntRange(min=1, max=1_000_000),
         "With levels: make N parts of runs between two levels.  [default: 1000]",
     ),
     Setting(
-        "repetitions",
-        "N",
+        "repetitions N",
         click.IntRange(min=2, max=1_000_000),
         "With levels: make the interval of N independent repetitions.  [default: 40]",
     ),
     Setting(
-        "delta",
-        "WIDTH[,WIDTH]",
+        "delta WIDTH[,WIDTH]",
         Pair(0, 1, one_is_enough=True),
         "For Pr >= p: so near to p nothing is promised; one number for both sides, or one for "
         "below and one for above.  [default: 0.01]",
     ),
     Setting(
-        "odds ratios",
-        "LOW,HIGH",
+        "odds ratios LOW,HIGH",
         Pair(0, math.inf),
         "For Pr >= Pr: if the ratio of the odds lies between these, nothing is promised.  "
         "[default: 0.9,1.1]",
     ),
     Setting(
-        "joint",
-        "on|off",
+        "joint on|off",
         click.BOOL,
         "Answer all Pr and E queries so that all their intervals hold together, with the risk of "
         "--alpha for all of them. Queries with the same bound share their runs.  [default: off]",
     ),
     Setting(
-        "dask",
-        "ADDRESS",
+        "dask ADDRESS",
         click.STRING,
         "For Pr and E: use the workers of the Dask scheduler at this address, as tcp://host:8786. "
         "They must have the same ntagen. Answers are the same as without them. Joint runs, those "
@@ -224,8 +206,7 @@ STATISTICAL: Final = (
 SETTINGS: Final = (
     *STATISTICAL_SETTINGS,
     Setting(
-        "under choice",
-        "race|eager|lazy",
+        "under choice race|eager|lazy",
         click.Choice(["race", "eager", "lazy"]),
         "For Pr, E and simulate under a strategy that lets the controller choose: its processes "
         "draw delays as without the strategy and may then wait on, until it demands a move (race), "
@@ -233,8 +214,7 @@ SETTINGS: Final = (
         "[default: race]",
     ),
     Setting(
-        "trace",
-        "shortest|fastest",
+        "trace shortest|fastest",
         click.Choice(["any", "shortest", "fastest"]),
         "With --trace: write the trace with the fewest transitions (if a run never ends, its loop "
         "counts once), or the one that takes the least time (not for E[], A<> and -->, whose runs "
@@ -242,37 +222,32 @@ SETTINGS: Final = (
         "wanted_trace",
     ),
     Setting(
-        "max plans",
-        "N",
+        "max plans N",
         click.IntRange(min=1),
         "With --plans: write at most N plans. With 1, the search stops at the first plan.  "
         "[default: 1000000; no limit for a FILE.jsonl]",
     ),
     Setting(
-        "ranking",
-        "CRITERION,…",
+        "ranking CRITERION,…",
         click.STRING,
         "With --plans of an environment: how they are ranked, the most important criterion first: "
         "clearance, reserve, rolls, length, target.  "
         "[default: as drive { … } says, else clearance,rolls,length]",
     ),
     Setting(
-        "guide",
-        "EXPR",
+        "guide EXPR",
         click.STRING,
         "An integer expression of the model, for example a function that says how far a state is "
         "from the goal: games explore first where it is least. Verdicts do not depend on it.",
     ),
     Setting(
-        "priorities",
-        "ignore|keep",
+        "priorities ignore|keep",
         click.Choice(["ignore", "keep"]),
         "Whether priorities of channels and processes count in games and in queries under a "
         "strategy. In all other queries they count.  [default: ignore, as TIGA does]",
     ),
     Setting(
-        "without",
-        "NAME,…",
+        "without NAME,…",
         _Heuristics(),
         "For experiments: switch these heuristics of the engine off. Verdicts do not depend on "
         "them; time and counts do. A wrong name lists all names.",

@@ -21,13 +21,12 @@ if TYPE_CHECKING:
 SETTINGS: Final = (
     *RUNS,
     Setting(
-        "buckets",
-        "N",
+        "buckets N",
         click.IntRange(min=1),
         "The number of buckets of the histogram.  [default: the square root of the number of "
         "values, at most 120]",
     ),
-    Setting("bucket width", "WIDTH", click.FLOAT, "How wide a bucket is, instead."),
+    Setting("bucket width WIDTH", click.FLOAT, "How wide a bucket is, instead."),
 )
 """The settings that count for random runs only."""
 

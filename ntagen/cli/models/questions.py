@@ -30,7 +30,6 @@ class Questions:
 
     def options(self, query: Asked, options: Options) -> dict[str, Any]:
         """Options that a query needs besides those that are given."""
-        del query, options
         return {}
 
     def answer(self, query: Asked, options: Options) -> Answer:
@@ -49,7 +48,6 @@ class Questions:
 
     def completed(self, outcome: Outcome, outputs: Outputs) -> Outcome:
         """An outcome whose evidence is written, with what else is to be said of it."""
-        del outputs
         return outcome
 
 

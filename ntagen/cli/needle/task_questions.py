@@ -11,14 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.models.outcomes import Outcome
-from ntagen.cli.models.plan_lists import (
-    LINES,
-    ListLimits,
-    Written,
-    counting,
-    stopped,
-    write_pages,
-)
+from ntagen.cli.models.plan_lists import LINES, ListLimits, Written, counting, stopped, write_pages
 from ntagen.cli.models.questions import Questions
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
