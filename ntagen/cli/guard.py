@@ -10,7 +10,7 @@ Ctrl-C, no file is left half written.
 * Memory is what the process takes beyond what it had when the command began: libraries that Python
   loads later count a little, so that there are always some megabytes beside the limit.
 * From a query on, which the engine ends by itself, a twentieth of the limit is left for printing
-  and writing.
+  and writing. To draw what random runs said until then takes more, and gets it (`Guard.allow`).
 """
 
 from __future__ import annotations
@@ -105,6 +105,18 @@ class Guard:
         """The engine has ended, perhaps by a limit: what is left is for printing and writing."""
         now_s = time.monotonic() - (self._timeout_s or 0)
         self._arm(max(self._start_s, now_s), max(self._base_bytes, self._taken_too_much()))
+
+    def allow(self, more_s: float, more_bytes: int) -> None:
+        """What follows gets at least this time and memory, whatever the limits are.
+
+        After an answer that a limit has ended, there is not enough left to load a library.
+        """
+        with self._wake:
+            if self._deadline_s is not None:
+                self._deadline_s = max(self._deadline_s, time.monotonic() + more_s)
+            if self._most_bytes is not None:
+                self._most_bytes = max(self._most_bytes, (resident_bytes() or 0) + more_bytes)
+            self._wake.notify()
 
     def _taken_too_much(self) -> int:
         """What the process would have to have taken at first for what it takes now."""
