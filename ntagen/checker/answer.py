@@ -16,7 +16,7 @@ from ntagen.values import dataclass
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Distribution
     from ntagen.checker.machine import Machine
-    from ntagen.checker.picture.chart import Chart
+    from ntagen.checker.picture.page import Svg
     from ntagen.checker.runs import Run
     from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
     from ntagen.checker.trajectories import OverTime, Trajectory
@@ -260,8 +260,8 @@ class Answer:
             )
         return frame_of_trajectories(self.trajectories)
 
-    def chart(self, buckets: int | None = None, width: float | None = None) -> Chart | None:
-        """What random runs say, as panels; ``None`` if there is nothing to draw.
+    def chart(self, buckets: int | None = None, width: float | None = None) -> Svg | None:
+        """What random runs say, as a picture; ``None`` if there is nothing to draw.
 
         Args:
             buckets: The number of buckets of a histogram; see `Distribution.histogram`.
@@ -281,10 +281,8 @@ class Answer:
         return runs_chart(runs, self.query) if runs else None
 
     def _repr_svg_(self) -> str | None:
-        from ntagen.checker.picture.chart import svg
-
         chart = self.chart()
-        return None if chart is None else svg(chart).text
+        return None if chart is None else chart.text
 
     @property
     def limit_text(self) -> str:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ntagen.checker.picture.chart import Chart
     from ntagen.checker.picture.page import Svg
 
     Floats = NDArray[np.float64]
@@ -243,8 +242,8 @@ class Distribution:
         buckets: int | None = None,
         width: float | None = None,
         interval: tuple[float | None, float | None] = (None, None),
-    ) -> Chart:
-        """The histogram above the cumulative distribution with its band.
+    ) -> Svg:
+        """The histogram above the cumulative distribution with its band, as a picture.
 
         Args:
             buckets: As for `histogram`; by default at most 120.
@@ -254,7 +253,7 @@ class Distribution:
         Raises:
             InputError: There are no values, or the buckets cannot be made.
         """
-        from ntagen.checker.picture.chart import DARK, Band, Bars, Chart, Item, Line, Panel
+        from ntagen.checker.picture.chart import BAND, BLUE, DARK, add_band, panels, picture
 
         automatic = len((self._known["histogram"] or {"counts": []})["counts"])
         if buckets is None and width is None and automatic > _MOST_BARS:
@@ -265,45 +264,45 @@ class Distribution:
         if edges[1] - edges[0] == 1.0 and self._is_whole:
             # The bar of a whole number stands around it.
             edges = [edge - 0.5 for edge in edges]
-        x, value, lower, upper = self._thinned(edges[0], edges[-1])
-        percent = f"{100 * (1 - self._alpha):g} %"
-        heights = histogram.frequencies.tolist()
-        top = 1.05 * max(heights)
-        items: list[Item] = [Bars("share of the runs", edges, heights)]
-        if None not in interval:
-            ends = [float(one) for one in interval if one is not None]
-            label = f"interval of the mean, at {percent} confidence"
-            items.append(Band(label, ends, [0.0, 0.0], [top, top], DARK))
-        if self.mean is not None:
-            items.append(Line("mean", [self.mean] * 2, [0.0, top], DARK, is_dashed=True))
-        # A rare event is a flat line else.
-        most = 1.0 if value[-1] >= 0.5 else min(1.0, 1.15 * upper[-1])
-        band = f"band for all values at once, at {percent} confidence"
-        cumulative: list[Item] = [
-            Band(band, x, lower, upper, is_step=True),
-            Line("share of the runs up to there", x, value, is_step=True),
-        ]
         caption = (
             f"{self.count:,} values of {self.runs:,} runs, from {self.min:.6g} to {self.max:.6g}, "
             f"mean {self.mean:.6g}"
         )
-        return Chart(
-            self._query.strip(),
-            caption,
-            (
-                Panel(self.label, per, items, (0.0, top)),
-                Panel(self.label, "cumulative share", cumulative, (0.0, most)),
-            ),
+        labels = (per, "cumulative share")
+        figure, (above, below) = panels(self._query, caption, self.label, labels)
+        percent = f"{100 * (1 - self._alpha):g} %"
+        heights = histogram.frequencies.tolist()
+        filled = [bar for bar in zip(edges, edges[1:], heights, strict=False) if bar[2]]
+        bars = above.bar(
+            [start for start, _, _ in filled],
+            [height for _, _, height in filled],
+            [end - start for start, end, _ in filled],
+            align="edge",
+            color=BLUE,
+            alpha=0.75,
+            edgecolor="white",
+            linewidth=0.4 if len(filled) <= _MOST_BARS else 0.0,
+            label="share of the runs",
         )
-
-    def svg(self, buckets: int | None = None, width: float | None = None) -> Svg:
-        """The picture of `chart`."""
-        from ntagen.checker.picture.chart import svg
-
-        return svg(self.chart(buckets, width))
+        if None not in interval:
+            ends = [float(one) for one in interval if one is not None]
+            label = f"interval of the mean, at {percent} confidence"
+            above.axvspan(*ends, color=DARK, alpha=BAND, linewidth=0.0, label=label)
+        if self.mean is not None:
+            above.axvline(self.mean, color=DARK, linewidth=1.0, linestyle="--", label="mean")
+        above.set_ylim(0.0, 1.05 * max(heights))
+        x, value, lower, upper = self._thinned(edges[0], edges[-1])
+        label = f"band for all values at once, at {percent} confidence"
+        add_band(below, x, (lower, upper), label, step="post")
+        label = "share of the runs up to there"
+        below.plot(x, value, color=BLUE, linewidth=1.0, drawstyle="steps-post", label=label)
+        # A rare event is a flat line else.
+        below.set_ylim(0.0, 1.0 if value[-1] >= 0.5 else min(1.0, 1.15 * upper[-1]))
+        said = (f"{start:g} to {end:g}: {height:.4g}" for start, end, height in filled)
+        return picture(figure, zip(bars, said, strict=True))
 
     def _repr_svg_(self) -> str | None:
-        return None if self.count == 0 else self.svg().text
+        return None if self.count == 0 else self.chart().text
 
     @property
     def _alpha(self) -> float:

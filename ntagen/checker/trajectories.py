@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ntagen.checker.picture.chart import Chart
     from ntagen.checker.picture.page import Svg
 
     Floats = NDArray[np.float64]
@@ -97,7 +96,7 @@ class Trajectory:
         return frame_of_trajectories((self,))
 
     def _repr_svg_(self) -> str:
-        return runs_svg((self,), self.query).text
+        return runs_chart((self,), self.query).text
 
     def _pairs(self, text: str) -> Floats:
         import numpy as np
@@ -185,31 +184,20 @@ class OverTime:
                 rows.append({"expression": text, **dict(zip(names, row, strict=True))})
         return frame_of(rows, "`times`, `mean`, `lower` and `upper` have the same")
 
-    def chart(self) -> Chart:
-        """A panel for each expression: the mean in the band of quantiles."""
-        from ntagen.checker.picture.chart import Band, Chart, Line, Panel
+    def chart(self) -> Svg:
+        """A picture with a panel for each expression: the mean in the band of quantiles."""
+        from ntagen.checker.picture.chart import BLUE, panels, picture
 
-        times = self.times.tolist()
-        low, high = (f"{100 * one:g}" for one in self.quantiles)
-        panels = []
-        for text in list(self.mean)[:_MOST_PANELS]:
-            items = (
-                Band(
-                    f"from {low} % to {high} % of the runs",
-                    times,
-                    self.lower[text].tolist(),
-                    self.upper[text].tolist(),
-                ),
-                Line("mean over the runs", times, self.mean[text].tolist()),
-            )
-            panels.append(Panel(_TIME, text, items))
         most = int(self.runs.max(initial=0))
-        return Chart(self.query.strip(), f"mean and quantiles of {most:,} runs", panels)
+        caption = f"mean and quantiles of {most:,} runs"
+        texts = list(self.mean)[:_MOST_PANELS]
+        figure, made = panels(self.query, caption, _TIME, texts)
+        for axes, text in zip(made, texts, strict=True):
+            _draw_mean(axes, self, text, "mean over the runs", BLUE)
+        return picture(figure)
 
     def _repr_svg_(self) -> str:
-        from ntagen.checker.picture.chart import svg
-
-        return svg(self.chart()).text
+        return self.chart().text
 
 
 _TIME: Final = "time [units of the model]"
@@ -280,57 +268,44 @@ def frame_of_trajectories(runs: Iterable[Trajectory]) -> Any:  # noqa: ANN401
     return frame_of(rows, "`Trajectory.times` and `Trajectory.values` have the same")
 
 
-def runs_chart(runs: Sequence[Trajectory], query: str) -> Chart:
+def runs_chart(runs: Sequence[Trajectory], query: str) -> Svg:
     """A panel for each expression: its value in each run over time, and the mean of many.
 
     Raises:
         InputError: There are no runs.
     """
-    from ntagen.checker.picture.chart import (
-        BLUE,
-        DARK,
-        PALE,
-        SERIES,
-        Band,
-        Chart,
-        Item,
-        Line,
-        Panel,
-    )
+    from ntagen.checker.picture.chart import DARK, PALE, SERIES, panels, picture
 
     if not runs:
         raise InputError("no run is shown, so there is nothing to draw")
     is_told_apart = len(runs) <= _MOST_TOLD_APART
     shown = runs[:_MOST_LINES]
     means = None if is_told_apart else over_time(runs, None, (0.05, 0.95), query)
-    panels = []
-    for text in runs[0].expressions[:_MOST_PANELS]:
-        items: list[Item] = []
-        for index, one in enumerate(shown):
-            points = one.points[text]
-            points = points[:: len(points) // _MOST_POINTS + 1]
-            moments, values = ([point[i] for point in points] for i in (0, 1))
-            label = f"run {one.run}" if is_told_apart else ""
-            if not is_told_apart and index == 0:
-                label = "runs" if len(shown) == len(runs) else f"the first {len(shown)} runs"
-            colour = SERIES[index % len(SERIES)] if is_told_apart else PALE
-            items.append(Line(label, moments, values, colour, 1.5 if is_told_apart else 0.8))
-        if means is not None:
-            times = means.times.tolist()
-            ends = (means.lower[text].tolist(), means.upper[text].tolist())
-            items.append(Band("from 5 % to 95 % of the runs", times, *ends, BLUE))
-            items.append(
-                Line(f"mean of {len(runs):,} runs", times, means.mean[text].tolist(), DARK, 2.0)
-            )
-        panels.append(Panel(_TIME, text, items))
     left_out = len(runs[0].expressions) - _MOST_PANELS
     more = f"; {left_out} expressions are left out" if left_out > 0 else ""
     number = "1 run" if len(runs) == 1 else f"{len(runs):,} runs"
-    return Chart(query.strip(), f"{number} over time{more}", panels)
+    texts = runs[0].expressions[:_MOST_PANELS]
+    figure, made = panels(query, f"{number} over time{more}", _TIME, texts)
+    for axes, text in zip(made, texts, strict=True):
+        for index, one in enumerate(shown):
+            points = one.points[text]
+            points = points[:: len(points) // _MOST_POINTS + 1]
+            (line,) = axes.plot(*zip(*points, strict=True))
+            if is_told_apart:
+                line.set(color=SERIES[index], linewidth=1.1, label=f"run {one.run}")
+            else:
+                line.set(color=PALE, linewidth=0.6)
+        if means is not None:
+            line.set_label("runs" if len(shown) == len(runs) else f"the first {len(shown)} runs")
+            _draw_mean(axes, means, text, f"mean of {len(runs):,} runs", DARK)
+    return picture(figure)
 
 
-def runs_svg(runs: Sequence[Trajectory], query: str) -> Svg:
-    """The picture of `runs_chart`."""
-    from ntagen.checker.picture.chart import svg
+def _draw_mean(axes: Any, found: OverTime, text: str, label: str, colour: str) -> None:  # noqa: ANN401
+    """Draws the mean of an expression on axes of matplotlib, in the band of quantiles."""
+    from ntagen.checker.picture.chart import add_band
 
-    return svg(runs_chart(runs, query))
+    low, high = (f"{100 * one:g}" for one in found.quantiles)
+    bounds = (found.lower[text].tolist(), found.upper[text].tolist())
+    add_band(axes, found.times.tolist(), bounds, f"from {low} % to {high} % of the runs")
+    axes.plot(found.times, found.mean[text], color=colour, linewidth=1.4, label=label)

@@ -1,17 +1,25 @@
-"""A picture as a value: an SVG document that notebooks show and that can be saved."""
+"""A picture as a value: an SVG document that notebooks show and that can be saved.
+
+Charts are figures of matplotlib. Diagrams, which are graphs and the charts of runs, are written as
+SVG by the modules of this package: a run has tens of thousands of bars, for which matplotlib takes
+a minute. `page` is the paper on which they stand.
+"""
 
 from __future__ import annotations
 
 import os
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape
 
 from ntagen.errors import InputError
 from ntagen.files import write_files
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 KINDS: Final = ("svg", "png", "pdf")
 """The formats of all pictures, which are the endings of their names."""
@@ -31,7 +39,6 @@ LIGHT: Final = (
 """Colours for things of one kind; light, for dark texts."""
 
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""Characters that an XML document must not contain."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -40,9 +47,11 @@ class Svg:
 
     Attributes:
         text: The SVG document.
+        figure: The figure of a chart; a diagram has none.
     """
 
     text: str
+    figure: Figure | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"<Svg of {len(self.text)} characters>"
@@ -66,10 +75,10 @@ class Svg:
         if kind == "svg":
             write_files({Path(path): self.text})
             return
-        # Matplotlib takes half a second to load, and SVG does not need it.
+        # Matplotlib takes half a second to load, and the SVG of a diagram does not need it.
         from ntagen.checker.picture.figure import converted
 
-        write_files({Path(path): converted(self.text, kind)})
+        write_files({Path(path): converted(self, kind)})
 
 
 def kind_of(path: str | os.PathLike[str], more: Sequence[str] = ()) -> str:
@@ -122,7 +131,12 @@ HEADING_HEIGHT: Final = 26
 
 def safe(text: str) -> str:
     """A text as it stands in an XML document."""
-    return escape(_NOT_XML.sub("\ufffd", text))
+    return escape(without_controls(text))
+
+
+def without_controls(text: str) -> str:
+    """A text without the characters that an XML document must not contain."""
+    return _NOT_XML.sub("\ufffd", text)
 
 
 def shortened(text: str, most: int) -> str:

@@ -2,28 +2,28 @@
 
 A corner is exact; only the last step, to the places on the page, rounds. Where a zone has no end,
 its area goes to the edge of the picture. A bound that belongs to its zone is a line, one that does
-not is dashed, and each line is drawn a little inside, so that neighbours do not cover each other's.
+not is dashed, and each line is drawn inside its area, so that neighbours do not cover each other's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from ntagen.checker.picture.gantt import ticks
-from ntagen.checker.picture.layout import text_width
-from ntagen.checker.picture.page import (
-    HEADING_HEIGHT,
-    LIGHT,
-    MARGIN,
-    Svg,
-    page,
-    safe,
-    shortened,
-)
+import matplotlib as mpl
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon, Rectangle
+
+from ntagen.checker.picture.chart import picture, stacked
+from ntagen.checker.picture.figure import CHART_STYLE
+from ntagen.checker.picture.page import LIGHT, Svg
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes as Plane
 
 Corner = tuple[Fraction, Fraction]
 
@@ -94,15 +94,13 @@ _SIDE: Final = 380
 _STRIP: Final = 56
 """The height of the picture of one clock."""
 _LINE: Final = "#404854"
-_INSIDE: Final = 1.3
-"""How far inside its area a line is drawn."""
-_LEGEND_CHARACTERS: Final = 90
-_ROW: Final = 20
-_FONT_SIZE: Final = 12
-_DASHES: Final = "5 4"
-_STRIPE: Final = 6
+_WIDTH: Final = 1.2
+_UNIT: Final = "[units of the model's time]"
+_HATCHES: Final = ("///", "\\\\\\", "---", "|||", "...", "ooo", "++", "xx")
+"""How areas are striped; of those that overlap, all are seen."""
 
 
+@mpl.rc_context(CHART_STYLE)
 def zones_picture(
     areas: Sequence[Area], axes: Axes, heading: str, notes: Sequence[str], *, striped: bool
 ) -> Svg:
@@ -118,39 +116,47 @@ def zones_picture(
     """
     colors = _colors(areas)
     striped = striped and len(colors) > 1
+    figure, (plane,) = stacked(heading, (_SIDE, _SIDE if axes.y else _STRIP))
+    plane.grid(visible=False)
+    plane.set_facecolor("#fafafa")
+    plane.set_xlim(0.0, float(axes.x_end))
+    plane.set_ylim(0.0, float(axes.y_end))
+    plane.set_xlabel(f"{axes.x} {_UNIT}")
+    if axes.y is None:
+        plane.set_yticks([])
+    else:
+        plane.set_ylabel(f"{axes.y} {_UNIT}")
     paints = {
-        kind: _Paint(f"url(#{_stripe_id(number, colors)})", _darker(color))
-        if striped
-        else _Paint(color, color)
+        kind: _striped(number, _darker(color)) if striped else {"facecolor": color}
         for number, (kind, color) in enumerate(colors.items())
     }
-    height = _SIDE if axes.y else _STRIP
-    frame = _Frame(
-        left=MARGIN + 12 + (max(text_width(axes.y), 40.0) if axes.y else 0.0),
-        top=MARGIN + HEADING_HEIGHT + 6.0,
-        height=height,
-        axes=axes,
-    )
-    parts = [*(_stripes(colors) if striped else ()), *_paper(frame)]
-    for area, zone in reversed(list(_seen(areas, striped=striped))):
-        parts += _zone(zone, area, paints[area.kind], frame)
-    parts += _scales(frame)
-    under = frame.top + height + 54
-    entries = [(one.area, shortened(kind, _LEGEND_CHARACTERS)) for kind, one in paints.items()]
-    parts += _legend(entries, notes, frame.left, under)
-    widest = max([0.0, *(text_width(text) for _, text in entries), *map(text_width, notes)])
-    width = max(frame.left + _SIDE, frame.left + 40 + widest, text_width(heading) * 1.25)
-    bottom = under + _ROW * (len(entries) + len(notes) + 2) + 4
-    box = (0.0, 0.0, width + 2 * MARGIN, bottom + MARGIN)
-    return Svg(page(box, heading, parts, _FONT_SIZE))
+    tips = [
+        (artist, area.note)
+        for area, zone in reversed(list(_seen(areas, striped=striped)))
+        for artist in _zone(plane, zone, axes, paints[area.kind])
+    ]
+    entries: list[tuple[Artist, str]] = [
+        (Rectangle((0.0, 0.0), 1.0, 1.0, **paint), kind) for kind, paint in paints.items()
+    ]
+    entries += [
+        (_bound("-"), "the bound belongs to the zone (<=, >=)"),
+        (_bound("--"), "the bound does not belong to it (<, >)"),
+        *((_bound("none"), note) for note in notes),
+    ]
+    return picture(figure, tips, entries)
 
 
-@dataclass(frozen=True, slots=True)
-class _Paint:
-    """The fill of areas of one kind, and the colour of their lines and points."""
+_Style = Literal["-", "--", "none"]
 
-    area: str
-    line: str
+
+def _bound(style: _Style) -> Line2D:
+    return Line2D([], [], color=_LINE, linewidth=_WIDTH, linestyle=style)
+
+
+def _striped(number: int, color: str) -> dict[str, Any]:
+    """Stripes of a colour, in a direction of their own."""
+    hatch = _HATCHES[number % len(_HATCHES)]
+    return {"facecolor": "none", "edgecolor": color, "linewidth": 0.0, "hatch": hatch}
 
 
 def _colors(areas: Sequence[Area]) -> dict[str, str]:
@@ -196,33 +202,6 @@ def _is_within(zone: Sequence[Half], other: Sequence[Half]) -> bool:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
-    """Where the picture stands on the page."""
-
-    left: float
-    top: float
-    height: float
-    axes: Axes
-
-    def place(self, corner: Corner) -> tuple[float, float]:
-        x = self.left + _SIDE * float(corner[0] / self.axes.x_end)
-        return x, self.top + self.height * (1.0 - float(corner[1] / self.axes.y_end))
-
-    @property
-    def sides(self) -> tuple[Half, ...]:
-        """Where the picture ends; clocks are not negative."""
-        zero = Fraction(0)
-        x_end, y_end = self.axes.x_end, self.axes.y_end
-        return (Half(-1, 0, zero), Half(0, -1, zero), Half(1, 0, x_end), Half(0, 1, y_end))
-
-    @property
-    def corners(self) -> list[Corner]:
-        zero = Fraction(0)
-        x_end, y_end = self.axes.x_end, self.axes.y_end
-        return [(zero, zero), (x_end, zero), (x_end, y_end), (zero, y_end)]
-
-
 def clipped(corners: Sequence[Corner], halves: Sequence[Half]) -> list[Corner]:
     """The corners of the part of a convex polygon that lies in all these halves.
 
@@ -248,150 +227,56 @@ def clipped(corners: Sequence[Corner], halves: Sequence[Half]) -> list[Corner]:
     return left
 
 
-def _zone(zone: Sequence[Half], area: Area, paint: _Paint, frame: _Frame) -> Iterator[str]:
-    corners = clipped(frame.corners, zone)
-    if not corners:
+def _zone(
+    plane: Plane, zone: Sequence[Half], axes: Axes, paint: dict[str, Any]
+) -> Iterator[Artist]:
+    """Draws a zone; gives what shows it."""
+    zero = Fraction(0)
+    whole = ((zero, zero), (axes.x_end, zero), (axes.x_end, axes.y_end), (zero, axes.y_end))
+    corners = clipped(whole, zone)
+    places = [(float(x), float(y)) for x, y in corners]
+    if len(places) > 2:
+        area = plane.add_patch(Polygon(places, zorder=1.0, **paint))
+        yield area
+        ends = pairwise([*zip(corners, places, strict=True), (corners[0], places[0])])
+        for (first, start), (second, end) in ends:
+            limits = [half for half in zone if not half.excess(first) and not half.excess(second)]
+            if any(not half.is_plain for half in limits):
+                style: _Style = "--" if any(half.strict for half in limits) else "-"
+                _line(plane, [start, end], 2.0 * _WIDTH, _LINE, style).set_clip_path(area)
         return
-    places = [frame.place(corner) for corner in corners]
-    tooltip = f"<title>{safe(area.note)}</title>"
-    if len(places) == 1:
-        (x, y) = places[0]
-        yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="{paint.line}" stroke="{_LINE}">'
-        yield f"{tooltip}</circle>"
-        return
+    color = paint.get("edgecolor", paint["facecolor"])
     if len(places) == 2:
-        yield from _line(zone, corners, places, paint.line, tooltip)
-        return
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
-    yield f'<polygon points="{points}" fill="{paint.area}">{tooltip}</polygon>'
-    ends = pairwise([*zip(corners, places, strict=True), (corners[0], places[0])])
-    for (first, start), (second, end) in ends:
-        limits = [half for half in zone if not half.excess(first) and not half.excess(second)]
-        if any(not half.is_plain for half in limits):
-            yield _bound(start, end, strict=any(half.strict for half in limits))
+        # Without an inside, it is a thick line; an end is full if it belongs to the zone.
+        yield _line(plane, places, 5.25, _LINE)
+        yield _line(plane, places, 3.4, color)
+        for corner, other, place in zip(corners, reversed(corners), places, strict=True):
+            limits = [half for half in zone if not half.excess(corner) and half.excess(other)]
+            if limits:
+                is_open = any(half.strict for half in limits)
+                _point(plane, place, 6.0, "#ffffff" if is_open else _LINE)
+    for place in places[:1] if len(places) == 1 else ():
+        yield _point(plane, place, 7.5, color)
 
 
 def _line(
-    zone: Sequence[Half],
-    corners: Sequence[Corner],
-    places: Sequence[tuple[float, float]],
-    fill: str,
-    tooltip: str,
-) -> Iterator[str]:
-    """A zone without an inside; an end is full if it belongs to the zone, and else hollow."""
-    (x1, y1), (x2, y2) = places
-    for color, width in ((_LINE, 7), (fill, 4.5)):
-        yield (
-            f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" '
-            f'stroke="{color}" stroke-width="{width}">{tooltip}</line>'
-        )
-    for corner, other, (x, y) in zip(corners, reversed(corners), places, strict=True):
-        ends = [half for half in zone if not half.excess(corner) and half.excess(other)]
-        if ends:
-            color = "#ffffff" if any(half.strict for half in ends) else _LINE
-            yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4" fill="{color}" stroke="{_LINE}"/>'
+    plane: Plane, ends: Sequence[tuple[float, float]], width: float, color: str, style: _Style = "-"
+) -> Line2D:
+    """A line above what was drawn before, and below what follows."""
+    x, y = zip(*ends, strict=True)
+    line = Line2D(x, y, linewidth=width, color=color, linestyle=style, zorder=1.0)
+    line.set_solid_capstyle("butt")
+    return plane.add_line(line)
 
 
-def _bound(start: tuple[float, float], end: tuple[float, float], *, strict: bool) -> str:
-    (x1, y1), (x2, y2) = start, end
-    length = ((x2 - x1) ** 2 + (y2 - y1) ** 2) ** 0.5 or 1.0
-    # The corners go round against the clock on the page, so that the inside is on the left.
-    aside = (y2 - y1) / length * _INSIDE, -(x2 - x1) / length * _INSIDE
-    dashes = f' stroke-dasharray="{_DASHES}"' if strict else ""
-    return (
-        f'<line x1="{x1 + aside[0]:.1f}" y1="{y1 + aside[1]:.1f}" x2="{x2 + aside[0]:.1f}" '
-        f'y2="{y2 + aside[1]:.1f}" stroke="{_LINE}" stroke-width="1.6"{dashes}/>'
-    )
-
-
-def _stripe_id(number: int, all_kinds: Collection[str]) -> str:
-    """The id of a pattern; in a notebook, several pictures stand on one page."""
-    return f"stripes-{number}-of-{len(all_kinds)}"
-
-
-def _stripes(colors: dict[str, str]) -> Iterator[str]:
-    """Stripes for each colour, each in a place of its own: where areas overlap, all are seen."""
-    yield "<defs>"
-    period = _STRIPE * len(colors)
-    for number, color in enumerate(colors.values()):
-        yield (
-            f'<pattern id="{_stripe_id(number, colors)}" width="{period}" height="{period}" '
-            'patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
-            f'<rect y="{_STRIPE * number}" width="{period}" height="{_STRIPE}" '
-            f'fill="{_darker(color)}"/></pattern>'
-        )
-    yield "</defs>"
+def _point(plane: Plane, place: tuple[float, float], size: float, color: str) -> Line2D:
+    """A point, whole even on the edge of the picture."""
+    (point,) = plane.plot(*place, "o", markersize=size, zorder=1.0, clip_on=False)
+    point.set(markerfacecolor=color, markeredgecolor=_LINE)
+    return point
 
 
 def _darker(color: str) -> str:
     """A colour that is still seen in thin stripes."""
     parts = [int(color[at : at + 2], 16) for at in (1, 3, 5)]
     return "#" + "".join(f"{max(0, round(255 - 1.9 * (255 - part))):02x}" for part in parts)
-
-
-def _paper(frame: _Frame) -> Iterator[str]:
-    yield (
-        f'<rect x="{frame.left:.1f}" y="{frame.top:.1f}" width="{_SIDE}" '
-        f'height="{frame.height}" fill="#fafafa" stroke="#c3c8d0"/>'
-    )
-
-
-def _scales(frame: _Frame) -> Iterator[str]:
-    axes, bottom = frame.axes, frame.top + frame.height
-    for tick in ticks(float(axes.x_end)):
-        x, _ = frame.place((Fraction(tick), Fraction(0)))
-        yield (
-            f'<line x1="{x:.1f}" y1="{bottom}" x2="{x:.1f}" y2="{bottom + 5}" stroke="{_LINE}"/>'
-        )
-        yield (
-            f'<text x="{x:.1f}" y="{bottom + 18}" font-size="11" text-anchor="middle" '
-            f'fill="#404040">{tick:g}</text>'
-        )
-    middle = frame.left + _SIDE / 2
-    unit = "[units of the model's time]"
-    yield (
-        f'<text x="{middle:.1f}" y="{bottom + 35}" text-anchor="middle" fill="#202020">'
-        f"{safe(axes.x)} {unit}</text>"
-    )
-    if axes.y is None:
-        return
-    for tick in ticks(float(axes.y_end)):
-        _, y = frame.place((Fraction(0), Fraction(tick)))
-        yield (
-            f'<line x1="{frame.left - 5:.1f}" y1="{y:.1f}" x2="{frame.left:.1f}" y2="{y:.1f}" '
-            f'stroke="{_LINE}"/>'
-        )
-        yield (
-            f'<text x="{frame.left - 8:.1f}" y="{y + 4:.1f}" font-size="11" text-anchor="end" '
-            f'fill="#404040">{tick:g}</text>'
-        )
-    yield (
-        f'<text x="{frame.left - 6:.1f}" y="{frame.top - 6:.1f}" text-anchor="end" '
-        f'fill="#202020">{safe(axes.y)}</text>'
-    )
-
-
-def _legend(
-    entries: Sequence[tuple[str, str]], notes: Sequence[str], left: float, top: float
-) -> Iterator[str]:
-    for number, (fill, text) in enumerate(entries):
-        y = top + _ROW * number
-        yield (
-            f'<rect x="{left:.1f}" y="{y}" width="26" height="13" fill="{fill}" '
-            f'stroke="{_LINE}" stroke-width="0.8"/>'
-        )
-        yield f'<text x="{left + 36:.1f}" y="{y + 11}" fill="#202020">{safe(text)}</text>'
-    y = top + _ROW * len(entries)
-    for dashes, text in (
-        ("", "the bound belongs to the zone (<=, >=)"),
-        (f' stroke-dasharray="{_DASHES}"', "the bound does not belong to it (<, >)"),
-    ):
-        yield (
-            f'<line x1="{left:.1f}" y1="{y + 7}" x2="{left + 26:.1f}" y2="{y + 7}" '
-            f'stroke="{_LINE}" stroke-width="1.6"{dashes}/>'
-        )
-        yield f'<text x="{left + 36:.1f}" y="{y + 11}" fill="#404040">{safe(text)}</text>'
-        y += _ROW
-    for note in notes:
-        yield f'<text x="{left:.1f}" y="{y + 11}" fill="#606874">{safe(note)}</text>'
-        y += _ROW

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from ntagen.cli.guard import current
 from ntagen.cli.models.options import RUNS
 from ntagen.cli.models.queries import Asked
 from ntagen.cli.models.run_progress import progress_of, say_interrupted
@@ -16,7 +17,7 @@ from ntagen.errors import InputError, LimitError, ModelError
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
-    from ntagen.checker.picture.chart import Chart
+    from ntagen.checker.picture.page import Svg
 
 SETTINGS: Final = (
     *RUNS,
@@ -32,6 +33,10 @@ SETTINGS: Final = (
 
 NAMES: Final = {one.field: f"--set '{one.words} …'" for one in SETTINGS}
 """How each of them is given."""
+
+_DRAWING_S: Final = 3.0
+_DRAWING_BYTES: Final = 200 << 20
+"""Enough to load matplotlib and to draw, on a slow machine too."""
 
 
 def plot_runs(
@@ -51,7 +56,6 @@ def plot_runs(
         LimitError: A limit came before there was anything to draw.
     """
     from ntagen.checker import Interrupted
-    from ntagen.checker.picture.chart import svg
     from ntagen.checker.picture.page import kind_of
 
     kind_of(path)
@@ -71,11 +75,12 @@ def plot_runs(
         if answer.estimate is None and not answer.trajectories:
             raise LimitError(f"{query.text} was {said} before there was anything to draw")
         echo(f"note: {said}: the picture shows the runs until then", err=True)
-    svg(_chart(answer, settings)).save(path)
+        current().allow(_DRAWING_S, _DRAWING_BYTES)
+    _chart(answer, settings).save(path)
     return code
 
 
-def _chart(answer: Answer, settings: dict[str, Any]) -> Chart:
+def _chart(answer: Answer, settings: dict[str, Any]) -> Svg:
     distribution = answer.distribution
     if distribution is not None and distribution.count == 0:
         what = "breaks" if distribution.broken else "reaches"

@@ -178,10 +178,11 @@ def test_steps_of_the_picture_rise_to_the_estimate(model: Model) -> None:
     answer = model.check("Pr[<=10](<> Q.B && x <= 3)", runs=500)
     chart = answer.chart()
     assert chart is not None
-    line = chart.panels[1].items[1]
-    assert all(one <= two for one, two in pairwise(line.y))  # type: ignore[union-attr]
-    assert line.y[-1] == answer.value  # type: ignore[union-attr]
-    assert line.y[0] == 0  # type: ignore[union-attr]
+    assert chart.figure is not None
+    (line,) = chart.figure.axes[1].lines
+    shares = np.asarray(line.get_ydata())
+    assert all(one <= two for one, two in pairwise(shares))
+    assert (shares[0], shares[-1]) == (0, answer.value)
 
 
 def test_a_frame_has_a_row_for_each_value(model: Model, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,8 +28,8 @@ system R, S;
 
 def drawn(*parts: str) -> np.ndarray:
     """The dots of a page of 100 by 100 pixels, each three colours from 0 to 1."""
-    svg = page((0.0, 0.0, 100.0, 100.0), "", parts, 12)
-    dots = imread(io.BytesIO(converted(svg, "png")), format="png")[..., :3]
+    diagram = Svg(page((0.0, 0.0, 100.0, 100.0), "", parts, 12))
+    dots = imread(io.BytesIO(converted(diagram, "png")), format="png")[..., :3]
     assert dots.shape == (200, 200, 3)
     return dots
 
@@ -44,9 +44,6 @@ def test_shapes_stand_where_the_svg_has_them() -> None:
         '<circle cx="70" cy="30" r="10" fill="#00ff00"/>',
         '<polygon points="10,60 40,60 40,90" fill="#0000ff"/>',
         '<line x1="60" y1="80" x2="90" y2="80" stroke="#000000" stroke-width="4"/>',
-        '<g clip-path="url(#frame)">',
-        '<rect x="60" y="60" width="30" height="10" fill="#ff00ff"/></g>',
-        '<clipPath id="frame"><rect x="60" y="60" width="10" height="10"/></clipPath>',
     )
     assert colour_at(dots, 25, 30) == [255, 0, 0]
     assert colour_at(dots, 25, 45) == [255, 255, 255]
@@ -55,8 +52,6 @@ def test_shapes_stand_where_the_svg_has_them() -> None:
     assert colour_at(dots, 35, 65) == [0, 0, 255]
     assert colour_at(dots, 15, 85) == [255, 255, 255]
     assert colour_at(dots, 75, 80) == [0, 0, 0]
-    assert colour_at(dots, 65, 65) == [255, 0, 255]
-    assert colour_at(dots, 80, 65) == [255, 255, 255]
 
 
 def test_later_shapes_cover_earlier_ones() -> None:
@@ -64,19 +59,6 @@ def test_later_shapes_cover_earlier_ones() -> None:
     text = '<text x="20" y="40" font-size="30" fill="#0000ff">$x$</text>'
     assert colour_at(drawn(text, red), 30, 33) == [255, 0, 0]
     assert (drawn(red, text)[40:90, 40:100, 2] > 0.9).any()
-
-
-def test_stripes_fill_their_outline_only() -> None:
-    dots = drawn(
-        '<defs><pattern id="s" width="12" height="12" patternUnits="userSpaceOnUse" '
-        'patternTransform="rotate(45)"><rect y="6" width="12" height="6" fill="#ff0000"/>'
-        "</pattern></defs>",
-        '<rect x="30" y="30" width="40" height="40" fill="url(#s)"/>',
-    )
-    red = (dots[..., 0] > 0.9) & (dots[..., 1] < 0.1)
-    assert not red[:58].any()
-    assert not red[142:].any()
-    assert 0.4 < red[60:140, 60:140].mean() < 0.6
 
 
 @pytest.mark.parametrize("kind", ["png", "pdf"])
