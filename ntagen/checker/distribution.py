@@ -253,7 +253,15 @@ class Distribution:
         Raises:
             InputError: There are no values, or the buckets cannot be made.
         """
-        from ntagen.checker.picture.chart import BAND, BLUE, DARK, add_band, panels, picture
+        from ntagen.checker.picture.chart import (
+            BAND,
+            BLUE,
+            DARK,
+            add_band,
+            add_bars,
+            panels,
+            picture,
+        )
 
         automatic = len((self._known["histogram"] or {"counts": []})["counts"])
         if buckets is None and width is None and automatic > _MOST_BARS:
@@ -273,17 +281,7 @@ class Distribution:
         percent = f"{100 * (1 - self._alpha):g} %"
         heights = histogram.frequencies.tolist()
         filled = [bar for bar in zip(edges, edges[1:], heights, strict=False) if bar[2]]
-        bars = above.bar(
-            [start for start, _, _ in filled],
-            [height for _, _, height in filled],
-            [end - start for start, end, _ in filled],
-            align="edge",
-            color=BLUE,
-            alpha=0.75,
-            edgecolor="white",
-            linewidth=0.4 if len(filled) <= _MOST_BARS else 0.0,
-            label="share of the runs",
-        )
+        tips = add_bars(above, filled, "share of the runs")
         if None not in interval:
             ends = [float(one) for one in interval if one is not None]
             label = f"interval of the mean, at {percent} confidence"
@@ -298,8 +296,7 @@ class Distribution:
         below.plot(x, value, color=BLUE, linewidth=1.0, drawstyle="steps-post", label=label)
         # A rare event is a flat line else.
         below.set_ylim(0.0, 1.0 if value[-1] >= 0.5 else min(1.0, 1.15 * upper[-1]))
-        said = (f"{start:g} to {end:g}: {height:.4g}" for start, end, height in filled)
-        return picture(figure, zip(bars, said, strict=True))
+        return picture(figure, tips)
 
     def _repr_svg_(self) -> str | None:
         return None if self.count == 0 else self.chart().text

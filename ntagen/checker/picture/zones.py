@@ -7,6 +7,7 @@ not is dashed, and each line is drawn inside its area, so that neighbours do not
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -239,11 +240,16 @@ def _zone(
         area = plane.add_patch(Polygon(places, zorder=1.0, **paint))
         yield area
         ends = pairwise([*zip(corners, places, strict=True), (corners[0], places[0])])
+        # The bounds of one style are one line with gaps, which is drawn in less time.
+        bounds: dict[_Style, list[tuple[float, float]]] = {}
         for (first, start), (second, end) in ends:
             limits = [half for half in zone if not half.excess(first) and not half.excess(second)]
             if any(not half.is_plain for half in limits):
                 style: _Style = "--" if any(half.strict for half in limits) else "-"
-                _line(plane, [start, end], 2.0 * _WIDTH, _LINE, style).set_clip_path(area)
+                bounds.setdefault(style, []).extend([start, end, (math.nan, math.nan)])
+        for style, line in bounds.items():
+            # Half of it is outside of the area, and is not seen.
+            _line(plane, line, 2.0 * _WIDTH, _LINE, style).set_clip_path(area)
         return
     color = paint.get("edgecolor", paint["facecolor"])
     if len(places) == 2:

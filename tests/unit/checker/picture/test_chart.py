@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from matplotlib.image import imread
 
-from ntagen.checker.picture.chart import panels, picture
+from ntagen.checker.picture.chart import add_bars, panels, picture
 from ntagen.checker.picture.page import Svg
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -41,6 +41,16 @@ def test_a_legend_has_each_label_once() -> None:
     for axes in made:
         axes.plot([0, 1], [0, 1], label="both")
     assert said(picture(figure).text, "text").count("both") == 1
+
+
+@pytest.mark.parametrize(("count", "tips"), [(3, 3), (1000, 0)])
+def test_bars_have_tooltips_if_one_can_point_at_them(count: int, tips: int) -> None:
+    figure, (axes,) = panels("h", "c", "x", ("y",))
+    notes = add_bars(axes, [(i, i + 1.0, 2.0) for i in range(count)], "bars")
+    svg = picture(figure, notes).text
+    assert len(said(svg, "title")) == 1 + tips
+    assert axes.get_xlim() == (0, count)
+    assert "bars" in said(svg, "text")
 
 
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
