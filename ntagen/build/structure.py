@@ -28,7 +28,6 @@ _TEXTS: Final[dict[type, tuple[str, ...]]] = {
     Query: ("formula", "comment"),
     Outcome: ("outcome", "type", "value"),
 }
-_DRAWN: Final = (Location, BranchPoint, Edge)
 
 Part = Model | Template | Node | Edge | Query | Outcome
 

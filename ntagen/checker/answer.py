@@ -324,13 +324,8 @@ class Answer:
             ends = list(accumulate(lengths))
             yield [tuple(chains[s:e]) for s, e in zip([0, *ends], ends, strict=False)]
 
-    def plans_json(self) -> str | None:
-        """The plans as JSON text with every edge in full; ``None`` without plans."""
-        around = self._raw.around_plans()
-        return None if around is None else "".join(self.plans_json_pieces())
-
     def plans_json_pieces(self) -> Iterator[str]:
-        """The same text in pieces, which are never in memory together."""
+        """The plans as JSON text with every edge in full, in pieces; none without plans."""
         around = self._raw.around_plans()
         if around is None:
             return

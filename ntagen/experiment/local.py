@@ -94,11 +94,6 @@ class LocalCrew:
             worker.close()
         self._idle, self._busy = [], {}
 
-    @property
-    def pids(self) -> list[int]:
-        """The numbers of the processes that are making a block."""
-        return [pid for worker, _ in self._busy.values() if (pid := worker.pid) is not None]
-
 
 class _Worker:
     """A pool of one process, which starts with its first block."""

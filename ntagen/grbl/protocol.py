@@ -30,7 +30,6 @@ MAX_REPLY_BYTES: Final = 512
 
 STATUS: Final = b"?"
 HOLD: Final = b"!"
-RESUME: Final = b"~"
 RESET: Final = b"\x18"
 DOOR: Final = b"\x84"
 JOG_CANCEL: Final = b"\x85"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ntagen.errors import DeviceError
 from ntagen.grbl.emulator import Emulator
 
 
@@ -15,7 +14,6 @@ class SimulatedPort:
 
     def __init__(self, emulator: Emulator) -> None:
         self._emulator = emulator
-        self._is_broken = False
 
     @property
     def name(self) -> str:
@@ -28,7 +26,6 @@ class SimulatedPort:
 
     def read(self, timeout_s: float) -> bytes:
         """Lets time pass until there is something to read, or the time is over."""
-        self._require_whole()
         end_s = self._emulator.now_s + timeout_s
         while not (data := self._emulator.take()):
             if self._emulator.now_s >= end_s:
@@ -38,19 +35,7 @@ class SimulatedPort:
 
     def write(self, data: bytes) -> None:
         """Gives bytes to the emulator now."""
-        self._require_whole()
         self._emulator.feed(data)
 
     def close(self) -> None:
         """Gives the port back; the emulator stays as it is."""
-
-    def break_off(self) -> None:
-        """Breaks the connection, as when the cable is pulled."""
-        self._is_broken = True
-
-    def _require_whole(self) -> None:
-        if self._is_broken:
-            raise DeviceError(
-                "sim: the connection to the controller is broken (input/output error)\n"
-                "hint: check cable and power; measure where the needle is before you go on"
-            )

@@ -40,7 +40,6 @@ from ntagen.needle.channels import (
     padded,
     place,
 )
-from ntagen.needle.circle import CurvaturePrior, fit_circle
 from ntagen.needle.descent import least_squares
 from ntagen.needle.fluctuations import Process, fluctuating, turning
 from ntagen.needle.kinematics import Arc, orthonormal, pushed_to
@@ -506,18 +505,3 @@ def _weights(length_mm: float = _AHEAD_MM) -> _Array:
     left_mm = np.maximum(0.0, length_mm - begins_mm) ** 2
     left_mm -= np.maximum(0.0, length_mm - begins_mm - _STEP_MM) ** 2
     return np.asarray(left_mm / np.sum(left_mm))
-
-
-def pose_from_points(
-    points_mm: _Array, noise_mm: float, prior: CurvaturePrior | None = None
-) -> tuple[Pose, float]:
-    """The pose and the radius that follow from the points of one push, without the entry.
-
-    The position is that of the circle nearest to the last point, the heading the tangent there.
-
-    Raises:
-        ValueError: The points are not an arc (`ntagen.needle.circle.fit_circle`).
-    """
-    fit = fit_circle(points_mm, noise_mm, prior)
-    last = points_mm[-1]
-    return fit.pose_at((float(last[0]), float(last[1]), float(last[2]))), fit.radius_mm

@@ -303,11 +303,6 @@ class PhantomNeedle:
         return self._tissue
 
     @property
-    def base_rad(self) -> float:
-        """The angle of the base; for reports and tests."""
-        return self._base_rad
-
-    @property
     def tip_rad(self) -> float:
         """The angle by which the tip was turned; for reports and tests."""
         return self._tip_rad

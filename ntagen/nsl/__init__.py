@@ -36,7 +36,6 @@ __all__ = [
     "load_with_warnings",
     "loads",
     "loads_task",
-    "loads_with_warnings",
 ]
 
 
@@ -124,14 +123,6 @@ def loads(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
         SourceError: The text has mistakes; the error has all of them.
     """
     return loads_task(text, path, include=include).scene
-
-
-def loads_with_warnings(
-    text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()
-) -> tuple[Scene, tuple[Diagnostic, ...]]:
-    """The scene that a text describes, and the warnings; all else is as in `loads`."""
-    task = loads_task(text, path, include=include)
-    return task.scene, task.warnings
 
 
 def loads_task(text: str, path: str = "<text>", *, include: Sequence[str | Path] = ()) -> Task:

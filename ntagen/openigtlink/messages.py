@@ -316,11 +316,6 @@ class Status:
     name: str = ""
     message: str = ""
 
-    @property
-    def is_ok(self) -> bool:
-        """Whether all is well."""
-        return self.code == 1
-
     def __str__(self) -> str:
         known = STATUS_NAMES[self.code] if self.code < len(STATUS_NAMES) else f"code {self.code}"
         return ", ".join(part for part in (known, self.name, self.message) if part)

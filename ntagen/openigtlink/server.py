@@ -80,15 +80,6 @@ class Server(Closing):
             self._changed.wait_for(lambda: newest() is not None, timeout_s)
             return newest()
 
-    def drop_clients(self) -> None:
-        """Closes all connections; clients may connect again."""
-        with self._changed:
-            clients = list(self._clients)
-        for client in clients:
-            # The thread sees the end of the stream, and closes it.
-            with contextlib.suppress(OSError):
-                client.shutdown(socket.SHUT_RDWR)
-
     def close(self) -> None:
         """Closes everything. It may be called twice."""
         with contextlib.suppress(OSError):

@@ -78,18 +78,40 @@ class Rated:
     is_apart: bool = False
 
 
-def odds_of(plan: Plan, scene: Scene, sampling: Sampling | None = None) -> Odds:
+def odds_of(plan: Plan, scene: Scene, sampling: Sampling | None = None, together: int = 1) -> Odds:
     """What runs say of a plan.
 
     Args:
         plan: Pushes of whole steps, and rolls by whole degrees.
         scene: The scene, with a stochastic tissue.
         sampling: How runs are made; the usual way if it is None.
+        together: The intervals of a kind hold together with those of so many plans.
 
     Raises:
         InputError: The tissue is another one, or the plan is none of the model.
     """
-    return _asked(plan, scene, sampling or Sampling(), 1)
+    from ntagen import checker
+    from ntagen.render import render_plan
+
+    sampling = sampling or Sampling()
+    model = checker.load(render_plan(scene, actions_of(plan, scene), sampling.runs))
+    found: list[Estimate] = []
+    for query in model.queries:
+        answer = model.check(
+            query.text,
+            runs=sampling.runs,
+            seed=sampling.seed,
+            alpha=sampling.risk / together,
+            threads=sampling.threads,
+        )
+        if answer.verdict == "unknown":
+            raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
+        if answer.estimate is None:
+            raise ModelError(f"the model of the plan fails: {answer.message}")
+        found.append(answer.estimate)
+    reach, *others = found
+    touch, clearance_mm = others if others else (None, None)
+    return Odds(reach, touch, clearance_mm)
 
 
 def rated(
@@ -112,7 +134,7 @@ def rated(
     found = []
     for candidate in candidates:
         listen()
-        odds = _asked(candidate.plan, scene, sampling or Sampling(), len(candidates))
+        odds = odds_of(candidate.plan, scene, sampling, len(candidates))
         found.append(Rated(candidate, odds))
     found.sort(key=lambda one: (-one.odds.reach.value, -_clearance_mm(one.odds)))
     least = found[0].odds.reach.lower if found else None
@@ -147,31 +169,6 @@ def actions_of(plan: Plan, scene: Scene) -> tuple[int, ...]:
         else:
             raise InputError("a plan with waits is for regions that move, and not for chance")
     return tuple(actions)
-
-
-def _asked(plan: Plan, scene: Scene, sampling: Sampling, together: int) -> Odds:
-    """What runs say of one of `together` plans; all intervals of a kind hold together."""
-    from ntagen import checker
-    from ntagen.render import render_plan
-
-    model = checker.load(render_plan(scene, actions_of(plan, scene), sampling.runs))
-    found: list[Estimate] = []
-    for query in model.queries:
-        answer = model.check(
-            query.text,
-            runs=sampling.runs,
-            seed=sampling.seed,
-            alpha=sampling.risk / together,
-            threads=sampling.threads,
-        )
-        if answer.verdict == "unknown":
-            raise LimitError(f"no answer from the engine: stopped by {answer.stop}")
-        if answer.estimate is None:
-            raise ModelError(f"the model of the plan fails: {answer.message}")
-        found.append(answer.estimate)
-    reach, *others = found
-    touch, clearance_mm = others if others else (None, None)
-    return Odds(reach, touch, clearance_mm)
 
 
 def _clearance_mm(odds: Odds) -> float:

@@ -36,8 +36,8 @@ from scipy.stats import chi2
 from ntagen.drive.configure import configure
 from ntagen.drive.fitting import settings_for_phantom
 from ntagen.drive.torsion import Compensated, Lag
-from ntagen.needle.circle import CurvaturePrior
-from ntagen.needle.estimate import Estimator, pose_from_points
+from ntagen.needle.circle import CurvaturePrior, fit_circle
+from ntagen.needle.estimate import Estimator
 from ntagen.needle.kinematics import bending_axis, orthonormal, push
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom import PhantomNeedle
@@ -315,7 +315,7 @@ def predict_trace(points: _Array, results: dict[str, Results]) -> None:
     with errors of 3 and 20 degrees.
     """
     expected = CurvaturePrior(1.0 / TRACE_RADIUS_MM, 0.1 / TRACE_RADIUS_MM)
-    entry, _ = pose_from_points(points[15::-1], 0.1, expected)
+    entry = fit_circle(points[15::-1], 0.1, expected).pose_at(points[0].tolist())
     back = Pose(entry.position_mm, scale(-1.0, entry.heading), entry.bevel)
     sensing = replace(BASE, noise_mm=0.03)
     usual = priors_for(Needle(ENTRY, TRACE_RADIUS_MM, 1.0), sensing)

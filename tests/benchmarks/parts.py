@@ -171,7 +171,7 @@ def _axes(pose: Pose) -> np.ndarray:  # type: ignore[type-arg]
 def driven(job: Job) -> End:
     """Makes a drive."""
     task = drawn_task(job.task, job.radii)
-    scene, _ = nsl.loads_with_warnings(text_of(task))
+    scene = nsl.loads(text_of(task))
     configuration = configure((), scene, job.known, "phantom")
     settings = CHANGES.get(job.without, lambda one: one)(configuration.settings)
     if job.timeout_s is not None:
@@ -203,7 +203,7 @@ def driven(job: Job) -> End:
 
 def has_plan(task: int, radii: tuple[float, float]) -> bool:
     """Whether a task has a plan from the entry."""
-    scene, _ = nsl.loads_with_warnings(text_of(drawn_task(task, radii)))
+    scene = nsl.loads(text_of(drawn_task(task, radii)))
     return synthesiser_for(Settings())(scene).best is not None
 
 

@@ -113,7 +113,7 @@ def main() -> None:
     ratios, bounds = [], []
     for number in range(arguments.first, arguments.first + arguments.count):
         task = drawn_task(number, (least, most))
-        scene, _ = nsl.loads_with_warnings(text_of(task))
+        scene = nsl.loads(text_of(task))
         best = chosen(scene)
         bounds.append(best.path_error_mm)
         said, seconds = verdict(scene, best.per_mm)

@@ -114,7 +114,7 @@ def main() -> None:
     found = Found()
     for number in range(arguments.first, arguments.first + arguments.count):
         task = replace(drawn_task(number, (least, most)), spins=spins)
-        scene, _ = nsl.loads_with_warnings(text_of(task))
+        scene = nsl.loads(text_of(task))
         plain = replace(scene, limits=replace(scene.limits, spins=()))
         verdicts = {}
         for word, one in (("without", plain), ("with", scene)):

@@ -26,6 +26,7 @@ from ntagen.tracking.live import Source
 from ntagen.tracking.look import look
 from ntagen.tracking.simulated import FORCE, NEEDLE, SimulatedTracker, packets_of
 from tests.faults.catalogue import Fault
+from tests.faults.connections import drop_clients
 from tests.faults.exchanges import DamagedPort, Wire, changed_messages, changed_replies
 from tests.faults.rig import Reading, Rig
 from tests.faults.runs import run
@@ -113,7 +114,7 @@ def exchange_with_tracker(seed: int) -> bool:
                 found = tracker.measure()
                 assert all(map(math.isfinite, found.position_mm)), seed
                 if draw.random() < 0.1:
-                    tracker.server.drop_clients()
+                    drop_clients(tracker.server)
         except DeviceError as error:
             check_message(error)
             return False

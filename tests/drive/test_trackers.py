@@ -35,6 +35,7 @@ from ntagen.tracking.live import LiveTracker, Source
 from ntagen.tracking.mount import Mount
 from ntagen.tracking.plausible import Plausible
 from ntagen.tracking.simulated import NEEDLE, SimulatedTracker
+from tests.faults.connections import drop_clients
 
 ROOT = Path(__file__).parents[2]
 PAPER = str(ROOT / "examples" / "paper.nsl")
@@ -341,7 +342,7 @@ class Failing:
             case "vanishes":
                 self.tracker.server.close()
             case "hangs up":
-                self.tracker.server.drop_clients()
+                drop_clients(self.tracker.server)
             case "wrong checksums":
                 self.tracker.server.send_bytes(bytes(data))
             case "no number":

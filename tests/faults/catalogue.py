@@ -19,6 +19,7 @@ from ntagen.errors import DeviceError, LimitError, ModelError
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import add, scale
 from ntagen.scene import Vector
+from tests.faults.connections import pull_cable
 from tests.faults.rig import Reading, Rig
 
 Strike = Callable[[Rig, random.Random], None]
@@ -198,7 +199,7 @@ _OFF = "jumped|where the tracker sees this one|as if the needle bent"
 _FAULTED, _LIMIT, _INTERRUPTED = State.FAULTED, State.TIMED_OUT, State.INTERRUPTED
 
 FAULTS: Final = (
-    Fault("serial EIO", _controller(lambda r: r.device.port.break_off()), _FAULTED, "broken"),
+    Fault("serial EIO", _controller(lambda r: pull_cable(r.device.port)), _FAULTED, "broken"),
     Fault(
         "silence",
         _controller(lambda r: setattr(r.emulator.faults, "is_silent", True)),

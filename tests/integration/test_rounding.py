@@ -42,13 +42,13 @@ def has_strategy(scene: Scene) -> bool | None:
 
 def test_a_chosen_resolution_finds_the_plans_that_a_coarse_one_loses() -> None:
     assert has_plan(TASK, 0.1)
-    scene, warnings = nsl.loads_with_warnings(WIDE)
-    assert warnings == ()
+    wide = nsl.loads_task(WIDE)
+    scene = wide.scene
+    assert wide.warnings == ()
     assert has_strategy(scene)
-    coarse, (warning,) = nsl.loads_with_warnings(
-        WIDE.replace("swept", "swept  resolution 1000 per mm")
-    )
-    assert not has_strategy(coarse)
+    coarse = nsl.loads_task(WIDE.replace("swept", "swept  resolution 1000 per mm"))
+    (warning,) = coarse.warnings
+    assert not has_strategy(coarse.scene)
     assert warning.code == "N096"
     assert f"write `{chosen(scene).per_mm} per mm`" in (warning.hint or "")
 

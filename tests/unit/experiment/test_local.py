@@ -40,12 +40,16 @@ class Deadly(LocalCrew):
         while not self.killed and not self._is_in_the_middle():
             pass
         if not self.killed:
-            os.kill(self.pids[0], signal.SIGKILL)
+            os.kill(self._pids()[0], signal.SIGKILL)
             self.killed = 1
         return super().wait()
 
+    def _pids(self) -> list[int]:
+        """The numbers of the processes that are making a block."""
+        return [pid for worker, _ in self._busy.values() if (pid := worker.pid) is not None]
+
     def _is_in_the_middle(self) -> bool:
-        return bool(self.pids) and any((self._folder / "runs").glob(".*.part"))
+        return bool(self._pids()) and any((self._folder / "runs").glob(".*.part"))
 
 
 def made(

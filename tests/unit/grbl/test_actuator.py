@@ -16,6 +16,7 @@ from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
 from ntagen.grbl.emulator import Emulator
 from ntagen.grbl.memory import Memory
 from ntagen.grbl.simulated import SimulatedPort
+from tests.faults.connections import pull_cable
 
 AXES = {
     GRBL_11H.name: Axes(insert=Axis("X"), roll=Axis("Y", sign=-1), roll_deg_per_s=90.0),
@@ -231,7 +232,7 @@ FAULTS: dict[str, tuple[Callable[[Bench], None], str]] = {
     "alarm": (lambda b: b.emulator.raise_alarm(1), r"ALARM:1 \(a limit switch was hit\)"),
     "reset": (lambda b: b.let_go("\x18", 0.0), r"ALARM:3|was reset"),
     "power cut": (lambda b: b.emulator.power_on(), "the controller was reset"),
-    "cable pulled": (lambda b: b.port.break_off(), "connection to the controller is broken"),
+    "cable pulled": (lambda b: pull_cable(b.port), "connection to the controller is broken"),
     "hold button": (lambda b: b.let_go("!", 0.0), "ended too early|was interrupted|not idle"),
     "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|not idle"),
 }

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ntagen.needle.channels import ENTRY as AT_ENTRY
 from ntagen.needle.channels import place
-from ntagen.needle.estimate import Estimate, Estimator, Priors, _ends, pose_from_points
+from ntagen.needle.estimate import Estimate, Estimator, Priors, _ends
 from ntagen.needle.kinematics import bending_axis, orthonormal, push, roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.phantom import PhantomNeedle
@@ -131,17 +131,6 @@ def test_the_same_history_gives_the_same_estimate() -> None:
 def test_any_history_without_errors_is_followed_exactly(moves: Moves) -> None:
     estimate, true = driven(moves, Errors())
     check_pose(estimate, true, 1e-5, 1e-5)
-
-
-def test_points_alone_give_the_pose_of_a_long_arc() -> None:
-    needle = VirtualNeedle(Needle(ENTRY, 30.0, 1.0), (), Errors(0.1), 1, SimulatedClock())
-    points = []
-    for _ in range(80):
-        needle.push(0.25)
-        points.append(needle.measure().position_mm)
-    pose, radius_mm = pose_from_points(np.array(points), 0.1)
-    assert radius_mm == pytest.approx(30.0, abs=3.0)
-    assert dot(pose.heading, needle.true_tip.heading) > math.cos(math.radians(3.0))
 
 
 def test_without_drift_the_curvature_is_one_for_all() -> None:

@@ -179,7 +179,7 @@ def test_the_compensation_brings_the_tip_to_the_angle() -> None:
         before = needle.tip_rad
         actuator.roll(math.radians(angle))
         assert math.degrees(needle.tip_rad - before) == pytest.approx(angle)
-        assert needle.base_rad == pytest.approx(needle.tip_rad)
+        assert needle._base_rad == pytest.approx(needle.tip_rad)
 
 
 def test_a_push_after_a_pull_follows_the_old_channel() -> None:

@@ -133,17 +133,17 @@ def test_a_lag_that_is_made_up_for_changes_nothing() -> None:
     Spun(Compensated(needle, Lag(math.radians(45.0)))).spin(60.0, 0.5)
     Spun(free).spin(60.0, 0.5)
     assert distance(needle.true_tip.position_mm, free.true_tip.position_mm) < 0.1
-    assert needle.base_rad == pytest.approx(needle.tip_rad, abs=0.02)
+    assert needle._base_rad == pytest.approx(needle.tip_rad, abs=0.02)
 
 
 def test_the_shaft_does_not_wind_up() -> None:
     needle = phantom()
     Spun(needle).spin(9.0, 0.5)
-    assert needle.base_rad == pytest.approx(TURN)
+    assert needle._base_rad == pytest.approx(TURN)
     Spun(needle)
     other = phantom()
     Spun(other).spin(10.0, 0.5)
-    assert other.base_rad == pytest.approx(0.0, abs=1e-9)
+    assert other._base_rad == pytest.approx(0.0, abs=1e-9)
 
 
 # --------------------------------------------------------------------------------------- estimator

@@ -40,7 +40,7 @@ def test_examples_of_files_are_in_the_standard_layout() -> None:
 @pytest.mark.parametrize(("kind", "text"), [e for e in EXAMPLES if e[0] != IN_FILES])
 def test_example_is_right(kind: str, text: str, tmp_path: Path) -> None:
     (tmp_path / "lets.nsl").write_text("let width = 3 mm\n", "utf-8")
-    _, warnings = nsl.loads_with_warnings(FRAMES[kind] % text, str(tmp_path / "env.nsl"))
+    warnings = nsl.loads_task(FRAMES[kind] % text, str(tmp_path / "env.nsl")).warnings
     assert warnings == ()
 
 

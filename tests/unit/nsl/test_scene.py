@@ -61,7 +61,8 @@ def test_published_instance_stays_right_without_a_region(keyword: str) -> None:
     lines = (EXAMPLES / "paper.nsl").read_text("utf-8").splitlines(keepends=True)
     rest = [line for line in lines if not line.lstrip().startswith(keyword)]
     assert len(rest) == len(lines) - 1
-    scene, warnings = nsl.loads_with_warnings("".join(rest))
+    task = nsl.loads_task("".join(rest))
+    scene, warnings = task.scene, task.warnings
     assert len(scene.regions) == 2
     assert warnings == ()
 

@@ -28,6 +28,7 @@ from ntagen.openigtlink.messages import (
 from ntagen.openigtlink.packets import HEADER, Counts, Packet
 from ntagen.openigtlink.samples import Policy, Statistics
 from ntagen.openigtlink.server import Server
+from tests.faults.connections import drop_clients
 
 WAIT_S = 10.0
 QUICK = Policy(stale_s=0.25, first_delay_s=0.01, longest_delay_s=0.05)
@@ -217,7 +218,7 @@ def test_a_server_that_vanishes_is_noticed_and_found_again(server: Server) -> No
     with connected(server, PATIENT) as client:
         server.send(Packet("N", at(1.0)))
         assert client.pose("N").content == at(1.0)
-        server.drop_clients()
+        drop_clients(server)
         assert wait_until(lambda: client.statistics().connections == 2)
         # The sample of the lost connection is not used again.
         assert client.devices() == ()
@@ -231,7 +232,7 @@ def test_without_reconnecting_the_loss_is_told_at_once(server: Server) -> None:
     with connected(server, policy) as client:
         server.send(Packet("N", at(1.0)))
         last = client.pose("N")
-        server.drop_clients()
+        drop_clients(server)
         with pytest.raises(DeviceError, match="has closed the connection"):
             client.pose("N", after_s=last.received_s)
 

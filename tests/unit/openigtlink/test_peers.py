@@ -32,6 +32,7 @@ from ntagen.openigtlink.messages import (
 from ntagen.openigtlink.packets import HEADER, Counts, Decoder, Packet
 from ntagen.openigtlink.samples import Policy
 from ntagen.openigtlink.server import Server
+from tests.faults.connections import drop_clients
 
 ROOT = Path(__file__).parents[3]
 PEERS = Path(__file__).parent / "peers"
@@ -211,7 +212,7 @@ def test_the_reference_library_reads_our_messages(reference: Path) -> None:
             )
             server.send_bytes(bytes(broken) + HEADER.pack(1, b"OTHER", b"O", 0, 3, 0) + b"abc")
             server.send(Packet("X", Text("over")))
-            server.drop_clients()
+            drop_clients(server)
             out, _ = peer.communicate(timeout=WAIT_S)
     assert out.splitlines() == [
         "TRANSFORM T 7.80000000 1 2 3 4 5 6 7 8 9 10 11 12",

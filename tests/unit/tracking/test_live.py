@@ -30,6 +30,7 @@ from ntagen.tracking import frames
 from ntagen.tracking.frames import IDENTITY
 from ntagen.tracking.live import LiveTracker, Source, require_frame
 from ntagen.tracking.mount import Mount
+from tests.faults.connections import drop_clients
 
 WAIT_S = 10.0
 PATIENT = Policy(stale_s=WAIT_S)
@@ -109,7 +110,7 @@ def test_a_server_that_sends_changes_only_is_not_stale(server: Server) -> None:
         first = measured(server, live, Packet("N", at(1.0)))
         threading.Event().wait(2 * QUICK.stale_s)
         assert live.measure().position_mm == first.position_mm
-        server.drop_clients()
+        drop_clients(server)
         # The sample of a lost connection says nothing, but the loss takes a moment to arrive.
         assert any(fails(live) for _ in range(1000))
 
