@@ -54,7 +54,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.charts": {"errors", "checker.picture"},
     "checker.winning": {"errors", "checker.picture"},
     "checker.distribution": {"errors", "frames", "checker.picture"},
-    "checker.interrupted": {"checker.answer"},
     "checker.trajectories": {"errors", "frames", "checker.picture"},
     "checker.queries": set(),
     "checker.expectation": {"checker.queries"},
@@ -76,13 +75,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.constants": set(),
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.constants", "checker.interrupted"}
+    | {"checker.constants"}
     | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
     | {"checker.expectation"}
     | {"checker.options", "checker.query_form", "checker.states"}
-    | {"checker.distribution", "checker.interrupted", "checker.trajectories"},
+    | {"checker.distribution", "checker.trajectories"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},

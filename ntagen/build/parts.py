@@ -12,10 +12,7 @@ were read.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeAlias
-
-if TYPE_CHECKING:
-    pass
+from typing import Final, Literal, TypeAlias
 
 Point: TypeAlias = tuple[float, float]
 """x and y in the units of UPPAAL's editor, x to the right and y down."""
@@ -169,3 +166,21 @@ def shown(part: object, head: str, names: tuple[str, ...]) -> str:
         *(f"{name}={value!r}" for name, value in given if value not in ("", None, False)),
     ]
     return f"{type(part).__name__}({', '.join(shown)})"
+
+
+# The names that UPPAAL's XML has for the labels of locations and edges.
+
+LOCATION_LABELS: Final[dict[str, LabelKind]] = {
+    "invariant": "invariant",
+    "exponentialrate": "rate",
+    "comments": "comment",
+}
+
+EDGE_LABELS: Final[dict[str, LabelKind]] = {
+    "select": "select",
+    "guard": "guard",
+    "synchronisation": "sync",
+    "assignment": "update",
+    "probability": "weight",
+    "comments": "comment",
+}

@@ -17,9 +17,17 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
-from ntagen.build.labels import EDGE_LABELS, LOCATION_LABELS
 from ntagen.build.model import Model, Outcome, Query
-from ntagen.build.parts import BranchPoint, Edge, LabelKind, Location, Node, Point
+from ntagen.build.parts import (
+    EDGE_LABELS,
+    LOCATION_LABELS,
+    BranchPoint,
+    Edge,
+    LabelKind,
+    Location,
+    Node,
+    Point,
+)
 from ntagen.build.template import Template
 from ntagen.errors import InputError
 from ntagen.files import MODEL_BYTES, read_file

@@ -11,9 +11,16 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from ntagen.build.arranging import arranged
-from ntagen.build.labels import EDGE_LABELS, LOCATION_LABELS
 from ntagen.build.model import Model, Outcome, Query
-from ntagen.build.parts import BranchPoint, Edge, LabelKind, Location, Point
+from ntagen.build.parts import (
+    EDGE_LABELS,
+    LOCATION_LABELS,
+    BranchPoint,
+    Edge,
+    LabelKind,
+    Location,
+    Point,
+)
 from ntagen.build.structure import require_structure
 from ntagen.build.template import Template
 from ntagen.checker.picture import diagram

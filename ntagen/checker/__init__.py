@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ntagen.checker.answer import Answer, Estimate, Extreme, Place, Value, Verdict
+from ntagen.checker.answer import Answer, Estimate, Extreme, Interrupted, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.expectation import Expected, expected_of, is_as_expected, remark_of
-from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.model import (
     HEURISTICS,
     Model,

@@ -10,11 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ntagen import _checker
-from ntagen.checker.answer import Answer
+from ntagen.checker.answer import Answer, Interrupted
 from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeTable
 from ntagen.checker.errors import RejectedError, failing, rejecting
-from ntagen.checker.interrupted import Interrupted
 from ntagen.checker.options import CodeEngine, Options, by_keywords
 from ntagen.checker.queries import Query, queries_from
 from ntagen.checker.query_form import form_of

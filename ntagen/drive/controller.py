@@ -44,9 +44,9 @@ from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import Moves, pieces
 from ntagen.drive.planning import Lack, Planner
 from ntagen.drive.posterior import promise_of
+from ntagen.drive.prospect import is_enough, is_surely_in
 from ntagen.drive.records import Ended, Journal, Predicted, Promised, Record, Relied
 from ntagen.drive.reliance import relies_on
-from ntagen.drive.reserve import is_enough, is_surely_in
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import Event, State
 from ntagen.drive.steering import Steering

@@ -18,7 +18,7 @@ import numpy as np
 from ntagen.drive.settings import Settings
 from ntagen.errors import DeviceError
 from ntagen.needle.estimate import RECENT, Estimate
-from ntagen.needle.noise import squared_length_bound
+from ntagen.needle.measurement import squared_length_bound
 from ntagen.needle.vectors import subtract
 from ntagen.scene import Vector
 

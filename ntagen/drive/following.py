@@ -29,7 +29,7 @@ from ntagen.drive.deviation import window
 from ntagen.drive.pieces import pieces
 from ntagen.drive.settings import Settings
 from ntagen.needle.kinematics import Arc, orthonormal, roll
-from ntagen.needle.noise import squared_length_bound
+from ntagen.needle.measurement import squared_length_bound
 from ntagen.needle.path import Path
 from ntagen.plan.actions import Action, Push, Roll
 from ntagen.plan.branches import arc_of

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ntagen.drive.settings import Settings
 from ntagen.errors import NtagenError
 from ntagen.needle.estimate import Estimate
-from ntagen.needle.noise import squared_length_bound
+from ntagen.needle.measurement import squared_length_bound
 from ntagen.plan.against_tissue import defend
 from ntagen.plan.closed_loop import Segment
 from ntagen.scene import Scene, Tissue

@@ -1,4 +1,6 @@
-"""Which plan to follow: one after whose first part the target can still be reached if it fails.
+"""Which plan to follow, and whether it has enough reserve for what the estimator does not know.
+
+The driver follows one after whose first part the target can still be reached if it fails.
 
 Plans are ranked by the `Prospects` of the place at which the driver looks at its plan again, and
 among those that are alike as before. Beside the plans that the engine has found, those are looked
@@ -17,11 +19,11 @@ import numpy as np
 from ntagen.drive.settings import Settings
 from ntagen.needle.estimate import Estimate
 from ntagen.plan.actions import Plan, Push, Roll
-from ntagen.plan.certify import certify
+from ntagen.plan.certify import Certificate, certify
 from ntagen.plan.prospects import Judged, Place, Prospects, first_part
 from ntagen.plan.rank import Candidate, rank
 from ntagen.plan.synthesise import Synthesis
-from ntagen.scene import Scene
+from ntagen.scene import Region, Scene
 
 _MOST_RATIO: Final = 0.5
 """The driver looks at a plan again when half of the way is left, at the latest."""
@@ -123,3 +125,44 @@ class _Judge:
             self._scene.limits.max_rolls - first.roll_count - first.spin_changes,
             spin,
         )
+
+
+_SIGMAS: Final = 1.0
+"""So many standard deviations of the tip's position are enough reserve."""
+
+_SURE_SIGMAS: Final = 3.0
+"""The tip is surely in a target if it is this many standard deviations deep in it."""
+
+
+def is_enough(certificate: Certificate, estimate: Estimate, most_mm: float = math.inf) -> bool:
+    """Whether a plan from the tip has enough reserve, at each region and in the last target.
+
+    The needle will be off its plan by about what the estimator says of a push that long
+    (`Estimate.position_std_mm`). A plan whose distances to regions, and whose depth in the last
+    target, are not greater than that will probably fail. It may hold now. But when it fails, the
+    tip can be at a place from which there is no other plan, and the needle must be pulled back. So
+    the driver looks for a better plan early.
+
+    Args:
+        certificate: The plan's certificate.
+        estimate: The estimate of the tip, or of one that is known as well.
+        most_mm: More than this is never needed.
+    """
+
+    def needed_mm(length_mm: float) -> float:
+        return min(most_mm, _SIGMAS * estimate.position_std_mm(length_mm))
+
+    end_mm = needed_mm(certificate.length_mm)
+    if certificate.target_depth_mm < end_mm:
+        return False
+    return all(
+        # A path is never known worse on the way than at its end.
+        one.distance_mm >= end_mm or one.distance_mm >= needed_mm(one.at_mm)
+        for one in certificate.clearances
+    )
+
+
+def is_surely_in(target: Region, estimate: Estimate, depth_mm: float) -> bool:
+    """Whether the tip is surely in a target, and at least this deep."""
+    inside_mm = -target.distance_mm(estimate.tip.position_mm)
+    return inside_mm >= max(depth_mm, _SURE_SIGMAS * estimate.position_std_mm(0.0))

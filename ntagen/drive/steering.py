@@ -11,20 +11,22 @@ commands after it.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 from ntagen.drive.device import Device, Halted, require_finite, rest, settle, spin_on
-from ntagen.drive.lateness import Lateness
-from ntagen.drive.reach import Reach
 from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import bent_last_mm, push_seconds
 from ntagen.drive.torsion import Lag
+from ntagen.errors import DeviceError
 from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path, sample_poses
+from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Push
 from ntagen.scene import SHAFT_SPACING_MM, Needle, Vector
 
@@ -32,6 +34,100 @@ _ROLL_NEGLIGIBLE_RAD: Final = 1e-9
 
 _ROLL_SMALL_RAD: Final = math.radians(10.0)
 """A tip whose bend differs by less from that of its channel follows the channel; ours."""
+
+
+_KEPT: Final = 16
+"""So many motions are kept: those of some seconds, and no tracker is believed that is so late."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    began_s: float
+    from_mm: float
+    to_mm: float
+    speed_mm_per_s: float
+
+
+class Lateness:
+    """The last motions along the channel: where the tip was when a position was measured.
+
+    A tracker is late: its values hold for `Measurement.time_s`, and the needle may have moved
+    since. Only times are used that the log has, so that a replay finds the same.
+    """
+
+    def __init__(self) -> None:
+        self._motions: deque[_Motion] = deque(maxlen=_KEPT)
+
+    def note(self, began_s: float, from_mm: float, to_mm: float, speed_mm_per_s: float) -> None:
+        """Notes a push or a pull from one depth to another, when it is over."""
+        self._motions.append(_Motion(began_s, from_mm, to_mm, speed_mm_per_s))
+
+    def depth_mm(self, time_s: float) -> float | None:
+        """The depth of the tip at a time; None before the motions that are known."""
+        for motion in reversed(self._motions):
+            if time_s >= motion.began_s:
+                went_mm = motion.speed_mm_per_s * (time_s - motion.began_s)
+                if motion.to_mm > motion.from_mm:
+                    return min(motion.to_mm, motion.from_mm + went_mm)
+                return max(motion.to_mm, motion.from_mm - went_mm)
+        return self._motions[0].from_mm if self._motions else None
+
+
+_SIGMAS: Final = 8.0
+"""The difference of two readings is longer than this by noise alone once in 10^6 runs: it has twice
+the variance, in three directions."""
+
+_TISSUE_MM: Final = 3.0
+"""Tissue that is pressed or breathes carries the tip by this much between two readings; ours."""
+
+
+class Reach:
+    """What the next measured position can be, by the motions that were commanded.
+
+    Between two measurements the tip moves at most as far as the needle was pushed and pulled,
+    whatever the tissue does. A position that is farther away than that, and than noise explains, is
+    wrong: the tracker takes another tool for the needle, or its reference was moved. To steer by it
+    would be to steer another needle.
+
+    A tracker may show the needle as it was before its last motion, so the motions since the
+    measurement before the last one count.
+
+    Args:
+        settings: The noise of the tracker, and the deviation that is allowed.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        priors = settings.priors
+        noise_mm = priors.noise_mm + priors.distortion_mm
+        tissue_mm = max(_TISSUE_MM, settings.deviation_mm)
+        self._spare_mm = tissue_mm + settings.overrun_mm + _SIGMAS * noise_mm
+        self._last: Measurement | None = None
+        self._way_mm = 0.0
+        self._way_before_mm = 0.0
+
+    def moved(self, length_mm: float) -> None:
+        """Notes a push or a pull of at most this length."""
+        self._way_mm += length_mm
+
+    def require(self, found: Measurement) -> None:
+        """Takes a measurement.
+
+        Raises:
+            DeviceError: The tip cannot be there.
+        """
+        last, self._last = self._last, found
+        way_mm = self._way_mm + self._way_before_mm
+        self._way_before_mm, self._way_mm = self._way_mm, 0.0
+        if last is None:
+            return
+        jump_mm = distance(found.position_mm, last.position_mm)
+        if not jump_mm <= way_mm + self._spare_mm:
+            raise DeviceError(
+                f"the measured tip jumped by {jump_mm:.1f} mm, but the needle was moved by "
+                f"{way_mm:.2f} mm at most; {self._spare_mm:.1f} mm more is allowed\n"
+                "hint: does the tracker take another tool for the needle, was its reference moved, "
+                "or has it more noise than the settings say?"
+            )
 
 
 class Steering:

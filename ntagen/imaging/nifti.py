@@ -13,7 +13,6 @@ import zlib
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen.imaging.mistakes import ImageError
-from ntagen.imaging.optional import package
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.volumes import Encoding, Packed, Volume, refuse_many, unpacking
 
@@ -43,7 +42,15 @@ def read_nifti(path: str, matrix: Matrix | None) -> Volume:
         ImageError: It cannot be read, or does not say where its voxels are.
     """
     data = bytes_of(path, MOST_BYTES)
-    nibabel = package("nibabel", "NIfTI files")
+    try:
+        # Who reads no such file does not need it.
+        import nibabel
+    except ImportError as error:
+        raise ImageError(
+            "package-missing",
+            "NIfTI files are read by the package nibabel, which is not installed",
+            "install it with `python -m pip install 'ntagen[imaging]'`",
+        ) from error
     encoding: Encoding = "gzip" if data[:2] == b"\x1f\x8b" else "raw"
     header = _header(path, nibabel, data, encoding)
     try:

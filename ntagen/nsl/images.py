@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, cast
 
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, DraftImage, DraftRegion, Placed
-from ntagen.nsl.paths import is_below
+from ntagen.nsl.reading import is_below
 from ntagen.nsl.source import Span
 from ntagen.shapes import Field, Shape
 

@@ -91,3 +91,8 @@ def _nearby(path: str) -> str | None:
     except (OSError, ValueError):
         return None
     return did_you_mean(name, names, cutoff=0.75)
+
+
+def is_below(path: str, folder: str) -> bool:
+    """Whether a file lies below a folder; links have been followed in both paths."""
+    return path.startswith(folder if folder.endswith(os.sep) else folder + os.sep)

@@ -20,9 +20,8 @@ from ntagen.nsl.draft import Draft
 from ntagen.nsl.driving import CHOICES, DriverResolver
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
-from ntagen.nsl.paths import is_below
 from ntagen.nsl.quantity import Quantity, is_unit, scalar
-from ntagen.nsl.reading import read_source
+from ntagen.nsl.reading import is_below, read_source
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
 from ntagen.parameters import BY_WORDS

@@ -22,8 +22,41 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from ntagen.errors import DeviceError
-from ntagen.openigtlink.crc import crc64
 from ntagen.openigtlink.messages import TYPES, Content, MalformedError, fixed, packed, until_zero
+
+POLYNOMIAL: Final = 0x42F0E1EBA9EA3693
+"""Of ECMA-182."""
+
+_MASK: Final = 2**64 - 1
+
+
+def _entry(index: int) -> int:
+    """The checksum of one byte."""
+    value = index << 56
+    for _ in range(8):
+        value = (value << 1) ^ (POLYNOMIAL if value >> 63 else 0)
+        value &= _MASK
+    return value
+
+
+_TABLE: Final = tuple(_entry(index) for index in range(256))
+
+
+def crc64(data: bytes, start: int = 0) -> int:
+    """The checksum of bytes: CRC-64, as of the whole body of a message.
+
+    The start value is 0, the most significant bit comes first, and there is no final inversion
+    (openigtlink.org/protocols/v2_header.html).
+
+    Args:
+        data: The bytes.
+        start: The checksum of the bytes before them.
+    """
+    value = start
+    for byte in data:
+        value = ((value << 8) & _MASK) ^ _TABLE[(value >> 56) ^ byte]
+    return value
+
 
 HEADER: Final = struct.Struct(">H12s20sQQQ")
 """Version, type, device, time stamp, size of the body, checksum of the body."""

@@ -182,3 +182,18 @@ def summary(answer: Answer, cpu_ms: int, memory_kib: tuple[int, int] | None) -> 
         lines.append(f" -- Virtual memory used : {memory_kib[0]} KiB")
         lines.append(f" -- Resident memory used : {memory_kib[1]} KiB")
     return lines
+
+
+def histogram(answer: Answer) -> list[str]:
+    """The line with the histogram of a statistical query; none for other queries.
+
+    Its number of buckets is the square root of the number of values, rounded up, as in a published
+    log of UPPAAL 5; buckets for whole numbers are whole numbers wide.
+    """
+    found = answer.distribution
+    if found is None or found.min is None or found.max is None or found.mean is None:
+        return []
+    known = found.to_json()["histogram"]
+    counts = " ".join(str(count) for count in known["counts"])
+    between = f"Values in [{found.min:g},{found.max:g}]"
+    return [f"{between} mean={found.mean:g} steps={known['width']:g}: {counts}"]

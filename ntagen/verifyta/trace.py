@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+import re
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.values import dataclass
 from ntagen.verifyta.network import Network
@@ -73,3 +74,11 @@ def _part(network: Network, raw: dict[str, Any]) -> Part:
     edge = process.number(raw["edge"], raw["branch"])
     names = process.edges[edge].select
     return Part(number, edge, tuple(raw["select"][name] for name in names))
+
+
+_ASSIGNMENT: Final = re.compile(r"\s*(?<![=!<>:+\-*/%&|^])=(?!=)\s*")
+
+
+def as_assigned(update: str) -> str:
+    """An update with ``:=`` for the assignments that the model writes with ``=``."""
+    return _ASSIGNMENT.sub(" := ", update)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from decimal import Decimal, localcontext
 from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.verifyta.wording import as_assigned
+from ntagen.verifyta.trace import as_assigned
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape, quoteattr
 
 from ntagen.verifyta.network import Edge, Network, Process
-from ntagen.verifyta.trace import Trace
-from ntagen.verifyta.wording import as_assigned
+from ntagen.verifyta.trace import Trace, as_assigned
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model

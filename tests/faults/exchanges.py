@@ -17,9 +17,8 @@ from pathlib import Path
 
 from ntagen.grbl.emulator import Emulator
 from ntagen.grbl.simulated import SimulatedPort
-from ntagen.openigtlink.crc import crc64
 from ntagen.openigtlink.messages import Freedom, Status, Text, Tool, TrackingData
-from ntagen.openigtlink.packets import HEADER, Packet
+from ntagen.openigtlink.packets import HEADER, Packet, crc64
 
 DATA = Path(__file__).parents[1] / "data" / "grbl"
 RECORDED = sorted(

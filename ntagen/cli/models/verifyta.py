@@ -132,8 +132,7 @@ def _checked(line: CommandLine, path: Path) -> int:
 
 def _show_runs_so_far(line: CommandLine, answer: Answer) -> None:
     """Prints what random runs say that the user has ended: it has no verdict."""
-    from ntagen.verifyta.histogram import histogram
-    from ntagen.verifyta.output import INTERRUPTED_RUNS, estimate
+    from ntagen.verifyta.output import INTERRUPTED_RUNS, estimate, histogram
 
     _progress(line, f"{INTERRUPTED_RUNS}\n")
     for value in [*estimate(answer), *histogram(answer)]:
@@ -151,8 +150,7 @@ def _progress(line: CommandLine, after: str) -> None:
 def _answer(line: CommandLine, model: Model, query: Query, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
-    from ntagen.verifyta.histogram import histogram
-    from ntagen.verifyta.output import estimate, summary, values, verdict
+    from ntagen.verifyta.output import estimate, histogram, summary, values, verdict
     from ntagen.verifyta.statistical import of_model, statistical
 
     text = query.text

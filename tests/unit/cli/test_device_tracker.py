@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from ntagen.cli import main
-from ntagen.openigtlink.crc import crc64
 from ntagen.openigtlink.messages import (
     NEWTON,
     Columns,
@@ -27,7 +26,7 @@ from ntagen.openigtlink.messages import (
     TrackingData,
     Transform,
 )
-from ntagen.openigtlink.packets import HEADER, Packet
+from ntagen.openigtlink.packets import HEADER, Packet, crc64
 from ntagen.openigtlink.server import Server
 
 PLAIN: Columns = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 2.0, 3.0))

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from ntagen.cli import main
-from ntagen.drive.configure import Configuration, configure
-from ntagen.drive.knowable import require_knowable
+from ntagen.drive.configure import Configuration, configure, require_knowable
 from ntagen.errors import InputError
 from ntagen.motion import Breath, Motion
 from ntagen.nsl import Task

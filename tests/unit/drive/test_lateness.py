@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from ntagen.drive.device import Assembly
-from ntagen.drive.lateness import Lateness
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import Spun
-from ntagen.drive.steering import Steering
+from ntagen.drive.steering import Lateness, Steering
 from ntagen.needle.kinematics import push
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import (

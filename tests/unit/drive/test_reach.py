@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ntagen.drive.reach import Reach
 from ntagen.drive.settings import Settings
+from ntagen.drive.steering import Reach
 from ntagen.errors import DeviceError
 from ntagen.needle.estimate import Priors
 from ntagen.needle.measurement import Measurement

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ntagen.drive.reserve import is_enough, is_surely_in
+from ntagen.drive.prospect import is_enough, is_surely_in
 from ntagen.needle.estimate import Estimate, Estimator, Priors
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from ntagen.openigtlink.crc import POLYNOMIAL, crc64
 from ntagen.openigtlink.messages import (
     NEWTON,
     Content,
@@ -32,10 +31,12 @@ from ntagen.openigtlink.messages import (
 from ntagen.openigtlink.packets import (
     HEADER,
     LARGEST_BODY_BYTES,
+    POLYNOMIAL,
     Counts,
     Decoder,
     Packet,
     ProtocolError,
+    crc64,
 )
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0))

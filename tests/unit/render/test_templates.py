@@ -9,7 +9,7 @@ from pathlib import Path
 import jinja2
 import pytest
 
-from ntagen.render import render, templates
+from ntagen.render import documents, render
 from tests.steering import PAPER
 
 
@@ -19,11 +19,11 @@ def anew(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Callable[[
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
     def rendered() -> str:
-        templates._environment.cache_clear()
+        documents._environment.cache_clear()
         return render(PAPER)
 
     yield rendered
-    templates._environment.cache_clear()
+    documents._environment.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -33,10 +33,10 @@ def test_an_unknown_name_is_an_error(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, anew: Callable[[], str]
 ) -> None:
     (tmp_path / "one.jinja").write_text(text)
-    monkeypatch.setattr(templates, "FOLDER", tmp_path)
-    templates._environment.cache_clear()
+    monkeypatch.setattr(documents, "FOLDER", tmp_path)
+    documents._environment.cache_clear()
     with pytest.raises(jinja2.UndefinedError, match="nothing"):
-        templates.filled("one.jinja", model=PAPER)
+        documents.filled("one.jinja", model=PAPER)
 
 
 def test_values_are_escaped_in_xml_alone(
@@ -44,10 +44,10 @@ def test_values_are_escaped_in_xml_alone(
 ) -> None:
     for name in ("one.xml.jinja", "one.c.jinja"):
         (tmp_path / name).write_text("{{ given }}\n")
-    monkeypatch.setattr(templates, "FOLDER", tmp_path)
-    templates._environment.cache_clear()
-    assert templates.filled("one.c.jinja", given="a < b && c") == "a < b && c\n"
-    assert templates.filled("one.xml.jinja", given="a < b && c") == "a &lt; b &amp;&amp; c\n"
+    monkeypatch.setattr(documents, "FOLDER", tmp_path)
+    documents._environment.cache_clear()
+    assert documents.filled("one.c.jinja", given="a < b && c") == "a < b && c\n"
+    assert documents.filled("one.xml.jinja", given="a < b && c") == "a &lt; b &amp;&amp; c\n"
 
 
 def test_later_processes_find_the_compiled_templates(
@@ -80,5 +80,5 @@ def test_without_a_folder_for_them_they_are_compiled_each_time(
     # A file stands where the folder should be; then the folder is gone after it was made.
     (tmp_path / "ntagen").write_text("")
     assert anew() == expected
-    monkeypatch.setattr(templates, "cache_folder", lambda: tmp_path / "gone")
+    monkeypatch.setattr(documents, "cache_folder", lambda: tmp_path / "gone")
     assert anew() == expected
