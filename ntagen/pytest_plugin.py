@@ -3,7 +3,7 @@
 pytest finds the plugin by its entry point. It collects a model that is named on the command line
 (``pytest models/gate.xml``), and models that the option ``ntagen_models`` of the project names by
 patterns; no other file. A test passes if the answer is as the file expects: see
-`ntagen.checker.expectation`. A failure shows what was expected, and the end of the trace.
+`ntagen.checker.queries`. A failure shows what was expected, and the end of the trace.
 
 A file of queries beside the model, ``gate.q`` for ``gate.xml``, is taken instead of the model's own
 queries, as in ``ntagen check gate.xml gate.q``.

@@ -55,8 +55,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.winning": {"errors", "checker.picture"},
     "checker.distribution": {"errors", "frames", "checker.picture"},
     "checker.trajectories": {"errors", "frames", "checker.picture"},
-    "checker.queries": set(),
-    "checker.expectation": {"checker.queries"},
+    "checker.queries": {"_checker"},
     "checker.facts": {"checker.picture", "checker.queries"},
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
     "checker.state_space": {"errors", "files", "checker.edges", "checker.picture"}
@@ -71,16 +70,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.story", "checker.strategy", "_checker"}
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
-    "checker.query_form": {"_checker"},
     "checker.constants": set(),
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
     | {"checker.constants"}
-    | {"checker.options", "checker.queries", "checker.query_form", "checker.states"}
+    | {"checker.options", "checker.queries", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
-    | {"checker.expectation"}
-    | {"checker.options", "checker.query_form", "checker.states"}
+    | {"checker.options", "checker.queries", "checker.states"}
     | {"checker.distribution", "checker.trajectories"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
@@ -360,7 +357,7 @@ def test_only_the_command_line_prints_or_exits() -> None:
 def test_the_compiled_engine_has_one_door(module: str) -> None:
     users = {item.room for item in imports() if item.module.startswith(module)}
     doors = {"checker.answer", "checker.errors", "checker.model", "checker.states"}
-    assert users <= doors | {"checker.play", "checker.query_form", "checker.strategy"}
+    assert users <= doors | {"checker.play", "checker.queries", "checker.strategy"}
 
 
 def test_commands_print_by_the_terminal_module_only() -> None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from ntagen.checker.answer import Answer, Estimate, Extreme, Interrupted, Place, Value, Verdict
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
-from ntagen.checker.expectation import Expected, expected_of, is_as_expected, remark_of
 from ntagen.checker.model import (
     HEURISTICS,
     Model,
@@ -35,7 +34,14 @@ from ntagen.checker.options import (
     StrategyWanted,
     TraceWanted,
 )
-from ntagen.checker.query_form import QueryForm, form_of
+from ntagen.checker.queries import (
+    Expected,
+    QueryForm,
+    expected_of,
+    form_of,
+    is_as_expected,
+    remark_of,
+)
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Cumulative, Distribution, Histogram

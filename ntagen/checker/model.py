@@ -15,8 +15,7 @@ from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeTable
 from ntagen.checker.errors import RejectedError, failing, rejecting
 from ntagen.checker.options import CodeEngine, Options, by_keywords
-from ntagen.checker.queries import Query, queries_from
-from ntagen.checker.query_form import form_of
+from ntagen.checker.queries import Query, form_of, queries_from
 from ntagen.errors import InputError, LimitError, ModelError, NtagenError
 from ntagen.files import EVIDENCE_BYTES, MODEL_BYTES, read_file, read_pieces
 

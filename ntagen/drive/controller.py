@@ -22,7 +22,7 @@ A push may be ended early while it goes on (`ntagen.drive.supervisor`). Then the
 and plans from where the needle is; at the second time in a row it pulls back.
 
 The first push belongs to a plan from the entry. If there is none, the push is made only if no known
-region is near it for any start error (`ntagen.drive.first_push`).
+region is near it for any start error (`ntagen.drive.planning`).
 
 The driver looks at known points whether somebody wants the run to end: before each motion and each
 synthesis. Between two such points something is always recorded, so that a replay knows at which
@@ -36,13 +36,12 @@ from typing import Final
 
 from ntagen.drive.deviation import DeviationMonitor, DivergenceMonitor, require_explained
 from ntagen.drive.device import Device
-from ntagen.drive.first_push import is_free
 from ntagen.drive.following import Course
 from ntagen.drive.guide import Guide
 from ntagen.drive.learning import Learner
 from ntagen.drive.pace import Pace
 from ntagen.drive.pieces import Moves, pieces
-from ntagen.drive.planning import Lack, Planner
+from ntagen.drive.planning import Lack, Planner, is_free
 from ntagen.drive.posterior import promise_of
 from ntagen.drive.prospect import is_enough, is_surely_in
 from ntagen.drive.records import Ended, Journal, Predicted, Promised, Record, Relied

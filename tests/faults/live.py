@@ -21,9 +21,8 @@ from typing import Any
 
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Command, Ended
-from ntagen.lab.lab import Lab
+from ntagen.lab.lab import Freeze, Lab
 from ntagen.lab.needles import place
-from ntagen.lab.publisher import Freeze
 from ntagen.nsl import load
 
 ROOT = Path(__file__).resolve().parents[2]

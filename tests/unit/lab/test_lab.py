@@ -19,9 +19,8 @@ from ntagen.errors import DeviceError, InputError
 from ntagen.grbl.actuator import GrblActuator
 from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.port import SerialPort
-from ntagen.lab.lab import Lab
+from ntagen.lab.lab import Freeze, Lab, TrackerFaults
 from ntagen.lab.needles import place
-from ntagen.lab.publisher import Freeze, TrackerFaults
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import distance
 from ntagen.needle.virtual import Errors
