@@ -67,6 +67,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
     | {"checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
+    | {"checker.options"}
     | {"checker.story", "checker.strategy", "_checker"}
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},

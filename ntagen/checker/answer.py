@@ -16,9 +16,10 @@ from ntagen.values import dataclass
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Distribution
     from ntagen.checker.machine import Machine
+    from ntagen.checker.options import Options
     from ntagen.checker.picture.page import Svg
     from ntagen.checker.runs import Run
-    from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy
+    from ntagen.checker.strategy import Strategy
     from ntagen.checker.trajectories import OverTime, Trajectory
 
 Verdict = Literal["satisfied", "not satisfied", "maybe", "unknown", "error"]
@@ -134,10 +135,10 @@ class Answer:
         raw: _checker.Answer,
         query: str,
         edges: EdgeTable,
-        rules: tuple[ForcedRule, PriorityRule],
+        options: Options,
     ) -> None:
         self._raw = raw
-        self._rules = rules
+        self._options = options
         self._edges = edges
         self.query = query
         self.verdict: Verdict = raw.verdict
@@ -409,7 +410,9 @@ class Answer:
         from ntagen.checker.strategy import Strategy
 
         raw = _checker.Strategy.of_answer(self._raw)
-        return None if raw is None else Strategy(raw, *self._rules)
+        return (
+            None if raw is None else Strategy(raw, self._options.forced, self._options.priorities)
+        )
 
     @property
     def machine(self) -> Machine | None:

@@ -233,14 +233,13 @@ class Model:
 
     def answer(self, query: str, options: Options) -> Answer:
         """Answers a query as `check` does, with all options as one value."""
-        rules = (options.forced, options.priorities)
         try:
             with rejecting():
                 raw = _checker.check(self._raw, query, options)
         except _checker.InterruptedError as interrupted:
-            answer = Answer(interrupted.args[0], query, self._edges, rules)
+            answer = Answer(interrupted.args[0], query, self._edges, options)
             raise Interrupted(answer) from None
-        return Answer(raw, query, self._edges, rules)
+        return Answer(raw, query, self._edges, options)
 
     def block_of_runs(self, query: str, first: int, count: int, options: Options) -> bytes:
         """Makes random runs of ``Pr`` or ``E``, for whoever answers the query elsewhere.
@@ -292,7 +291,7 @@ class Model:
         with rejecting():
             answers = _checker.check_jointly(self._raw, texts, [options for _, options in queries])
         return [
-            Answer(raw, text, self._edges, (options.forced, options.priorities))
+            Answer(raw, text, self._edges, options)
             for raw, (text, options) in zip(answers, queries, strict=True)
         ]
 

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ntagen.cluster.identity import identity
 from ntagen.drive.configure import Configuration
@@ -16,13 +17,16 @@ from ntagen.drive.log import Log
 from ntagen.drive.log_facts import facts_of
 from ntagen.drive.outcome import Driven
 from ntagen.drive.records import Journal, JournalError, Journals
-from ntagen.drive.simulate import simulate, synthesiser_for
+from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.experiment.description import Row, digest_of
 from ntagen.experiment.record import Observer, Profile, Run, Synthesised
 from ntagen.experiment.store import Results, finished_in, new_log
 from ntagen.nsl import Task, load_task
+
+if TYPE_CHECKING:
+    from ntagen.lab.lab import Truth
 
 FAILED = "failed"
 """The outcome of a run in which the driver broke."""
@@ -141,9 +145,7 @@ def _driven(
 
             journal = Journals(*logs, observer)
             made = driven_in_lab(task, configuration, row.known, row.speed, journal)
-            truth = made.truth
-            true = (truth.clearance_mm, truth.target_distance_mm)
-            return _run(row, seed, made.driven, true, observer, name)
+            return _run(row, seed, made.driven, made.truth, observer, name)
         result = simulate(
             task.scene,
             synthesiser_for(configuration.settings),
@@ -158,15 +160,14 @@ def _driven(
         raise
     except Exception as error:  # a bug in one run must not end a campaign of thousands
         return _broken(row, seed, error, name)
-    true = (result.clearance_mm, result.target_distance_mm)
-    return _run(row, seed, result, true, observer, name)
+    return _run(row, seed, result, result, observer, name)
 
 
 def _run(
     row: Row,
     seed: int,
     driven: Driven,
-    true: tuple[float, float],
+    truth: Truth | Result,
     observer: Observer,
     log: str,
 ) -> Run:
@@ -177,7 +178,7 @@ def _run(
     """
     ended = driven.ended
     says_reached = ended.outcome == State.TARGET_REACHED.value
-    clear_mm, target_mm = true
+    clear_mm, target_mm = truth.clearance_mm, truth.target_distance_mm
     return Run(
         row=row.id,
         seed=seed,

@@ -153,6 +153,14 @@ def match_trace(scene: Scene, trace: Trace, options: Options | None = None) -> M
     return _Matcher(scene, trace, options or Options()).best()
 
 
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A sequence of rolls, and the chain with them that fits best."""
+
+    steps: Steps
+    fitted: Fitted
+
+
 class _Matcher:
     """One match."""
 
@@ -194,7 +202,7 @@ class _Matcher:
 
     def best(self) -> Match:
         """The match."""
-        found: list[tuple[Steps, Fitted]] = []
+        found: list[_Found] = []
         costs: list[float] = []
         for count in self._counts:
             if costs and FLOOR_MM * ROLL_GAIN**count >= min(costs):
@@ -210,13 +218,12 @@ class _Matcher:
                 f"{self._trace.samples.name}: the trace is too short for {self._options.rolls} "
                 "rolls\nhint: ask for fewer"
             )
-        steps, fitted = found[int(np.argmin(costs))]
-        return self._match(steps, fitted, tuple(self._rms_mm(one) for _, one in found))
+        best = found[int(np.argmin(costs))]
+        return self._match(best, tuple(self._rms_mm(one.fitted) for one in found))
 
-    def _weighed(self, found: tuple[Steps, Fitted]) -> float:
+    def _weighed(self, found: _Found) -> float:
         """What is least for the number of rolls that is taken."""
-        steps, fitted = found
-        return math.hypot(self._rms_mm(fitted), FLOOR_MM) * ROLL_GAIN ** len(steps)
+        return math.hypot(self._rms_mm(found.fitted), FLOOR_MM) * ROLL_GAIN ** len(found.steps)
 
     def _rms_mm(self, fitted: Fitted) -> float:
         return math.sqrt(fitted.squares_mm2 / len(self._trace.points_mm))
@@ -247,7 +254,7 @@ class _Matcher:
         free = self._options.start == "free"
         return Freedom(free, free, self._options.radius == "fit", self._expected_per_mm)
 
-    def _with_rolls(self, count: int, bar: float) -> tuple[Steps, Fitted] | None:
+    def _with_rolls(self, count: int, bar: float) -> _Found | None:
         """The best sequence with so many rolls; None if the trace is too short for them.
 
         It is not improved further if it is far from what fewer rolls reach, the bar.
@@ -255,21 +262,21 @@ class _Matcher:
         curvature = self._expected_per_mm
         if self._options.radius == "fit":
             curvature = bend_of(self._trace)
-        best: tuple[Steps, Fitted] | None = None
+        best: _Found | None = None
         for _ in range(2):
             space = self._space(curvature)
             sequences = best_sequences(space, count, _REFINED)
             if not sequences:
                 return None
-            found = [(steps, self._fitted(space, steps)) for steps in sequences]
-            best = min(found if best is None else [*found, best], key=_cost)
+            found = [self._fitted(space, steps) for steps in sequences]
+            best = min(found if best is None else [*found, best], key=_cost_mm2)
             if self._weighed(best) > _HOPELESS * bar:
                 break
-            best = self._moved(space, *best)
-            change = best[1].curvature_per_mm / curvature - 1.0
+            best = self._moved(space, best)
+            change = best.fitted.curvature_per_mm / curvature - 1.0
             if count == 0 or abs(change) < _SAME_CURVATURE:
                 break
-            curvature = best[1].curvature_per_mm
+            curvature = best.fitted.curvature_per_mm
         return best
 
     def _space(self, curvature_per_mm: float) -> Space:
@@ -286,8 +293,8 @@ class _Matcher:
             start,
         )
 
-    def _fitted(self, space: Space, steps: Steps) -> Fitted:
-        """The exact fit of a sequence."""
+    def _fitted(self, space: Space, steps: Steps) -> _Found:
+        """A sequence with its exact fit."""
         points, depths = self._trace.points_mm, self._trace.depths_mm
         rolls, curvature = space.rolls([steps]), space.curvature_per_mm
         position, frame = self._start.position_mm, self._start.frame
@@ -301,25 +308,25 @@ class _Matcher:
             begin = replace(
                 free, frame=oriented_on_grid(points, rolls, self._length_mm, free, begin.frame)
             )
-        return fit_chain(points, rolls, self._length_mm, begin, self._freedom())
+        return _Found(steps, fit_chain(points, rolls, self._length_mm, begin, self._freedom()))
 
-    def _moved(self, space: Space, steps: Steps, fitted: Fitted) -> tuple[Steps, Fitted]:
+    def _moved(self, space: Space, found: _Found) -> _Found:
         """The sequence after moves by one step, of single rolls or all, as long as they help."""
-        tried = {steps}
+        tried = {found.steps}
         while True:
-            near = {moved for moved in _neighbours(steps) if space.contains(moved)} - tried
+            near = {moved for moved in _neighbours(found.steps) if space.contains(moved)} - tried
             tried |= near
-            found = [(one, self._fitted(space, one)) for one in sorted(near)]
-            best = min([*found, (steps, fitted)], key=_cost)
-            if best[0] == steps:
-                return steps, fitted
-            steps, fitted = best
+            best = min([*(self._fitted(space, one) for one in sorted(near)), found], key=_cost_mm2)
+            if best is found:
+                return found
+            found = best
 
-    def _match(self, steps: Steps, fitted: Fitted, rms_mm: tuple[float, ...]) -> Match:
+    def _match(self, found: _Found, rms_mm: tuple[float, ...]) -> Match:
+        fitted = found.fitted
         heading, bevel, _ = (vector_of(column) for column in fitted.frame.T)
         pose = Pose(vector_of(fitted.position_mm), heading, bevel)
         needle = replace(self._needle, tip=pose, radius_mm=1.0 / fitted.curvature_per_mm)
-        plan = self._plan(steps)
+        plan = self._plan(found.steps)
         near = nearest_on_all(
             plan.arcs(needle), pose.position_mm, [vector_of(p) for p in self._trace.points_mm]
         )
@@ -368,5 +375,5 @@ def _neighbours(steps: Steps) -> Iterator[Steps]:
             yield (*steps[:index], (place + by, angle), *steps[index + 1 :])
 
 
-def _cost(found: tuple[Steps, Fitted]) -> float:
-    return found[1].cost_mm2
+def _cost_mm2(found: _Found) -> float:
+    return found.fitted.cost_mm2
