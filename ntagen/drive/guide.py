@@ -79,7 +79,7 @@ class Guide:
         rolls = self._scene.limits.max_rolls + 1
         speed_mm_per_s = self._scene.needle.speed_mm_per_s
         rolls_s = rolls * math.pi / self._settings.roll_rad_per_s
-        return _longest_mm(tree) / speed_mm_per_s + rolls_s
+        return tree.longest_mm / speed_mm_per_s + rolls_s
 
     def next(self) -> tuple[Action, Pose] | None:
         """See `Following.next`."""
@@ -149,11 +149,3 @@ class Guide:
         if self._tree is None:
             raise AssertionError("there is no strategy")
         return self._tree
-
-
-def _longest_mm(tree: Segment) -> float:
-    """The length of the longest branch."""
-    return max(
-        one.length_mm + (0.0 if one.then is None else _longest_mm(one.then))
-        for one in tree.branches
-    )

@@ -147,9 +147,8 @@ def require_holding(tree: Segment, scene: Scene) -> None:
         InputError: It does not.
     """
     _require_picks(tree, scene, is_first=True)
-    longest_mm = _longest_mm(tree)
-    if longest_mm > scene.needle.length_mm + _SMALL_MM:
-        raise InputError(f"the strategy is {longest_mm:g} mm long: longer than the needle")
+    if tree.longest_mm > scene.needle.length_mm + _SMALL_MM:
+        raise InputError(f"the strategy is {tree.longest_mm:g} mm long: longer than the needle")
     tissue, reach = scene.tissue, certify_all(tree, scene)
     if reach.most_rolls > scene.limits.max_rolls:
         raise InputError(f"the strategy makes {reach.most_rolls} rolls, and the task allows less")
@@ -158,14 +157,6 @@ def require_holding(tree: Segment, scene: Scene) -> None:
             f"the strategy does not hold in this task: {reach.clearance_mm:.2f} mm from regions, "
             f"and {reach.depth_mm:.2f} mm deep in the target; both must be {tissue.tip_mm:g} mm"
         )
-
-
-def _longest_mm(segment: Segment) -> float:
-    """The length of the longest way through a segment and all after it."""
-    return max(
-        branch.length_mm + (0.0 if branch.then is None else _longest_mm(branch.then))
-        for branch in segment.branches
-    )
 
 
 def _require_picks(segment: Segment, scene: Scene, *, is_first: bool) -> None:

@@ -217,7 +217,7 @@ class ContentResolver:
     def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
         """A property of the needle or of its motion."""
         span, value = statement.value.span, statement.value
-        is_free = isinstance(value, tree.Name) and value.text == FREE and not scope.find(FREE)
+        is_free = isinstance(value, tree.Name) and value.text == FREE and FREE not in scope
         if statement.keyword == "bevel" and is_free:
             draft.is_bevel_free = True
         elif statement.keyword in VECTORS:

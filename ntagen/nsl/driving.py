@@ -147,7 +147,7 @@ class DriverResolver:
         hint = did_you_mean(f"{parameter.words} {name.text}", longer)
         if hint is None and self._takes_plain_numbers:
             hint = f"write for example `{parameter.example}`"
-        if hint is None or name.text in CONSTANTS or scope.find(name.text) is not None:
+        if hint is None or name.text in CONSTANTS or name.text in scope:
             return False
         message = f"`{name.text}` is no value of `{parameter.words}`"
         self._reporter.report("unknown-name", name.span, message, hint=hint)

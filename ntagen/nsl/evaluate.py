@@ -8,8 +8,8 @@ reported too.
 from __future__ import annotations
 
 import math
+from collections import ChainMap
 from collections.abc import Callable, Sequence
-from dataclasses import field
 from typing import Final
 
 from ntagen.nsl import tree
@@ -41,30 +41,16 @@ FUNCTIONS: Final = ("abs", "cos", "max", "min", "sin", "sqrt")
 """The functions."""
 
 
-@dataclass
-class Scope:
-    """The names that are visible at a place: those of its braces and of the braces around."""
+@dataclass(frozen=True, slots=True)
+class Definition:
+    """What a name means, and where that is said; there is no value if that has a mistake."""
 
-    outer: Scope | None = None
-    values: dict[str, Quantity | None] = field(default_factory=dict)
-    spans: dict[str, Span] = field(default_factory=dict)
+    value: Quantity | None
+    span: Span
 
-    def find(self, name: str) -> Scope | None:
-        """The scope that defines a name; None if there is none."""
-        scope: Scope | None = self
-        while scope is not None and name not in scope.values:
-            scope = scope.outer
-        return scope
 
-    def names(self) -> list[str]:
-        """All visible names."""
-        outer = [] if self.outer is None else self.outer.names()
-        return [*outer, *self.values]
-
-    def define(self, name: str, span: Span, value: Quantity | None) -> None:
-        """Adds a name; its value is None if its definition has a mistake."""
-        self.values[name] = value
-        self.spans[name] = span
+Scope = ChainMap[str, Definition]
+"""The names that are visible at a place: those of its braces, then those of the braces around."""
 
 
 class Evaluator:
@@ -228,10 +214,9 @@ class Evaluator:
         name = expression.text
         if name in CONSTANTS:
             return CONSTANTS[name]
-        home = scope.find(name)
-        if home is not None:
-            return home.values[name]
-        hint = did_you_mean(name, [*scope.names(), *CONSTANTS])
+        if name in scope:
+            return scope[name].value
+        hint = did_you_mean(name, [*scope, *CONSTANTS])
         if is_unit(name) or name in ALIASES:
             hint = f"write a unit after a number: `1 {ALIASES.get(name, name)}`"
         elif name in FUNCTIONS:

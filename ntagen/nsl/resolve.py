@@ -18,7 +18,7 @@ from ntagen.nsl.content import NUMBERS, VECTORS, ContentResolver
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft
 from ntagen.nsl.driving import CHOICES, DriverResolver
-from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Evaluator, Scope
+from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Definition, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import Quantity, is_unit, scalar
 from ntagen.nsl.reading import is_below, read_source
@@ -131,10 +131,10 @@ class _Resolver:
             self._draft.has_gaps = True
             self._draft.seen.setdefault(keyword, statement.span)
         if keyword == "let" and name is not None:
-            scope.define(name, statement.span, None)
+            scope[name] = Definition(None, statement.span)
         elif keyword == "environment" and self._draft is None:
             self._draft = Draft(statement.span, name or "?", has_gaps=True)
-            self._statements(statement.body, Scope(scope), "environment")
+            self._statements(statement.body, scope.new_child(), "environment")
         elif keyword in ("needle", "motion", "drive", "device"):
             self._statements(statement.body, scope, BLOCKS[keyword])
         elif keyword == "for" and name is not None:
@@ -197,7 +197,7 @@ class _Resolver:
             return
         folders = tuple(self._folders)
         self._draft = Draft(statement.name.span, statement.name.text, folders=folders)
-        self._statements(statement.body, Scope(scope), "environment")
+        self._statements(statement.body, scope.new_child(), "environment")
 
     def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
         """Resolves the statements of another file as if they stood here; a file counts once."""
@@ -293,8 +293,7 @@ class _Resolver:
         value: Quantity | None,
     ) -> None:
         """Resolves the body of a loop with a value of its variable."""
-        inner = Scope(scope)
-        inner.define(variable.text, variable.span, value)
+        inner = scope.new_child({variable.text: Definition(value, variable.span)})
         self._loop_depth += 1
         self._statements(body, inner, "for")
         self._loop_depth -= 1
@@ -305,12 +304,11 @@ class _Resolver:
         """A constant."""
         value = self._evaluator.evaluate(statement.value, scope)
         if self._is_name_free(statement.name, scope):
-            scope.define(statement.name.text, statement.name.span, value)
+            scope[statement.name.text] = Definition(value, statement.name.span)
 
     def _is_name_free(self, name: tree.Identifier, scope: Scope) -> bool:
         """Whether a constant or a loop's variable can have this name; if not, reports it."""
         text = name.text
-        home = scope.find(text)
         if text in CONSTANTS or text in FUNCTIONS or is_unit(text):
             what = (
                 "a unit" if is_unit(text) else "a function" if text in FUNCTIONS else "a constant"
@@ -322,13 +320,13 @@ class _Resolver:
                 hint=f"choose another name, for example `my_{text}`",
             )
             return False
-        if home is not None:
+        if text in scope:
             self._reporter.report(
                 "duplicate-name",
                 name.span,
                 f"`{text}` is defined already",
                 hint="choose another name",
-                notes=(f"the first definition is at {home.spans[text].place}",),
+                notes=(f"the first definition is at {scope[text].span.place}",),
             )
             return False
         return True

@@ -70,6 +70,14 @@ class Segment:
         """The number of ways on which the target is reached."""
         return sum(1 if one.then is None else one.then.leaves for one in self.branches)
 
+    @property
+    def longest_mm(self) -> float:
+        """The length of the longest way through this segment and all after it."""
+        return max(
+            one.length_mm + (0.0 if one.then is None else one.then.longest_mm)
+            for one in self.branches
+        )
+
     def to_json(self) -> dict[str, Any]:
         """The tree as JSON; angles in rad, lengths in mm."""
         return {
