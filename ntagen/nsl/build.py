@@ -19,7 +19,7 @@ from ntagen.motion import Breath
 from ntagen.nsl import build_devices
 from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
-from ntagen.nsl.draft import Draft, Placed
+from ntagen.nsl.draft import Draft
 from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
@@ -254,13 +254,9 @@ class _Builder:
     def _positive(self, keyword: str, kind: str, role: str) -> float | None:
         """A property of the needle or its motion that is greater than 0."""
         placed = self._draft.numbers.get(keyword)
-        if placed is None or placed.value is None:
+        if placed is None:
             return None
-        return (
-            placed.value
-            if self._reporter.obeys(rules.positive(placed.value, role, kind), placed.span)
-            else None
-        )
+        return placed.obeying(lambda value: rules.positive(value, role, kind), self._reporter)
 
     def _needle(self, tip: Pose | None) -> Needle | None:
         """The needle, or None after a mistake in it."""
@@ -284,24 +280,15 @@ class _Builder:
             else self._positive("step", "step-not-positive", "the step")
         )
         angles = self._roll_angles()
-        count = DEFAULT_MAX_ROLLS if draft.max_rolls is None else draft.max_rolls.value
-        distance = (
-            DEFAULT_ROLL_DISTANCE_MM if draft.roll_distance is None else draft.roll_distance.value
-        )
-        if (
-            draft.max_rolls is not None
-            and count is not None
-            and not self._reporter.obeys(rules.roll_count(count), draft.max_rolls.span)
-        ):
-            count = None
-        if (
-            draft.roll_distance is not None
-            and distance is not None
-            and not self._reporter.obeys(
-                rules.not_negative(distance, "the distance between rolls"), draft.roll_distance.span
+        count: int | None = DEFAULT_MAX_ROLLS
+        if draft.max_rolls is not None:
+            count = draft.max_rolls.obeying(rules.roll_count, self._reporter)
+        distance: float | None = DEFAULT_ROLL_DISTANCE_MM
+        if draft.roll_distance is not None:
+            distance = draft.roll_distance.obeying(
+                lambda value: rules.not_negative(value, "the distance between rolls"),
+                self._reporter,
             )
-        ):
-            distance = None
         if step is None or angles is None or count is None or distance is None:
             return None
         return Limits(step, angles, count, distance, draft.is_bevel_free, self._spins())
@@ -312,9 +299,10 @@ class _Builder:
             return tuple(map(rad_from_deg, DEFAULT_ROLLS_DEG))
         found: dict[int, Span] = {}
         for placed in self._draft.angles:
-            degrees = self._whole_degrees(placed)
-            if degrees is None:
+            angle_rad = placed.obeying(rules.roll, self._reporter)
+            if angle_rad is None:
                 continue
+            degrees = round(deg_from_rad(angle_rad))
             if degrees in found:
                 self._report(
                     "roll-repeated", placed.span, f"the roll by {degrees} deg is written twice"
@@ -322,25 +310,16 @@ class _Builder:
             found.setdefault(degrees, placed.span)
         return tuple(rad_from_deg(float(degrees)) for degrees in found) or None
 
-    def _whole_degrees(self, placed: Placed[float]) -> int | None:
-        """A roll in degrees."""
-        if placed.value is None:
-            return None
-        if not self._reporter.obeys(rules.roll(placed.value), placed.span):
-            return None
-        return round(deg_from_rad(placed.value))
-
     def _spins(self) -> tuple[float, ...]:
         """The fractions of the insertion in which the needle may spin; those without a mistake."""
         found: list[float] = []
         for placed in self._draft.spins:
-            if placed.value is None or not self._reporter.obeys(
-                rules.spin(placed.value), placed.span
-            ):
+            spin = placed.obeying(rules.spin, self._reporter)
+            if spin is None:
                 continue
-            repeated = rules.spin_repeated([*found, placed.value], len(found))
+            repeated = rules.spin_repeated([*found, spin], len(found))
             if self._reporter.obeys(repeated, placed.span):
-                found.append(placed.value)
+                found.append(spin)
         return tuple(found)
 
     def _check_spins(self, tissue: Tissue, breath: Breath | None) -> None:
@@ -361,20 +340,16 @@ class _Builder:
         values: dict[str, Any] = {}
         for word, (field_name, rule) in _TISSUE_RULES.items():
             placed = self._draft.tissue.get(word)
-            if placed is None or placed.value is None:
-                continue
-            if self._reporter.obeys(rule(placed.value), placed.span):
-                values[field_name] = placed.value
+            value = None if placed is None else placed.obeying(rule, self._reporter)
+            if value is not None:
+                values[field_name] = value
         return replace(tissue, **values)
 
     def _resolution(self) -> int | None:
         """Fixed-point units in a mm if they are written, and rightly."""
         placed = self._draft.resolution
-        if placed is None or placed.value is None:
-            return None
-        if not self._reporter.obeys(rules.resolution(placed.value), placed.span):
-            return None
-        return round(placed.value)
+        value = None if placed is None else placed.obeying(rules.resolution, self._reporter)
+        return None if value is None else round(value)
 
     # -------------------------------------------------------------------------------------- rules
 

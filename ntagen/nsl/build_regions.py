@@ -153,11 +153,9 @@ class Regions:
         if draft.solid is not None:
             shape = self._solids.shape(draft, draft.solid)
             return None if shape is None else Region(draft.name, draft.kind, shape)
-        radius = draft.radius.value
-        if radius is not None and not self._reporter.obeys(
-            rules.positive(radius, f"the radius of `{draft.name}`"), draft.radius.span
-        ):
-            return None
+        radius = draft.radius.obeying(
+            lambda value: rules.positive(value, f"the radius of `{draft.name}`"), self._reporter
+        )
         if radius is None or draft.center is None or draft.center.value is None:
             return None
         return Region.ball(draft.name, draft.kind, draft.center.value, radius)

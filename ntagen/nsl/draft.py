@@ -5,12 +5,15 @@ A value with a mistake is None, and the mistake is reported.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
 from typing import Generic, TypeVar
 
+from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.source import Span
 from ntagen.nsl.tree import ImageForm, SolidForm
 from ntagen.parameters import Given
+from ntagen.rules import Breach
 from ntagen.scene import RegionKind, Vector
 from ntagen.shapes import Shape
 from ntagen.values import dataclass
@@ -24,6 +27,12 @@ class Placed(Generic[T]):
 
     value: T | None
     span: Span
+
+    def obeying(self, rule: Callable[[T], Breach | None], reporter: Reporter) -> T | None:
+        """The value if it obeys a rule; if not, that is reported. None after a mistake."""
+        if self.value is None or not reporter.obeys(rule(self.value), self.span):
+            return None
+        return self.value
 
 
 @dataclass(frozen=True, slots=True)
