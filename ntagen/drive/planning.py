@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
@@ -15,7 +16,6 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import push_seconds
 from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
-from ntagen.drive.timing import timed
 from ntagen.drive.torsion import Lag
 from ntagen.drive.tube import Tube
 from ntagen.errors import LimitError
@@ -290,3 +290,11 @@ def is_free(scene: Scene, length_mm: float, priors: Priors) -> bool:
         clearance(arcs, needle.tip.position_mm, region).distance_mm > reach_mm
         for region in scene.avoided
     )
+
+
+def timed(synthesis: Synthesis, work: Callable[[Synthesis], Synthesis]) -> Synthesis:
+    """What further work makes of a synthesis, with the time of that work."""
+    start_s = time.perf_counter()
+    done = work(synthesis)
+    seconds = synthesis.loop_seconds + time.perf_counter() - start_s
+    return replace(done, loop_seconds=seconds)

@@ -6,8 +6,9 @@ import functools
 import gc
 import importlib
 import math
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
@@ -19,7 +20,6 @@ from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import spun
-from ntagen.drive.timing import TimedSynthesiser
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
 from ntagen.needle.answering import Answers, Between, Corners, Drawn, Given
@@ -266,3 +266,20 @@ class Witness:
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
         """Does nothing: the truth is added to measurements only."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimedSynthesiser:
+    """A synthesiser that says how long it took: `Synthesis.loop_seconds`.
+
+    Attributes:
+        inner: Finds the plans.
+    """
+
+    inner: BestPlanSynthesiser
+
+    def __call__(self, scene: Scene, asked: Scene | None = None) -> Synthesis:
+        """The synthesis, with its time."""
+        start_s = time.perf_counter()
+        synthesis = self.inner(scene, asked)
+        return replace(synthesis, loop_seconds=time.perf_counter() - start_s)

@@ -17,7 +17,7 @@ from ntagen.drive.device import rest
 from ntagen.drive.plant import NeedlePlant, simulated_axes, simulated_controller
 from ntagen.drive.simulate import Maker, Simulated
 from ntagen.grbl.actuator import GrblActuator
-from ntagen.grbl.simulated import SimulatedPort
+from ntagen.grbl.emulator import SimulatedPort
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.virtual import Obstacle, require_possible

@@ -26,13 +26,13 @@ from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.plan.extract import step_length_mm
 from ntagen.scene import Needle, Pose, Scene
 from ntagen.traces.chain import LEAST_CURVATURE_PER_MM, vector_of
-from ntagen.traces.grid import oriented_on_grid
 from ntagen.traces.refine import (
     CURVATURE_STD_RATIO,
     ERROR_MM,
     Fitted,
     Freedom,
     fit_chain,
+    oriented_on_grid,
     pose_from_depths,
     turned_from_depths,
 )

@@ -7,7 +7,7 @@ import socket
 from typing import NoReturn
 
 from ntagen.errors import DeviceError
-from ntagen.grbl.simulated import SimulatedPort
+from ntagen.grbl.emulator import SimulatedPort
 from ntagen.openigtlink.server import Server
 
 

@@ -15,8 +15,7 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from ntagen.grbl.emulator import Emulator
-from ntagen.grbl.simulated import SimulatedPort
+from ntagen.grbl.emulator import Emulator, SimulatedPort
 from ntagen.openigtlink.messages import Freedom, Status, Text, Tool, TrackingData
 from ntagen.openigtlink.packets import HEADER, Packet, crc64
 

@@ -16,11 +16,10 @@ from ntagen.cli import main
 from ntagen.errors import DeviceError
 from ntagen.grbl.check import inspect
 from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
-from ntagen.grbl.emulator import Emulator
+from ntagen.grbl.emulator import Emulator, SimulatedPort
 from ntagen.grbl.memory import Memory
 from ntagen.grbl.port import Port, SerialPort
 from ntagen.grbl.pseudo import PseudoTerminal
-from ntagen.grbl.simulated import SimulatedPort
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "paper.nsl"
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from ntagen.experiment.statistics import rate_of, spread_of
+from ntagen.experiment.table import rate_of, spread_of
 
 
 @pytest.mark.parametrize(

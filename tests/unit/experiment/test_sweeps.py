@@ -16,9 +16,8 @@ from ntagen.experiment.description import Experiment, Row
 from ntagen.experiment.one_sweep import listed_values, quantity_of, sweep_of_task
 from ntagen.experiment.reading import read_experiment
 from ntagen.experiment.report import report_of
-from ntagen.experiment.statistics import rate_of
 from ntagen.experiment.sweeps import conclusions_of, sweeps_of
-from ntagen.experiment.table import document_of
+from ntagen.experiment.table import document_of, rate_of
 from ntagen.experiment.writing import csv_of
 from ntagen.parameters import BY_WORDS
 from tests.unit.experiment.files import SCENARIOS, written

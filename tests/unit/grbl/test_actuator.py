@@ -13,9 +13,8 @@ from ntagen.errors import DeviceError, Halted
 from ntagen.grbl.actuator import STOP_BYTES, GrblActuator, StoppedError
 from ntagen.grbl.axes import Axes, Axis
 from ntagen.grbl.dialects import GRBL_11H, GRBLHAL, Dialect
-from ntagen.grbl.emulator import Emulator
+from ntagen.grbl.emulator import Emulator, SimulatedPort
 from ntagen.grbl.memory import Memory
-from ntagen.grbl.simulated import SimulatedPort
 from tests.faults.connections import pull_cable
 
 AXES = {

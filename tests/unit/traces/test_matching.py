@@ -19,8 +19,8 @@ from ntagen.plan.extract import leads_to_target
 from ntagen.render import render
 from ntagen.rounding import units_per_mm
 from ntagen.scene import Vector
-from ntagen.traces.grid import GRID_DEG, _nearest, frame_at
 from ntagen.traces.matching import Match, Options, match_trace
+from ntagen.traces.refine import GRID_DEG, _nearest, frame_at
 from ntagen.traces.search import Space, Start
 from tests.steering import sphere
 from tests.traces import BENCH, FOLDER, MAKE, points_of, trace
