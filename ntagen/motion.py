@@ -15,7 +15,7 @@ import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
-from ntagen.shapes import Vector
+from ntagen.shapes import Vector, vector_of
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -56,8 +56,7 @@ class Motion:
         for (before_s, before), (after_s, after) in pairwise(self.rows):
             if before_s <= since_s <= after_s:
                 share = (since_s - before_s) / (after_s - before_s)
-                x, y, z = (a + share * (b - a) for a, b in zip(before, after, strict=True))
-                return (x, y, z)
+                return vector_of(a + share * (b - a) for a, b in zip(before, after, strict=True))
         return self.table[0][1]
 
     def many_mm(self, times_s: _Array) -> _Array:

@@ -24,6 +24,7 @@ from ntagen.errors import DeviceError, Halted, LimitError
 from ntagen.needle.measurement import Measurement
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Scene, Vector
+from ntagen.shapes import vector_of
 
 _RELATIVE: Final = 1e-6
 _ABSOLUTE: Final = 1e-6
@@ -233,5 +234,4 @@ def _is_close(one: object, other: object) -> bool:
 def _vector_or_none(values: tuple[float, ...]) -> Vector | None:
     if not values:
         return None
-    x, y, z = values
-    return (x, y, z)
+    return vector_of(values)

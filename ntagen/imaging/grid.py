@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from ntagen.imaging.mistakes import ImageError
-from ntagen.shapes import Axes, Bounds, Vector
+from ntagen.shapes import Axes, Bounds, Vector, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -74,8 +74,7 @@ class Grid:
     @property
     def steps_mm(self) -> Vector:
         """The distances between neighbours."""
-        x, y, z = (e / (n - 1) for e, n in zip(self.extent_mm, self.counts, strict=True))
-        return (x, y, z)
+        return vector_of(e / (n - 1) for e, n in zip(self.extent_mm, self.counts, strict=True))
 
     def places(self, axis: int) -> NDArray[np.float64]:
         """The coordinates of the points along an axis."""

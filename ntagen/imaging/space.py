@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 from ntagen.imaging.mistakes import ImageError
-from ntagen.shapes import UPRIGHT, Axes, Vector
+from ntagen.shapes import UPRIGHT, Axes, Vector, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,8 +42,7 @@ class Rigid:
         """One point, moved."""
         import numpy as np
 
-        x, y, z = map(float, self.points(np.array([point]))[0])
-        return (x, y, z)
+        return vector_of(self.points(np.array([point]))[0])
 
     def after(self, first: Rigid) -> Rigid:
         """The motion `first`, and then this one."""

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final
 from ntagen.imaging.grid import Grid, Wish, grid_over
 from ntagen.imaging.meshes import Mesh, inverted
 from ntagen.imaging.mistakes import ImageError
-from ntagen.shapes import SAMPLES_PER_MM, UPRIGHT, Field, Vector
+from ntagen.shapes import SAMPLES_PER_MM, UPRIGHT, Field, Vector, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,7 +57,7 @@ def field_of_mesh(mesh: Mesh, wish: Wish, name: str) -> Field:
     import numpy as np
 
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    grid = grid_over(UPRIGHT, (_vector(low), _vector(high)), wish)
+    grid = grid_over(UPRIGHT, (vector_of(low), vector_of(high)), wish)
     winding = _winding(mesh, grid, name)
     if (winding < 0).any():
         raise inverted(name)
@@ -68,7 +68,7 @@ def field_of_mesh(mesh: Mesh, wish: Wish, name: str) -> Field:
         grid,
         signed,
         0.5 * excess_mm + _SHIFT_MM,
-        (_vector(low), _vector(high)),
+        (vector_of(low), vector_of(high)),
         mesh.vertices,
         mesh.volume,
         wish,
@@ -103,15 +103,15 @@ def made_field(
     middle = (low + np.array(deepest) * np.array(grid.steps_mm)) @ axes
     units = np.clip(np.rint(signed * SAMPLES_PER_MM), -(2.0**31) + 1, 2.0**31 - 1)
     return Field(
-        corner_mm=_vector(low @ axes),
+        corner_mm=vector_of(low @ axes),
         axes=grid.axes,
         extent_mm=grid.extent_mm,
         counts=grid.counts,
         samples=units.astype("<i4").tobytes(),
         doubt_mm=doubt_mm,
-        low_mm=_vector(np.array(bounds[0]) - low),
-        high_mm=_vector(np.array(bounds[1]) - low),
-        middle_mm=_vector(middle),
+        low_mm=vector_of(np.array(bounds[0]) - low),
+        high_mm=vector_of(np.array(bounds[1]) - low),
+        middle_mm=vector_of(middle),
         radius_mm=float(np.sqrt(((ends - middle) ** 2).sum(axis=1)).max()),
         deepest_mm=max(-float(signed[deepest]), 1.0 / SAMPLES_PER_MM),
         body_mm3=volume_mm3,
@@ -256,8 +256,3 @@ def _parts(counts: NDArray[np.int64]) -> list[slice]:
 def _area(one: Points, two: Points) -> Points:
     """The cross products of vectors in a plane."""
     return one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-
-
-def _vector(values: Points) -> Vector:
-    x, y, z = map(float, values)
-    return (x, y, z)

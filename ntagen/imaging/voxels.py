@@ -17,7 +17,7 @@ from ntagen.imaging.grid import Wish, grid_over
 from ntagen.imaging.segmentations import Mask
 from ntagen.imaging.space import Rigid
 from ntagen.imaging.surfaces import made_field
-from ntagen.shapes import Field, Vector
+from ntagen.shapes import Field, Vector, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -54,7 +54,7 @@ def field_of_mask(mask: Mask, motion: Rigid, unit_mm: float, wish: Wish) -> Fiel
     first = axes @ np.array(frame.shift_mm)
     low = first - 0.5 * spacing
     high = low + np.array(mask.voxels.shape) * spacing
-    bounds = (_vector(low), _vector(high))
+    bounds = (vector_of(low), vector_of(high))
     grid = grid_over(frame.axes, bounds, wish, _FINEST_SHARE * float(spacing.min()))
     # In units of voxels, with a layer of other voxels around the part.
     places = [(grid.places(i) - first[i]) / spacing[i] + 1.0 for i in range(3)]
@@ -156,8 +156,3 @@ def _along(values: Values, axis: int, places: Values, spacing_mm: float) -> Valu
                 np.minimum(best, flat[k] + cost[k], out=best)
         result[i] = best
     return np.moveaxis(result.reshape(len(places), *rows.shape[1:]), 0, axis)
-
-
-def _vector(values: Values) -> Vector:
-    x, y, z = map(float, values)
-    return (x, y, z)

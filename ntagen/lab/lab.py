@@ -23,6 +23,7 @@ from ntagen.openigtlink.messages import Transform
 from ntagen.openigtlink.packets import Packet
 from ntagen.openigtlink.server import Server
 from ntagen.scene import Pose, Scene, Vector
+from ntagen.shapes import vector_of
 from ntagen.tracking.simulated import FORCE, NEEDLE, packets_of
 
 HOST: Final = "127.0.0.1"
@@ -290,8 +291,7 @@ def _signed(content: object, signs: Vector) -> Transform:
         raise TypeError(f"the lab publishes the pose of {NEEDLE}, not {content}")
 
     def column(vector: Vector) -> Vector:
-        x, y, z = (a * b for a, b in zip(signs, vector, strict=True))
-        return (x, y, z)
+        return vector_of(a * b for a, b in zip(signs, vector, strict=True))
 
     x, y, z, origin = content.columns
     return Transform((column(x), column(y), column(z), column(origin)))

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from ntagen.needle.vectors import combine, cross, dot, scale, subtract, unit
 from ntagen.scene import Pose, Vector
+from ntagen.shapes import vector_of
 
 _Array = NDArray[np.float64]
 
@@ -199,8 +200,4 @@ def _in_space(
     )
     out_of_plane = (points - centroid) @ axes[2]
     rms_mm = math.sqrt(float(np.mean(in_plane**2 + out_of_plane**2)))
-    return CircleFit(_vector(center), _vector(normal), float(curvature), std_per_mm, rms_mm)
-
-
-def _vector(array: _Array) -> Vector:
-    return (float(array[0]), float(array[1]), float(array[2]))
+    return CircleFit(vector_of(center), vector_of(normal), float(curvature), std_per_mm, rms_mm)

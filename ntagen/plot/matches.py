@@ -18,7 +18,7 @@ from ntagen.needle.vectors import cross, dot, scale, subtract
 from ntagen.plan.actions import Plan, Push
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER
 from ntagen.scene import Pose, Vector
-from ntagen.traces.chain import vector_of
+from ntagen.shapes import vector_of
 from ntagen.traces.matching import Match
 from ntagen.traces.prediction import Prediction
 from ntagen.units import deg_from_rad

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from ntagen.scene import Vector
+from ntagen.shapes import vector_of
 
 Matrix = tuple[Vector, Vector, Vector]
 """Three rows of a 3x3 matrix."""
@@ -31,8 +32,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def turned(matrix: Matrix, vector: Vector) -> Vector:
     """The product of a matrix and a vector."""
-    x, y, z = (row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in matrix)
-    return (x, y, z)
+    return vector_of(row[0] * vector[0] + row[1] * vector[1] + row[2] * vector[2] for row in matrix)
 
 
 def model_frame(axis: Vector) -> Matrix:

@@ -3,7 +3,7 @@
 from ntagen.shapes.ellipsoid import Ellipsoid
 from ntagen.shapes.field import SAMPLES_PER_MM, Field
 from ntagen.shapes.round import Capsule, HalfSpace, Sphere
-from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning
+from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning, vector_of
 from ntagen.shapes.skin import skin
 from ntagen.shapes.straight import Box, Cylinder
 from ntagen.shapes.surface import (
@@ -40,4 +40,5 @@ __all__ = [
     "thickness_mm",
     "triangles",
     "turning",
+    "vector_of",
 ]

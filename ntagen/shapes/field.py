@@ -32,6 +32,7 @@ from ntagen.shapes.shape import (
     moved,
     own_points,
     turned,
+    vector_of,
 )
 from ntagen.values import dataclass
 
@@ -94,8 +95,7 @@ class Field(Shape):
     @property
     def steps_mm(self) -> Vector:
         """The distances between neighbours of the grid along its axes."""
-        x, y, z = (e / (n - 1) for e, n in zip(self.extent_mm, self.counts, strict=True))
-        return (x, y, z)
+        return vector_of(e / (n - 1) for e, n in zip(self.extent_mm, self.counts, strict=True))
 
     @property
     def sample_doubt_mm(self) -> float:
@@ -249,5 +249,4 @@ class Field(Shape):
         """Where a point of the grid is."""
         x, y, z = (n * step for n, step in zip(place, self.steps_mm, strict=True))
         offset = along(self.axes, (x, y, z))
-        a, b, c = (p + q for p, q in zip(self.corner_mm, offset, strict=True))
-        return (a, b, c)
+        return vector_of(p + q for p, q in zip(self.corner_mm, offset, strict=True))

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, ClassVar, Final
 
 if TYPE_CHECKING:
@@ -106,6 +106,12 @@ class Shape(ABC):
     @abstractmethod
     def reach_mm(self) -> float:
         """The radius of a ball about `center_mm` that contains the shape."""
+
+
+def vector_of(numbers: Iterable[float]) -> Vector:
+    """Three numbers, such as those of an array, as a vector."""
+    x, y, z = map(float, numbers)
+    return (x, y, z)
 
 
 def along(axes: Axes, own: Vector) -> Vector:

@@ -18,6 +18,7 @@ from ntagen.shapes.shape import (
     own_point,
     own_points,
     turned,
+    vector_of,
 )
 from ntagen.values import dataclass
 
@@ -128,8 +129,7 @@ class Cylinder(Shape):
     @property
     def center_mm(self) -> Vector:
         """The middle between its ends."""
-        x, y, z = (0.5 * (a + b) for a, b in zip(self.start_mm, self.end_mm, strict=True))
-        return (x, y, z)
+        return vector_of(0.5 * (a + b) for a, b in zip(self.start_mm, self.end_mm, strict=True))
 
     @property
     def depth_mm(self) -> float:
@@ -226,5 +226,4 @@ def _one_beyond(*excess: float) -> float:
 
 def _between(start_mm: Vector, end_mm: Vector, share: float) -> Vector:
     """The point at a share of the way."""
-    x, y, z = (a + share * (b - a) for a, b in zip(start_mm, end_mm, strict=True))
-    return (x, y, z)
+    return vector_of(a + share * (b - a) for a, b in zip(start_mm, end_mm, strict=True))

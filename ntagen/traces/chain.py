@@ -15,18 +15,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.scene import Vector
-
 Array = NDArray[np.float64]
 
 LEAST_CURVATURE_PER_MM: Final = 1e-7
 """A radius of 10 km: a straighter chain gets this curvature, so that its arcs have a centre."""
-
-
-def vector_of(numbers: Array) -> Vector:
-    """A row of an array as a vector."""
-    x, y, z = numbers.tolist()
-    return (x, y, z)
 
 
 @dataclass(frozen=True, slots=True)

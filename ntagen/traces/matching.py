@@ -25,7 +25,8 @@ from ntagen.needle.path import nearest_on_all
 from ntagen.plan.actions import Action, Plan, Push, Roll
 from ntagen.plan.extract import step_length_mm
 from ntagen.scene import Needle, Pose, Scene
-from ntagen.traces.chain import LEAST_CURVATURE_PER_MM, vector_of
+from ntagen.shapes import vector_of
+from ntagen.traces.chain import LEAST_CURVATURE_PER_MM
 from ntagen.traces.refine import (
     CURVATURE_STD_RATIO,
     ERROR_MM,

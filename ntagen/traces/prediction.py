@@ -14,7 +14,7 @@ import numpy as np
 from ntagen.needle.path import nearest_on_all
 from ntagen.plan.actions import Plan, Push
 from ntagen.scene import Scene, Vector
-from ntagen.traces.chain import vector_of
+from ntagen.shapes import vector_of
 from ntagen.traces.matching import Match, Options, match_trace
 from ntagen.traces.trace import Trace, first_part
 
@@ -107,5 +107,4 @@ def _deviations(
 def _measured_at(trace: Trace, depth_mm: float) -> Vector:
     """Where the tip was at a depth, on the straight line between two points."""
     columns = (np.interp(depth_mm, trace.depths_mm, column) for column in trace.points_mm.T)
-    x, y, z = map(float, columns)
-    return (x, y, z)
+    return vector_of(columns)

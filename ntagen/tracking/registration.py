@@ -26,13 +26,14 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from ntagen.errors import InputError
 from ntagen.scene import Vector
+from ntagen.shapes import vector_of
 from ntagen.tracking.frames import Transform
 
 _Array = npt.NDArray[np.float64]
@@ -150,7 +151,7 @@ def register(pairs: Pairs) -> Fit:
     center, axes, spread = _shape(moved)
     left_out = [_left_out(i, source, target) for i in range(count)]
     return Fit(
-        transform=Transform(pairs.source, pairs.target, _rows(rotation), _vector(translation)),
+        transform=Transform(pairs.source, pairs.target, _rows(rotation), vector_of(translation)),
         names=pairs.names,
         residuals_mm=tuple(float(one) for one in residuals),
         left_out_mm=tuple(one[0] if one else None for one in left_out),
@@ -158,9 +159,9 @@ def register(pairs: Pairs) -> Fit:
         fle_mm=fre_mm / math.sqrt(1.0 - 2.0 / count),
         suspect=_suspect(pairs.names, left_out, fre_mm),
         is_flat=is_flat,
-        center_mm=_vector(center),
+        center_mm=vector_of(center),
         axes=_rows(axes),
-        spread_mm=_vector(spread),
+        spread_mm=vector_of(spread),
     )
 
 
@@ -347,9 +348,5 @@ def _rms(values: _Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _vector(values: Sequence[Any] | _Array) -> Vector:
-    return (float(values[0]), float(values[1]), float(values[2]))
-
-
 def _rows(matrix: _Array) -> tuple[Vector, Vector, Vector]:
-    return (_vector(matrix[0]), _vector(matrix[1]), _vector(matrix[2]))
+    return (vector_of(matrix[0]), vector_of(matrix[1]), vector_of(matrix[2]))
