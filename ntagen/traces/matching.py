@@ -269,7 +269,7 @@ class _Matcher:
             sequences = best_sequences(space, count, _REFINED)
             if not sequences:
                 return None
-            found = [self._fitted(space, steps) for steps in sequences]
+            found = [_Found(steps, self._fitted(space, steps)) for steps in sequences]
             best = min(found if best is None else [*found, best], key=_cost_mm2)
             if self._weighed(best) > _HOPELESS * bar:
                 break
@@ -294,8 +294,8 @@ class _Matcher:
             start,
         )
 
-    def _fitted(self, space: Space, steps: Steps) -> _Found:
-        """A sequence with its exact fit."""
+    def _fitted(self, space: Space, steps: Steps) -> Fitted:
+        """The exact fit of a sequence."""
         points, depths = self._trace.points_mm, self._trace.depths_mm
         rolls, curvature = space.rolls([steps]), space.curvature_per_mm
         position, frame = self._start.position_mm, self._start.frame
@@ -309,7 +309,7 @@ class _Matcher:
             begin = replace(
                 free, frame=oriented_on_grid(points, rolls, self._length_mm, free, begin.frame)
             )
-        return _Found(steps, fit_chain(points, rolls, self._length_mm, begin, self._freedom()))
+        return fit_chain(points, rolls, self._length_mm, begin, self._freedom())
 
     def _moved(self, space: Space, found: _Found) -> _Found:
         """The sequence after moves by one step, of single rolls or all, as long as they help."""
@@ -317,7 +317,8 @@ class _Matcher:
         while True:
             near = {moved for moved in _neighbours(found.steps) if space.contains(moved)} - tried
             tried |= near
-            best = min([*(self._fitted(space, one) for one in sorted(near)), found], key=_cost_mm2)
+            tries = [_Found(one, self._fitted(space, one)) for one in sorted(near)]
+            best = min([*tries, found], key=_cost_mm2)
             if best is found:
                 return found
             found = best
