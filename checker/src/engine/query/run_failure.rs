@@ -194,7 +194,7 @@ fn help_for(failure: &Failure, query: &Query) -> &'static str {
         Failure::RunTime(_) => "correct the model, or keep it out of this state",
         Failure::NoRate(_) if query.under.is_some() => {
             "give the location an exponential rate, or an invariant that bounds the time; or ask \
-             with --under-choice eager or lazy"
+             with --set 'under choice eager' or 'under choice lazy'"
         }
         Failure::NoRate(_) => {
             "give the location an exponential rate, or an invariant that bounds the time"
