@@ -25,17 +25,18 @@ impl Builder<'_> {
                 self.call(expr, result);
             }
             Kind::Ternary(condition, then, otherwise) => {
-                let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-                self.condition(condition, yes, no);
-                for (block, side) in [(yes, then), (no, otherwise)] {
-                    self.switch(block);
-                    self.effect(side);
-                    self.jump(end);
-                }
-                self.switch(end);
+                self.either_side(condition, [then, otherwise], |builder, side| {
+                    builder.effect(side);
+                });
             }
-            Kind::Assign(..) | Kind::Compound(..) | Kind::Step { .. } => {
-                self.target_of_effect(expr);
+            Kind::Assign(target, value) => {
+                self.assign(target, value);
+            }
+            Kind::Compound(operator, target, value) => {
+                self.compound(*operator, target, value, expr.span);
+            }
+            Kind::Step { target, delta, .. } => {
+                self.step(target, *delta, expr.span);
             }
             _ if expr.ty.is_register() => {
                 self.value(expr);
@@ -47,21 +48,6 @@ impl Builder<'_> {
         }
     }
 
-    fn target_of_effect(&mut self, expr: &Expr) {
-        match &expr.kind {
-            Kind::Assign(target, value) => {
-                self.assign(target, value);
-            }
-            Kind::Compound(operator, target, value) => {
-                self.compound(*operator, target, value, expr.span);
-            }
-            Kind::Step { target, delta, .. } => {
-                self.step(target, *delta, expr.span);
-            }
-            _ => unreachable!("called for assignments only"),
-        }
-    }
-
     /// Assigns a value and returns where it went.
     pub(super) fn assign(&mut self, target: &Expr, value: &Expr) -> Destination {
         let place = self.target(target, true);
@@ -70,12 +56,7 @@ impl Builder<'_> {
             if let Destination::Memory(address) = place
                 && address != source
             {
-                let words = target.ty.size().words;
-                self.emit(Instruction::CopyWords {
-                    target: address,
-                    source,
-                    words,
-                });
+                self.copy_words(address, source, target.ty.size().words);
             }
             return place;
         }
@@ -108,16 +89,7 @@ impl Builder<'_> {
                 let Index { length, .. } = array.index;
                 let stride = array.part.size().words;
                 self.counted((0, length as i32 - 1), span, &mut |builder, counter| {
-                    let site = builder.site(span);
-                    let scaled = builder.register(RegisterType::Integer);
-                    builder.emit(Instruction::ScaleIndex {
-                        target: scaled,
-                        index: counter,
-                        first: 0,
-                        length,
-                        stride,
-                        site,
-                    });
+                    let scaled = builder.scaled_index(counter, 0, length, stride, span);
                     let index = Some(builder.add_indices(address.index, scaled));
                     let part = Address { index, ..address };
                     builder.check_parts(part, &array.part, &given.part, span);
@@ -197,10 +169,6 @@ impl Builder<'_> {
     pub(super) fn default_words(&mut self, address: Address, image: Vec<i32>) {
         let words = image.len() as u32;
         let offset = super::store_constant(self.network, self.images, image);
-        self.emit(Instruction::CopyWords {
-            target: address,
-            source: at(Base::Constants, offset),
-            words,
-        });
+        self.copy_words(address, at(Base::Constants, offset), words);
     }
 }

@@ -3,9 +3,7 @@
 use super::super::typed::{ClockEffect, ClockSet, Expr, Kind, LocalId, Parameter, Root, Signature};
 use super::super::types::{Memory, Type};
 use super::{Builder, register_type};
-use crate::ir::{
-    Address, ClockAtom, FunctionId, Instruction, IntegerOperator, Register, RegisterType,
-};
+use crate::ir::{Address, ClockAtom, FunctionId, Instruction, IntegerOperator, Register};
 
 impl Builder<'_> {
     /// Calls a function. An array or struct that it returns goes to `result`.
@@ -26,9 +24,7 @@ impl Builder<'_> {
             clock_sets.push(set);
         }
         if let Some(address) = result {
-            let target = self.register(RegisterType::Address);
-            self.emit(Instruction::AddressOf { target, address });
-            registers.push(target);
+            registers.push(self.address_of(address));
         }
         self.record_effects(signature, &clock_sets);
         self.emit_call(*function, registers, &expr.ty)
@@ -77,20 +73,11 @@ impl Builder<'_> {
         if parameter.ty.is_aggregate() {
             let source = self.checked_address(argument, &parameter.ty);
             let address = if changes_follow {
-                let words = parameter.ty.size().words;
-                let target = self.frame(words);
-                self.emit(Instruction::CopyWords {
-                    target,
-                    source,
-                    words,
-                });
-                target
+                self.copied(source, parameter.ty.size().words)
             } else {
                 source
             };
-            let target = self.register(RegisterType::Address);
-            self.emit(Instruction::AddressOf { target, address });
-            registers.push(target);
+            registers.push(self.address_of(address));
             return None;
         }
         let value = self.stable_value(argument, changes_follow);
@@ -120,9 +107,7 @@ impl Builder<'_> {
                 let extent = extent(argument);
                 self.effects.writes.push(extent);
             }
-            let target = self.register(RegisterType::Address);
-            self.emit(Instruction::AddressOf { target, address });
-            registers.push(target);
+            registers.push(self.address_of(address));
         }
         (size.clocks > 0).then(|| {
             let (operand, set) = self.clock(argument);

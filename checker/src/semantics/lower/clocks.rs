@@ -96,7 +96,8 @@ impl Builder<'_> {
             } => self.compare_clocks(
                 expr,
                 comparisons(*relation, *negated),
-                (left.as_deref(), right.as_deref()),
+                left.as_deref(),
+                right.as_deref(),
                 bound,
             ),
             _ => unreachable!("checking leaves only conditions of the class of guards"),
@@ -107,7 +108,8 @@ impl Builder<'_> {
         &mut self,
         expr: &Expr,
         comparisons: Vec<(bool, bool, bool)>,
-        (left, right): (Option<&Expr>, Option<&Expr>),
+        left: Option<&Expr>,
+        right: Option<&Expr>,
         bound: &Expr,
     ) {
         let left = self.clock_or_reference(left);

@@ -11,12 +11,7 @@ impl Builder<'_> {
     pub(super) fn value(&mut self, expr: &Expr) -> Register {
         match &expr.kind {
             Kind::Int(value) => self.integer(*value),
-            Kind::Double(value) => {
-                let target = self.register(RegisterType::Double);
-                let value = (*value).into();
-                self.emit(Instruction::Double { target, value });
-                target
-            }
+            Kind::Double(value) => self.double(*value),
             Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
                 let target = self.target(expr, false);
                 self.load(target, &expr.ty)
@@ -44,9 +39,7 @@ impl Builder<'_> {
             }
             Kind::Not(inner) => {
                 let source = self.value(inner);
-                let target = self.register(RegisterType::Integer);
-                self.emit(Instruction::Not { target, source });
-                target
+                self.not(source)
             }
             Kind::And(..) | Kind::Or(..) => self.truth(expr),
             _ => self.operation(expr),
@@ -57,9 +50,7 @@ impl Builder<'_> {
         match &expr.kind {
             Kind::ToDouble(inner) => {
                 let source = self.value(inner);
-                let target = self.register(RegisterType::Double);
-                self.emit(Instruction::IntegerToDouble { target, source });
-                target
+                self.as_double(source)
             }
             Kind::ClockReading(inner) => {
                 self.effects.mentions_clocks = true;
@@ -97,15 +88,7 @@ impl Builder<'_> {
             }
             Kind::Real(operator, left, right) => {
                 let (left, right) = self.operands(left, right);
-                let target = self.register(RegisterType::Double);
-                let operator = *operator;
-                self.emit(Instruction::DoubleArithmetic {
-                    operator,
-                    target,
-                    left,
-                    right,
-                });
-                target
+                self.real(*operator, left, right)
             }
             Kind::Math(function, arguments) => {
                 let arguments = self.stable_values(arguments);
@@ -124,48 +107,30 @@ impl Builder<'_> {
     }
 
     fn comparison(&mut self, expr: &Expr) -> Register {
-        let target = self.register(RegisterType::Integer);
         match &expr.kind {
             Kind::Compare(relation, left, right) => {
                 let (left, right) = self.operands(left, right);
-                let relation = *relation;
-                self.emit(Instruction::CompareIntegers {
-                    relation,
-                    target,
-                    left,
-                    right,
-                });
+                self.compare(*relation, left, right)
             }
             Kind::CompareReal(relation, left, right) => {
                 let (left, right) = self.operands(left, right);
-                let relation = *relation;
-                self.emit(Instruction::CompareDoubles {
-                    relation,
-                    target,
-                    left,
-                    right,
-                });
+                self.compare_doubles(*relation, left, right)
             }
             Kind::CompareWords(equal, left, right) => {
                 let words = left.ty.size().words;
                 let left = self.stable_address(left, right);
                 let right = self.address(right);
+                let target = self.register(RegisterType::Integer);
                 self.emit(Instruction::EqualWords {
                     target,
                     left,
                     right,
                     words,
                 });
-                if !equal {
-                    let source = target;
-                    let target = self.register(RegisterType::Integer);
-                    self.emit(Instruction::Not { target, source });
-                    return target;
-                }
+                if *equal { target } else { self.not(target) }
             }
             other => unreachable!("checking leaves no such value: {other:?}"),
         }
-        target
     }
 
     /// The address of an array or struct that the evaluation of `later` does not change.
@@ -174,13 +139,13 @@ impl Builder<'_> {
         if !later.has_effect() {
             return source;
         }
-        let words = expr.ty.size().words;
+        self.copied(source, expr.ty.size().words)
+    }
+
+    /// A copy of words in the frame.
+    pub(super) fn copied(&mut self, source: Address, words: u32) -> Address {
         let target = self.frame(words);
-        self.emit(Instruction::CopyWords {
-            target,
-            source,
-            words,
-        });
+        self.copy_words(target, source, words);
         target
     }
 
@@ -211,14 +176,9 @@ impl Builder<'_> {
 
     fn truth(&mut self, expr: &Expr) -> Register {
         let target = self.register(RegisterType::Integer);
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(expr, yes, no);
-        for (block, value) in [(yes, 1), (no, 0)] {
-            self.switch(block);
-            self.emit(Instruction::Integer { target, value });
-            self.jump(end);
-        }
-        self.switch(end);
+        self.either_side(expr, [1, 0], |builder, value| {
+            builder.set_integer(target, value);
+        });
         target
     }
 
@@ -230,15 +190,10 @@ impl Builder<'_> {
         ty: &Type,
     ) -> Register {
         let target = self.register(register_type(ty));
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(condition, yes, no);
-        for (block, side) in [(yes, then), (no, otherwise)] {
-            self.switch(block);
-            let source = self.value(side);
-            self.copy(target, source);
-            self.jump(end);
-        }
-        self.switch(end);
+        self.either_side(condition, [then, otherwise], |builder, side| {
+            let source = builder.value(side);
+            builder.copy(target, source);
+        });
         target
     }
 

@@ -4,8 +4,8 @@ use super::super::typed::{Expr, Kind, Signature};
 use super::{Builder, Home, at, register_type, store_constant};
 use crate::diagnostics::Span;
 use crate::ir::{
-    Address, Base, ExternalArgument, ExternalId, ExternalSignature, FunctionId, Instruction,
-    Register, RegisterType, RunTimeErrorKind, Terminator,
+    Base, ExternalArgument, ExternalId, ExternalSignature, FunctionId, Instruction, Register,
+    RunTimeErrorKind, Terminator,
 };
 
 impl Builder<'_> {
@@ -74,9 +74,6 @@ impl Builder<'_> {
             words.push(i32::from_le_bytes(last));
         }
         let offset = store_constant(self.network, self.images, words);
-        let target = self.register(RegisterType::Address);
-        let address: Address = at(Base::Constants, offset);
-        self.emit(Instruction::AddressOf { target, address });
-        target
+        self.address_of(at(Base::Constants, offset))
     }
 }

@@ -27,8 +27,8 @@ use super::places::Destination;
 use super::{Builder, at};
 use crate::diagnostics::Span;
 use crate::ir::{
-    Address, Base, DoubleOperator, FunctionId, Instruction, IntegerOperator, Register,
-    RegisterType, Relation, Terminator,
+    Address, Base, DoubleOperator, FunctionId, IntegerOperator, Register, RegisterType, Relation,
+    Terminator,
 };
 use crate::syntax::ast::Quantifier;
 
@@ -74,7 +74,7 @@ impl Builder<'_> {
         for condition in conditions {
             if let (Some(shared), true) = (shared, condition.is_timed()) {
                 let part = self.timed(condition, shared);
-                let both = self.bits(IntegerOperator::And, mask, part, condition.span);
+                let both = self.arithmetic(IntegerOperator::And, mask, part, condition.span);
                 self.copy(mask, both);
                 let next = self.new_block();
                 self.terminate(Terminator::Branch(mask, next, fail));
@@ -139,7 +139,7 @@ impl Builder<'_> {
             Kind::Not(inner) => {
                 let inner = self.timed(inner, shared);
                 let all = self.integer(ALWAYS);
-                self.bits(IntegerOperator::Xor, inner, all, expr.span)
+                self.arithmetic(IntegerOperator::Xor, inner, all, expr.span)
             }
             Kind::And(left, right) => self.both(left, right, shared, expr.span),
             Kind::Or(left, right) => self.either(left, right, shared, expr.span),
@@ -148,39 +148,12 @@ impl Builder<'_> {
                 let then = self.timed(then, shared);
                 let otherwise = self.timed(otherwise, shared);
                 let all = self.integer(ALWAYS);
-                let not = self.bits(IntegerOperator::Xor, condition, all, expr.span);
-                let then = self.bits(IntegerOperator::And, condition, then, expr.span);
-                let otherwise = self.bits(IntegerOperator::And, not, otherwise, expr.span);
-                self.bits(IntegerOperator::Or, then, otherwise, expr.span)
+                let not = self.arithmetic(IntegerOperator::Xor, condition, all, expr.span);
+                let then = self.arithmetic(IntegerOperator::And, condition, then, expr.span);
+                let otherwise = self.arithmetic(IntegerOperator::And, not, otherwise, expr.span);
+                self.arithmetic(IntegerOperator::Or, then, otherwise, expr.span)
             }
-            Kind::Quantifier {
-                quantifier,
-                local,
-                range,
-                body,
-            } => {
-                let for_all = *quantifier == Quantifier::ForAll;
-                let (start, operator) = if for_all {
-                    (ALWAYS, IntegerOperator::And)
-                } else {
-                    (0, IntegerOperator::Or)
-                };
-                let result = self.integer(start);
-                let end = self.new_block();
-                self.count(*local, *range, expr, &mut |builder| {
-                    let part = builder.timed(body, shared);
-                    let joined = builder.bits(operator, result, part, expr.span);
-                    builder.copy(result, joined);
-                    let next = builder.new_block();
-                    let decided = builder.integer(ALWAYS - start);
-                    let is_decided = builder.related(Relation::Equal, result, decided);
-                    builder.terminate(Terminator::Branch(is_decided, end, next));
-                    builder.switch(next);
-                });
-                self.jump(end);
-                self.switch(end);
-                result
-            }
+            Kind::Quantifier { .. } => self.timed_quantifier(expr, shared),
             Kind::CompareReal(relation, left, right) => {
                 let [left, right] = [left, right].map(|side| {
                     if curved_number(side).is_some() {
@@ -200,33 +173,52 @@ impl Builder<'_> {
         }
     }
 
+    fn timed_quantifier(&mut self, expr: &Expr, shared: Horizon) -> Register {
+        let Kind::Quantifier {
+            quantifier,
+            local,
+            range,
+            body,
+        } = &expr.kind
+        else {
+            unreachable!("called for quantifiers only");
+        };
+        let (start, operator) = match quantifier {
+            Quantifier::ForAll => (ALWAYS, IntegerOperator::And),
+            _ => (0, IntegerOperator::Or),
+        };
+        let result = self.integer(start);
+        let end = self.new_block();
+        self.count(*local, *range, expr, &mut |builder| {
+            let part = builder.timed(body, shared);
+            let joined = builder.arithmetic(operator, result, part, expr.span);
+            builder.copy(result, joined);
+            let next = builder.new_block();
+            let decided = builder.integer(ALWAYS - start);
+            let is_decided = builder.compare(Relation::Equal, result, decided);
+            builder.terminate(Terminator::Branch(is_decided, end, next));
+            builder.switch(next);
+        });
+        self.jump(end);
+        self.switch(end);
+        result
+    }
+
     /// Adds what is known of a part to the signature.
     fn sign(&mut self, code: Register, shared: Horizon) {
         let base = self.double(SIGNATURE_BASE);
         let before = self.real(DoubleOperator::Multiply, shared.signature, base);
-        let target = self.register(RegisterType::Double);
-        self.emit(Instruction::IntegerToDouble {
-            target,
-            source: code,
-        });
-        let signature = self.real(DoubleOperator::Add, before, target);
+        let code = self.as_double(code);
+        let signature = self.real(DoubleOperator::Add, before, code);
         self.copy(shared.signature, signature);
     }
 
     /// The mask of what does not change as time passes.
     fn untimed(&mut self, expr: &Expr) -> Register {
         let mask = self.register(RegisterType::Integer);
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(expr, yes, no);
-        for (block, value) in [(yes, ALWAYS), (no, 0)] {
-            self.switch(block);
-            self.emit(Instruction::Integer {
-                target: mask,
-                value,
-            });
-            self.jump(end);
-        }
-        self.switch(end);
+        self.either_side(expr, [ALWAYS, 0], |builder, value| {
+            builder.set_integer(mask, value);
+        });
         mask
     }
 
@@ -238,7 +230,7 @@ impl Builder<'_> {
         self.terminate(Terminator::Branch(mask, next, end));
         self.switch(next);
         let second = self.timed(right, shared);
-        let both = self.bits(IntegerOperator::And, mask, second, span);
+        let both = self.arithmetic(IntegerOperator::And, mask, second, span);
         self.copy(mask, both);
         self.jump(end);
         self.switch(end);
@@ -251,11 +243,11 @@ impl Builder<'_> {
         self.copy(mask, first);
         let (next, end) = (self.new_block(), self.new_block());
         let all = self.integer(ALWAYS);
-        let is_decided = self.related(Relation::Equal, mask, all);
+        let is_decided = self.compare(Relation::Equal, mask, all);
         self.terminate(Terminator::Branch(is_decided, end, next));
         self.switch(next);
         let second = self.timed(right, shared);
-        let either = self.bits(IntegerOperator::Or, mask, second, span);
+        let either = self.arithmetic(IntegerOperator::Or, mask, second, span);
         self.copy(mask, either);
         self.jump(end);
         self.switch(end);
@@ -278,17 +270,12 @@ impl Builder<'_> {
             Kind::Ternary(condition, then, otherwise) => {
                 let value = self.register(RegisterType::Double);
                 let slope = self.register(RegisterType::Double);
-                let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-                self.condition(condition, yes, no);
-                for (block, side) in [(yes, then), (no, otherwise)] {
-                    self.switch(block);
-                    let side = self.linear(side, shared);
-                    self.copy(value, side.value);
-                    let side_slope = side.slope.unwrap_or_else(|| self.double(0.0));
-                    self.copy(slope, side_slope);
-                    self.jump(end);
-                }
-                self.switch(end);
+                self.either_side(condition, [then, otherwise], |builder, side| {
+                    let side = builder.linear(side, shared);
+                    builder.copy(value, side.value);
+                    let side_slope = side.slope.unwrap_or_else(|| builder.double(0.0));
+                    builder.copy(slope, side_slope);
+                });
                 let slope = Some(slope);
                 Linear { value, slope }
             }
@@ -372,34 +359,34 @@ impl Builder<'_> {
         let zero = self.double(0.0);
         let tolerance = self.tolerance(left.value, right.value);
         let minus = self.real(DoubleOperator::Subtract, zero, tolerance);
-        let at_most = self.real_related(Relation::LessEqual, gap, tolerance);
-        let at_least = self.real_related(Relation::GreaterEqual, gap, minus);
-        let near = self.bits(IntegerOperator::And, at_most, at_least, span);
+        let at_most = self.compare_doubles(Relation::LessEqual, gap, tolerance);
+        let at_least = self.compare_doubles(Relation::GreaterEqual, gap, minus);
+        let near = self.arithmetic(IntegerOperator::And, at_most, at_least, span);
         self.bound_horizon(gap, slope, near, shared, span);
         let one = self.integer(1);
-        let at_least_code = self.bits(IntegerOperator::ShiftLeft, at_least, one, span);
-        let code = self.bits(IntegerOperator::Or, at_most, at_least_code, span);
+        let at_least_code = self.arithmetic(IntegerOperator::ShiftLeft, at_least, one, span);
+        let code = self.arithmetic(IntegerOperator::Or, at_most, at_least_code, span);
         self.sign(code, shared);
         // What holds behind the moment where the two are equal depends on the slope.
         let (now, turned, keeps) = match relation {
             Relation::LessEqual => (at_most, Relation::Greater, false),
             Relation::GreaterEqual => (at_least, Relation::Less, false),
             Relation::Equal => (near, Relation::NotEqual, false),
-            Relation::Less => (self.opposite(at_least), Relation::Less, true),
-            Relation::Greater => (self.opposite(at_most), Relation::Greater, true),
-            Relation::NotEqual => (self.opposite(near), Relation::NotEqual, true),
+            Relation::Less => (self.not(at_least), Relation::Less, true),
+            Relation::Greater => (self.not(at_most), Relation::Greater, true),
+            Relation::NotEqual => (self.not(near), Relation::NotEqual, true),
         };
-        let turns = self.real_related(turned, slope, zero);
-        let turns = self.bits(IntegerOperator::And, near, turns, span);
+        let turns = self.compare_doubles(turned, slope, zero);
+        let turns = self.arithmetic(IntegerOperator::And, near, turns, span);
         let behind = if keeps {
-            self.bits(IntegerOperator::Or, now, turns, span)
+            self.arithmetic(IntegerOperator::Or, now, turns, span)
         } else {
-            let stays = self.opposite(turns);
-            self.bits(IntegerOperator::And, now, stays, span)
+            let stays = self.not(turns);
+            self.arithmetic(IntegerOperator::And, now, stays, span)
         };
         let one = self.integer(1);
-        let shifted = self.bits(IntegerOperator::ShiftLeft, behind, one, span);
-        self.bits(IntegerOperator::Or, now, shifted, span)
+        let shifted = self.arithmetic(IntegerOperator::ShiftLeft, behind, one, span);
+        self.arithmetic(IntegerOperator::Or, now, shifted, span)
     }
 
     /// How far two numbers may be apart and count as equal.
@@ -426,9 +413,9 @@ impl Builder<'_> {
     ) {
         let zero = self.double(0.0);
         let product = self.real(DoubleOperator::Multiply, gap, slope);
-        let closes = self.real_related(Relation::Less, product, zero);
-        let far = self.opposite(near);
-        let closes = self.bits(IntegerOperator::And, closes, far, span);
+        let closes = self.compare_doubles(Relation::Less, product, zero);
+        let far = self.not(near);
+        let closes = self.arithmetic(IntegerOperator::And, closes, far, span);
         let (yes, end) = (self.new_block(), self.new_block());
         self.terminate(Terminator::Branch(closes, yes, end));
         self.switch(yes);
@@ -438,62 +425,6 @@ impl Builder<'_> {
         self.copy(shared.least, least);
         self.jump(end);
         self.switch(end);
-    }
-
-    fn double(&mut self, value: f64) -> Register {
-        let target = self.register(RegisterType::Double);
-        let value = value.into();
-        self.emit(Instruction::Double { target, value });
-        target
-    }
-
-    fn real(&mut self, operator: DoubleOperator, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.emit(Instruction::DoubleArithmetic {
-            operator,
-            target,
-            left,
-            right,
-        });
-        target
-    }
-
-    fn real_related(&mut self, relation: Relation, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::CompareDoubles {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
-    }
-
-    fn related(&mut self, relation: Relation, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::CompareIntegers {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
-    }
-
-    fn opposite(&mut self, source: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::Not { target, source });
-        target
-    }
-
-    fn bits(
-        &mut self,
-        operator: IntegerOperator,
-        left: Register,
-        right: Register,
-        span: Span,
-    ) -> Register {
-        self.arithmetic(operator, left, right, span)
     }
 }
 

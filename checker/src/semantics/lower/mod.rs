@@ -33,8 +33,8 @@ use super::typed::{Effects, Expr, Local, LocalId, Statement};
 use super::types::{Memory, Type};
 use crate::diagnostics::Span;
 use crate::ir::{
-    Address, Base, Block, BlockId, Function, FunctionId, Instruction, IntegerOperator, Network,
-    Register, RegisterType, Site, SiteId, Terminator,
+    Address, Base, Block, BlockId, DoubleOperator, Function, FunctionId, Instruction,
+    IntegerOperator, Network, Register, RegisterType, Relation, Site, SiteId, Terminator,
 };
 
 /// Images of values in the constant memory that were stored before: by a hash of the words, where
@@ -173,11 +173,7 @@ impl<'n> Builder<'n> {
         let target = self.frame(ty.size().words);
         let offset = target.offset;
         if ty.is_aggregate() {
-            self.emit(Instruction::CopyWords {
-                target,
-                source: at(Base::Register(register), 0),
-                words: ty.size().words,
-            });
+            self.copy_words(target, at(Base::Register(register), 0), ty.size().words);
         } else {
             self.store(places::Destination::Memory(target), register, &ty);
         }
@@ -212,12 +208,7 @@ impl<'n> Builder<'n> {
         let target = at(Base::State, 0);
         if expr.ty.is_aggregate() {
             let source = self.address(expr);
-            let words = expr.ty.size().words;
-            self.emit(Instruction::CopyWords {
-                target,
-                source,
-                words,
-            });
+            self.copy_words(target, source, expr.ty.size().words);
         } else {
             let value = self.value(expr);
             self.store(places::Destination::Memory(target), value, &expr.ty);
@@ -332,28 +323,132 @@ impl<'n> Builder<'n> {
         self.terminate(Terminator::Jump(block));
     }
 
+    /// Goes on with one of two sides as a condition says; both end behind them.
+    fn either_side<T>(
+        &mut self,
+        condition: &Expr,
+        sides: [T; 2],
+        mut lower: impl FnMut(&mut Self, T),
+    ) {
+        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
+        self.condition(condition, yes, no);
+        for (block, side) in [yes, no].into_iter().zip(sides) {
+            self.switch(block);
+            lower(self, side);
+            self.jump(end);
+        }
+        self.switch(end);
+    }
+
     fn integer(&mut self, value: i32) -> Register {
         let target = self.register(RegisterType::Integer);
+        self.set_integer(target, value);
+        target
+    }
+
+    fn set_integer(&mut self, target: Register, value: i32) {
         self.emit(Instruction::Integer { target, value });
+    }
+
+    fn double(&mut self, value: f64) -> Register {
+        let target = self.register(RegisterType::Double);
+        let value = value.into();
+        self.emit(Instruction::Double { target, value });
         target
     }
 
     fn zero(&mut self, ty: RegisterType) -> Register {
-        if ty == RegisterType::Double {
-            let target = self.register(ty);
-            self.emit(Instruction::Double {
-                target,
-                value: 0.0.into(),
-            });
-            return target;
+        match ty {
+            RegisterType::Double => self.double(0.0),
+            _ => self.integer(0),
         }
-        self.integer(0)
+    }
+
+    fn as_double(&mut self, source: Register) -> Register {
+        let target = self.register(RegisterType::Double);
+        self.emit(Instruction::IntegerToDouble { target, source });
+        target
+    }
+
+    fn not(&mut self, source: Register) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::Not { target, source });
+        target
     }
 
     fn copy(&mut self, target: Register, source: Register) {
         if target != source {
             self.emit(Instruction::Copy { target, source });
         }
+    }
+
+    fn copy_words(&mut self, target: Address, source: Address, words: u32) {
+        self.emit(Instruction::CopyWords {
+            target,
+            source,
+            words,
+        });
+    }
+
+    fn address_of(&mut self, address: Address) -> Register {
+        let target = self.register(RegisterType::Address);
+        self.emit(Instruction::AddressOf { target, address });
+        target
+    }
+
+    /// The offset of a part of an array, checked against its length.
+    fn scaled_index(
+        &mut self,
+        index: Register,
+        first: i32,
+        length: u32,
+        stride: u32,
+        span: Span,
+    ) -> Register {
+        let site = self.site(span);
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::ScaleIndex {
+            target,
+            index,
+            first,
+            length,
+            stride,
+            site,
+        });
+        target
+    }
+
+    fn compare(&mut self, relation: Relation, left: Register, right: Register) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::CompareIntegers {
+            relation,
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    fn compare_doubles(&mut self, relation: Relation, left: Register, right: Register) -> Register {
+        let target = self.register(RegisterType::Integer);
+        self.emit(Instruction::CompareDoubles {
+            relation,
+            target,
+            left,
+            right,
+        });
+        target
+    }
+
+    fn real(&mut self, operator: DoubleOperator, left: Register, right: Register) -> Register {
+        let target = self.register(RegisterType::Double);
+        self.emit(Instruction::DoubleArithmetic {
+            operator,
+            target,
+            left,
+            right,
+        });
+        target
     }
 
     fn arithmetic(
@@ -376,10 +471,10 @@ impl<'n> Builder<'n> {
     }
 }
 
-/// The registers that hold values of a type.
 /// What it takes to lower a function, as a rule: see [`cancellation::work`].
 const UNITS_FOR_FUNCTION: usize = 1 << 13;
 
+/// The kind of register that holds values of a type.
 fn register_type(ty: &Type) -> RegisterType {
     if ty.is_real() {
         RegisterType::Double

@@ -61,7 +61,7 @@ impl Builder<'_> {
                 stride,
             } => {
                 let path = self.path(array, memory);
-                self.indexed(path, index, (*first, *length, stride.of(memory)))
+                self.indexed(path, index, *first, *length, stride.of(memory))
             }
             _ => {
                 let address = self.address(expr);
@@ -102,7 +102,9 @@ impl Builder<'_> {
         &mut self,
         mut path: Path,
         index: &Expr,
-        (first, length, stride): (i32, u32, u32),
+        first: i32,
+        length: u32,
+        stride: u32,
     ) -> Path {
         let position = index.constant().map(|i| i64::from(i) - i64::from(first));
         if let Some(position) = position
@@ -112,16 +114,7 @@ impl Builder<'_> {
             return path;
         }
         let source = self.value(index);
-        let site = self.site(index.span);
-        let scaled = self.register(RegisterType::Integer);
-        self.emit(Instruction::ScaleIndex {
-            target: scaled,
-            index: source,
-            first,
-            length,
-            stride,
-            site,
-        });
+        let scaled = self.scaled_index(source, first, length, stride, index.span);
         if length == 0 {
             // Any index is an error, so nothing is touched; what comes after must lie somewhere all
             // the same.
@@ -173,7 +166,16 @@ impl Builder<'_> {
                 }
             }
             Kind::Ternary(condition, then, otherwise) => {
-                Destination::Memory(self.choose_address(condition, then, otherwise, written))
+                let address =
+                    self.choose_address(condition, then, otherwise, |builder, side| match builder
+                        .target(side, written)
+                    {
+                        Destination::Memory(address) => address,
+                        Destination::Register(_) => {
+                            unreachable!("places that are chosen from lie in memory")
+                        }
+                    });
+                Destination::Memory(address)
             }
             Kind::Assign(target, value) => self.assign(target, value),
             Kind::Compound(operator, target, value) => {
@@ -189,27 +191,14 @@ impl Builder<'_> {
         condition: &Expr,
         then: &Expr,
         otherwise: &Expr,
-        written: bool,
+        mut of: impl FnMut(&mut Self, &Expr) -> Address,
     ) -> Address {
-        let chosen = self.register(RegisterType::Address);
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(condition, yes, no);
-        for (block, side) in [(yes, then), (no, otherwise)] {
-            self.switch(block);
-            let address = match self.target(side, written) {
-                Destination::Memory(address) => address,
-                Destination::Register(_) => {
-                    unreachable!("places that are chosen from lie in memory")
-                }
-            };
-            self.emit(Instruction::AddressOf {
-                target: chosen,
-                address,
-            });
-            self.jump(end);
-        }
-        self.switch(end);
-        at(Base::Register(chosen), 0)
+        let target = self.register(RegisterType::Address);
+        self.either_side(condition, [then, otherwise], |builder, side| {
+            let address = of(builder, side);
+            builder.emit(Instruction::AddressOf { target, address });
+        });
+        at(Base::Register(target), 0)
     }
 
     /// Records that words may be changed, if they are words of the state.
@@ -228,7 +217,7 @@ impl Builder<'_> {
                 target
             }
             Kind::Ternary(condition, then, otherwise) if expr.ty.is_aggregate() => {
-                self.choose_value_address(condition, then, otherwise)
+                self.choose_address(condition, then, otherwise, Self::address)
             }
             _ if expr.is_place() => match self.target(expr, false) {
                 Destination::Memory(address) => address,
@@ -239,23 +228,6 @@ impl Builder<'_> {
                 self.spill(value, &expr.ty)
             }
         }
-    }
-
-    fn choose_value_address(&mut self, condition: &Expr, then: &Expr, otherwise: &Expr) -> Address {
-        let chosen = self.register(RegisterType::Address);
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(condition, yes, no);
-        for (block, side) in [(yes, then), (no, otherwise)] {
-            self.switch(block);
-            let address = self.address(side);
-            self.emit(Instruction::AddressOf {
-                target: chosen,
-                address,
-            });
-            self.jump(end);
-        }
-        self.switch(end);
-        at(Base::Register(chosen), 0)
     }
 
     /// Puts a value into memory of its own.
@@ -341,18 +313,13 @@ impl Builder<'_> {
         otherwise: &Expr,
     ) -> (ClockOperand, ClockSet) {
         let chosen = self.register(RegisterType::Integer);
-        let (yes, no, end) = (self.new_block(), self.new_block(), self.new_block());
-        self.condition(condition, yes, no);
         let mut sets = Vec::new();
-        for (block, side) in [(yes, then), (no, otherwise)] {
-            self.switch(block);
-            let (operand, set) = self.clock(side);
-            let number = self.clock_number(operand);
-            self.copy(chosen, number);
-            self.jump(end);
+        self.either_side(condition, [then, otherwise], |builder, side| {
+            let (operand, set) = builder.clock(side);
+            let number = builder.clock_number(operand);
+            builder.copy(chosen, number);
             sets.push(set);
-        }
-        self.switch(end);
+        });
         let operand = ClockOperand {
             first: ClockId(0),
             index: Some(chosen),

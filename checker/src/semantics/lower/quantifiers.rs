@@ -5,7 +5,7 @@ use super::super::types::{Interval, Type};
 use super::places::Destination;
 use super::{Builder, Home, register_type};
 use crate::diagnostics::Span;
-use crate::ir::{Instruction, IntegerOperator, Register, RegisterType, Relation, Terminator};
+use crate::ir::{DoubleOperator, IntegerOperator, Register, Relation, Terminator};
 use crate::syntax::ast::Quantifier;
 
 impl Builder<'_> {
@@ -31,10 +31,7 @@ impl Builder<'_> {
             });
         } else {
             let decided = i32::from(*quantifier == Quantifier::Exists);
-            self.emit(Instruction::Integer {
-                target: result,
-                value: decided,
-            });
+            self.set_integer(result, decided);
             self.count(*local, *range, expr, &mut |builder| {
                 let next = builder.new_block();
                 let (yes, no) = if decided == 1 {
@@ -45,10 +42,7 @@ impl Builder<'_> {
                 builder.condition(body, yes, no);
                 builder.switch(next);
             });
-            self.emit(Instruction::Integer {
-                target: result,
-                value: 1 - decided,
-            });
+            self.set_integer(result, 1 - decided);
         }
         self.jump(end);
         self.switch(end);
@@ -59,14 +53,7 @@ impl Builder<'_> {
         if expr.ty != Type::Double {
             return self.arithmetic(IntegerOperator::Add, left, right, expr.span);
         }
-        let target = self.register(RegisterType::Double);
-        self.emit(Instruction::DoubleArithmetic {
-            operator: crate::ir::DoubleOperator::Add,
-            target,
-            left,
-            right,
-        });
-        target
+        self.real(DoubleOperator::Add, left, right)
     }
 
     /// Runs `body` for each value of a local from `low` to `high`.
@@ -94,11 +81,7 @@ impl Builder<'_> {
         if low > high {
             return;
         }
-        let counter = self.register(RegisterType::Integer);
-        self.emit(Instruction::Integer {
-            target: counter,
-            value: low,
-        });
+        let counter = self.integer(low);
         let (head, next, end) = (self.new_block(), self.new_block(), self.new_block());
         self.jump(head);
         self.switch(head);
@@ -106,13 +89,7 @@ impl Builder<'_> {
         body(self, counter);
         self.loops -= 1;
         let last = self.integer(high);
-        let is_last = self.register(RegisterType::Integer);
-        self.emit(Instruction::CompareIntegers {
-            relation: Relation::Equal,
-            target: is_last,
-            left: counter,
-            right: last,
-        });
+        let is_last = self.compare(Relation::Equal, counter, last);
         self.terminate(Terminator::Branch(is_last, end, next));
         self.switch(next);
         let one = self.integer(1);

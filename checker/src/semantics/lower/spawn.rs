@@ -7,8 +7,7 @@ use super::places::Destination;
 use super::{Builder, Home, at, store_constant};
 use crate::diagnostics::Span;
 use crate::ir::{
-    Address, Base, FunctionId, Instruction, IntegerOperator, Register, RegisterType, Relation,
-    RunTimeErrorKind, Terminator,
+    Address, Base, FunctionId, IntegerOperator, Register, Relation, RunTimeErrorKind, Terminator,
 };
 
 impl Builder<'_> {
@@ -27,36 +26,19 @@ impl Builder<'_> {
         let last = slots.count as i32 - 1;
         self.counted((0, last), span, &mut |builder, number| {
             let location = builder.slot_word(LOCATION_WORDS + slots.first, 1, slots, number, span);
-            let found = builder.register(RegisterType::Integer);
-            builder.emit(Instruction::LoadInteger {
-                target: found,
-                address: location,
-            });
+            let location = Destination::Memory(location);
+            let found = builder.load(location, &Type::ANY_INT);
             let absent = builder.integer(slots.absent.0 as i32);
-            let is_free = builder.register(RegisterType::Integer);
-            builder.emit(Instruction::CompareIntegers {
-                relation: Relation::Equal,
-                target: is_free,
-                left: found,
-                right: absent,
-            });
+            let is_free = builder.compare(Relation::Equal, found, absent);
             let (free, next) = (builder.new_block(), builder.new_block());
             builder.terminate(Terminator::Branch(is_free, free, next));
             builder.switch(free);
             let source = builder.integer(slots.initial.0 as i32);
-            builder.emit(Instruction::StoreInteger {
-                address: location,
-                source,
-            });
+            builder.store(location, source, &Type::ANY_INT);
             for ((first, words), image) in [slots.words, slots.meta_words].into_iter().zip(images) {
                 if words > 0 {
                     let target = builder.slot_word(first, words, slots, number, span);
-                    let source = at(Base::Constants, image);
-                    builder.emit(Instruction::CopyWords {
-                        target,
-                        source,
-                        words,
-                    });
+                    builder.copy_words(target, at(Base::Constants, image), words);
                 }
             }
             builder.store_arguments(signature, slots, number, span);
@@ -78,20 +60,10 @@ impl Builder<'_> {
         number: Register,
         span: Span,
     ) -> Address {
-        let site = self.site(span);
-        let index = self.register(RegisterType::Integer);
-        self.emit(Instruction::ScaleIndex {
-            target: index,
-            index: number,
-            first: 0,
-            length: slots.count,
-            stride: words,
-            site,
-        });
+        let index = self.scaled_index(number, 0, slots.count, words, span);
         Address {
-            base: Base::State,
-            offset: first,
             index: Some(index),
+            ..at(Base::State, first)
         }
     }
 
@@ -120,11 +92,7 @@ impl Builder<'_> {
                     self.store(Destination::Memory(target), value, ty);
                 }
                 Some(Home::Frame(frame)) => {
-                    self.emit(Instruction::CopyWords {
-                        target,
-                        source: at(Base::Frame, frame),
-                        words: parameter.ty.size().words,
-                    });
+                    self.copy_words(target, at(Base::Frame, frame), parameter.ty.size().words);
                 }
                 _ => unreachable!("arguments are values"),
             }
@@ -132,14 +100,10 @@ impl Builder<'_> {
     }
 
     fn count_instance(&mut self, counter: &Place, span: Span) {
-        let address = at(Base::State, counter.base.words);
-        let before = self.register(RegisterType::Integer);
-        self.emit(Instruction::LoadInteger {
-            target: before,
-            address,
-        });
+        let count = Destination::Memory(at(Base::State, counter.base.words));
+        let before = self.load(count, &Type::ANY_INT);
         let one = self.integer(1);
-        let source = self.arithmetic(IntegerOperator::Add, before, one, span);
-        self.emit(Instruction::StoreInteger { address, source });
+        let after = self.arithmetic(IntegerOperator::Add, before, one, span);
+        self.store(count, after, &Type::ANY_INT);
     }
 }

@@ -122,12 +122,7 @@ impl Builder<'_> {
         if let Some(result) = self.result_address {
             let ty = self.result.clone();
             let source = self.checked_address(value, &ty);
-            let words = ty.size().words;
-            self.emit(Instruction::CopyWords {
-                target: at(Base::Register(result), 0),
-                source,
-                words,
-            });
+            self.copy_words(at(Base::Register(result), 0), source, ty.size().words);
             self.terminate(Terminator::Return(None));
             return;
         }
