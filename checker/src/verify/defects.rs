@@ -25,7 +25,8 @@ pub(super) const MOST_REGIONS: u64 = 200_000;
 pub(super) fn find(
     rules: &Rules<'_>,
     regions: Regions,
-    (start, is_everywhere): (State, bool),
+    start: State,
+    is_everywhere: bool,
     is_won: &dyn Fn(&State) -> bool,
     effort: &mut Effort<'_>,
 ) -> Result<Option<Violation>, Error> {

@@ -4,7 +4,7 @@
 use crate::ir::Network;
 
 use super::moves::{Part, is_same_entry};
-use super::place::{Conjunction, Kind, Move, Place, parts_in, without_conjunctions};
+use super::place::{Conjunction, Kind, Move, Piece, Place, parts_in, without_conjunctions};
 use super::rules::{Decision, Owner, Rules};
 use super::stages;
 use super::symbolic::within_all;
@@ -12,98 +12,106 @@ use super::zone::{Comparison, Zone};
 
 /// The moves that are to be expected in a part of the piece with this index and kind, each with
 /// where, and where the strategy asks for a move that is not possible.
-pub(super) fn courses(
+pub(super) fn expected_moves(
     rules: &Rules<'_>,
     known: &Place<'_>,
-    (index, kind): (usize, Kind),
+    index: usize,
+    kind: Kind,
     part: &Zone,
 ) -> (Vec<(usize, Zone)>, Vec<Zone>) {
     let network = rules.semantics.network();
     let owner = rules.claim.owner;
     let is_own = |one: &Move| one.controllable == (owner == Owner::Controller);
-    let mut courses = Vec::new();
-    let mut bad = Vec::new();
-    let mut rest = vec![part.clone()];
-    match kind {
-        Kind::Over | Kind::Turns(_) => return (courses, bad),
-        Kind::Anything => {
-            for (index, one) in known.moves.iter().enumerate() {
-                let parts = parts_in(part, &one.enabled).into_iter();
-                courses.extend(parts.map(|part| (index, part)));
-            }
-            return (courses, bad);
-        }
+    let all = 0..known.moves.len();
+    let own: Vec<usize> = match kind {
+        Kind::Over | Kind::Turns(_) => return (Vec::new(), Vec::new()),
+        Kind::Anything => return (possible(known, all, part), Vec::new()),
         Kind::Acts(decision) => {
-            let action = known
-                .decisions
-                .and_then(|all| all.decisions[decision].action.as_ref());
+            let decisions = known.decisions.map(|all| &all.decisions[decision]);
+            let action = decisions.and_then(|one| one.action.as_ref());
             let action: &[Part] = action.map_or(&[], Vec::as_slice);
-            let mut impossible = vec![part.clone()];
-            for (index, one) in known.moves.iter().enumerate() {
-                let is_meant = match owner {
-                    Owner::Controller => is_same_entry(network, action, &one.parts),
-                    Owner::Environment => *action == *one.parts,
-                };
-                if is_own(one) && is_meant {
-                    impossible = without_conjunctions(impossible, &one.enabled);
-                    let parts = parts_in(part, &one.enabled).into_iter();
-                    courses.extend(parts.map(|part| (index, part)));
-                }
-            }
-            bad.extend(impossible);
-            if owner == Owner::Environment {
-                // Where the environment acts, it is first.
-                rest.clear();
-            } else if rules.claim.is_permissive {
-                // The moves of the environment are met by each piece; once is enough.
-                let before = known.pieces[..index].iter();
-                for one in before.filter(|one| one.kind != Kind::Over) {
-                    rest = without_conjunctions(rest, &one.zones);
-                }
-            }
+            let is_meant = |one: &Move| match owner {
+                Owner::Controller => is_same_entry(network, action, &one.parts),
+                Owner::Environment => *action == *one.parts,
+            };
+            let own = |&index: &usize| is_own(&known.moves[index]) && is_meant(&known.moves[index]);
+            all.clone().filter(own).collect()
         }
-        Kind::Waits if rules.claim.is_permissive && owner == Owner::Environment => {
+        Kind::Proposes => stages::proposed(rules, known),
+        Kind::Waits => Vec::new(),
+    };
+    let mut bad = Vec::new();
+    if matches!(kind, Kind::Acts(_)) {
+        bad = own.iter().fold(vec![part.clone()], |left, &index| {
+            without_conjunctions(left, &known.moves[index].enabled)
+        });
+    }
+    let mut expected = possible(known, own, part);
+    let rest = left_to_opponent(rules, known, index, kind, part);
+    let legs = known.decisions.map_or(&[][..], |decisions| &decisions.legs);
+    for index in all.filter(|&index| !is_own(&known.moves[index])) {
+        let one = &known.moves[index];
+        for part in rest.iter().flat_map(|part| parts_in(part, &one.enabled)) {
+            if owner == Owner::Controller || legs.is_empty() {
+                expected.push((index, part));
+                continue;
+            }
+            let (taken, missing) = picked(network, known, legs, one, part);
+            expected.extend(taken.into_iter().map(|part| (index, part)));
+            bad.extend(missing);
+        }
+    }
+    (expected, bad)
+}
+
+/// Some moves, each with the parts of a part where it is possible.
+fn possible(
+    known: &Place<'_>,
+    moves: impl IntoIterator<Item = usize>,
+    part: &Zone,
+) -> Vec<(usize, Zone)> {
+    let parts = |index: usize| parts_in(part, &known.moves[index].enabled).into_iter();
+    let moves = moves.into_iter();
+    moves
+        .flat_map(|index| parts(index).map(move |part| (index, part)))
+        .collect()
+}
+
+/// Where in a part the moves of the opponent are to be expected.
+fn left_to_opponent(
+    rules: &Rules<'_>,
+    known: &Place<'_>,
+    index: usize,
+    kind: Kind,
+    part: &Zone,
+) -> Vec<Zone> {
+    let rest = vec![part.clone()];
+    let is_permissive = rules.claim.is_permissive;
+    let without = |rest, one: &Piece| without_conjunctions(rest, &one.zones);
+    match (kind, rules.claim.owner) {
+        // Where the environment acts, it is first.
+        (Kind::Acts(_), Owner::Environment) => Vec::new(),
+        // Each piece meets the moves of the environment; once is enough.
+        (Kind::Acts(_), Owner::Controller) if is_permissive => {
+            let before = known.pieces[..index].iter();
+            let before = before.filter(|one| one.kind != Kind::Over);
+            before.fold(rest, without)
+        }
+        (Kind::Waits, Owner::Environment) if is_permissive => {
             let acting = known.pieces.iter();
             let acting = acting.filter(|one| matches!(one.kind, Kind::Acts(_)));
-            for one in acting {
-                rest = without_conjunctions(rest, &one.zones);
-            }
+            acting.fold(rest, without)
         }
-        Kind::Proposes => {
-            for index in stages::proposed(rules, known) {
-                let parts = parts_in(part, &known.moves[index].enabled).into_iter();
-                courses.extend(parts.map(|part| (index, part)));
-            }
-        }
-        Kind::Waits => {}
+        _ => rest,
     }
-    let legs = known.decisions.map_or(&[][..], |decisions| &decisions.legs);
-    for (index, one) in known
-        .moves
-        .iter()
-        .enumerate()
-        .filter(|(_, one)| !is_own(one))
-    {
-        for part in &rest {
-            for part in parts_in(part, &one.enabled) {
-                if owner == Owner::Controller || legs.is_empty() {
-                    courses.push((index, part));
-                    continue;
-                }
-                let (taken, missing) = picked(network, (known, legs), one, part);
-                courses.extend(taken.into_iter().map(|part| (index, part)));
-                bad.extend(missing);
-            }
-        }
-    }
-    (courses, bad)
 }
 
 /// Where a move of the controller may be met, whose legs the environment picks, and where it picks
 /// one that is not possible.
 fn picked(
     network: &Network,
-    (known, legs): (&Place<'_>, &[Decision]),
+    known: &Place<'_>,
+    legs: &[Decision],
     one: &Move,
     part: Zone,
 ) -> (Vec<Zone>, Vec<Zone>) {

@@ -115,7 +115,8 @@ impl<'a> Machine<'a> {
 pub(super) fn proposes(
     network: &Network,
     action: Action,
-    (parts, channel): (&[Part], Option<u32>),
+    parts: &[Part],
+    channel: Option<u32>,
 ) -> bool {
     let part = parts[0];
     let edge = &network.processes[part.process as usize].edges[part.edge as usize];

@@ -217,7 +217,7 @@ impl Play<'_> {
         let mut is_possible = false;
         for (one, target) in &possible {
             let network = self.rules.semantics.network();
-            let is_own = one.controllable && proposes(network, action, (&one.parts, one.channel));
+            let is_own = one.controllable && proposes(network, action, &one.parts, one.channel);
             if is_own {
                 self.coverage.own_moves += 1;
                 is_possible = true;

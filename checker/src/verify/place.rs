@@ -130,12 +130,14 @@ impl<'a> Place<'a> {
     }
 
     /// What is said about the states with some words; the moves also where play is over, if they go
-    /// on there. `start` is what is not known to be won before anything is looked at.
+    /// on there. `rest` and `outer` are what is not known to be won before anything is looked at.
     pub(super) fn new(
         symbolic: &Symbolic<'_>,
         rules: &Rules<'a>,
-        (words, goes_on): (Box<[i32]>, bool),
-        start: (&Rest, &Rest),
+        words: Box<[i32]>,
+        goes_on: bool,
+        rest: &Rest,
+        outer: &Rest,
     ) -> Result<Place<'a>, Error> {
         let Some(invariant) = symbolic.invariant(&words)? else {
             return Err(Error::InitialInvariant);
@@ -158,8 +160,8 @@ impl<'a> Place<'a> {
             rank,
             zones,
             kind,
-            rest: start.0.clone(),
-            outer: start.1.clone(),
+            rest: rest.clone(),
+            outer: outer.clone(),
         };
         let zones = |decision: &Decision| -> Vec<Conjunction> {
             let zones = decision.zones.iter();
@@ -201,7 +203,7 @@ impl<'a> Place<'a> {
         let claim = rules.claim;
         let holds = |predicate: &Predicate| -> Result<Vec<Zone>, Error> {
             let deadlock = |_: &Zone| Err(Error::Unsupported("the predicate deadlock"));
-            let parts = symbolic.part(predicate, (&self.words, hull), &deadlock)?;
+            let parts = symbolic.part(predicate, &self.words, hull, &deadlock)?;
             Ok(parts.into_iter().filter(|part| !part.is_empty()).collect())
         };
         let goal = claim.goal.map(holds).transpose()?.unwrap_or_default();
@@ -248,12 +250,54 @@ impl<'a> Place<'a> {
         rules: &Rules<'_>,
         hull: &Zone,
     ) -> Result<(), Error> {
+        let (mut moves, simple) = self.possible_moves(symbolic, hull)?;
+        let has_priorities = rules.claim.has_priorities && symbolic.network().features.priorities;
+        if has_priorities {
+            let enabled = by_priority(&moves);
+            for (one, enabled) in moves.iter_mut().zip(enabled) {
+                one.enabled = enabled;
+            }
+        }
+        let under = rules.allowed_of(&self.words);
+        if let Some(under) = under {
+            let is_permissive = rules.claim.under.is_some_and(|(_, permissive)| permissive);
+            self.oblige(under, is_permissive, hull);
+            for one in &mut moves {
+                if is_controllable(symbolic, &one.parts) {
+                    one.enabled =
+                        allowed(rules.semantics.network(), one, under, is_permissive, hull);
+                }
+            }
+        }
+        for (one, simple) in moves.into_iter().zip(simple) {
+            let zones = one.enabled.iter();
+            let simple = simple.filter(|_| !has_priorities && under.is_none());
+            self.moves.push(Move {
+                controllable: is_controllable(symbolic, &one.parts),
+                enabled: match simple {
+                    Some(conjunction) => vec![conjunction],
+                    None => zones.map(|zone| conjunction(zone, hull)).collect(),
+                },
+                parts: one.parts.into(),
+                channel: one.channel,
+                assignments: one.effect.assignments.into(),
+                target: Target::Words(one.effect.target.into()),
+            });
+        }
+        self.add_stops(symbolic, hull)
+    }
+
+    /// The moves without regard to priorities, each with the conjunction where it is possible, if
+    /// it is one; adds where urgent moves are possible, and where a move fails.
+    fn possible_moves(
+        &mut self,
+        symbolic: &Symbolic<'_>,
+        hull: &Zone,
+    ) -> Result<(Vec<Possible>, Vec<Option<Conjunction>>), Error> {
         let candidates = symbolic.candidates(&self.words)?;
         let combinations = symbolic.combinations(&candidates, &self.words, hull)?;
         drop(candidates);
-        let mut moves: Vec<Possible> = Vec::new();
-        let mut simple: Vec<Option<Conjunction>> = Vec::new();
-        let mut failing = Vec::new();
+        let (mut moves, mut simple, mut failing) = (Vec::new(), Vec::new(), Vec::new());
         for one in &combinations {
             let guard = guarded(&one.guard, &one.excluded, hull);
             if guard.is_empty() {
@@ -291,40 +335,7 @@ impl<'a> Place<'a> {
         if !failing.is_empty() {
             self.end(failing, false);
         }
-        let has_priorities = rules.claim.has_priorities && symbolic.network().features.priorities;
-        if has_priorities {
-            let enabled = by_priority(&moves);
-            for (one, enabled) in moves.iter_mut().zip(enabled) {
-                one.enabled = enabled;
-            }
-        }
-        let under = rules.allowed_of(&self.words);
-        if let Some(under) = under {
-            let is_permissive = rules.claim.under.is_some_and(|(_, permissive)| permissive);
-            self.oblige(under, is_permissive, hull);
-            for one in &mut moves {
-                if is_controllable(symbolic, &one.parts) {
-                    one.enabled =
-                        allowed(rules.semantics.network(), one, (under, is_permissive), hull);
-                }
-            }
-        }
-        for (one, simple) in moves.into_iter().zip(simple) {
-            let zones = one.enabled.iter();
-            let simple = simple.filter(|_| !has_priorities && under.is_none());
-            self.moves.push(Move {
-                controllable: is_controllable(symbolic, &one.parts),
-                enabled: match simple {
-                    Some(conjunction) => vec![conjunction],
-                    None => zones.map(|zone| conjunction(zone, hull)).collect(),
-                },
-                parts: one.parts.into(),
-                channel: one.channel,
-                assignments: one.effect.assignments.into(),
-                target: Target::Words(one.effect.target.into()),
-            });
-        }
-        self.add_stops(symbolic, hull)
+        Ok((moves, simple))
     }
 
     fn add_stops(&mut self, symbolic: &Symbolic<'_>, hull: &Zone) -> Result<(), Error> {
@@ -408,7 +419,7 @@ impl<'a> Place<'a> {
         let mut found = match rules.claim.forcing {
             Forcing::Always => others,
             Forcing::Network => without_all(others, &own),
-            Forcing::Component => self.forced_by_components(rules, zone, (&own, &others)),
+            Forcing::Component => self.forced_by_components(rules, zone, &own, &others),
         };
         let kept = match rules.claim.aim {
             Aim::Keep => vec![zone.clone()],
@@ -425,7 +436,8 @@ impl<'a> Place<'a> {
         &self,
         rules: &Rules<'_>,
         zone: &Zone,
-        (own, others): (&[Zone], &[Zone]),
+        own: &[Zone],
+        others: &[Zone],
     ) -> Vec<Zone> {
         let mut found = Vec::new();
         if rules.semantics.network().features.clock_guarded_urgent {
@@ -480,7 +492,8 @@ fn counting<'d>(
 fn allowed(
     network: &Network,
     one: &Possible,
-    (under, is_permissive): (&Decisions, bool),
+    under: &Decisions,
+    is_permissive: bool,
     hull: &Zone,
 ) -> Vec<Zone> {
     let counting = counting(under, is_permissive, hull);

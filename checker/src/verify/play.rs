@@ -12,7 +12,7 @@ use crate::ir::{Network, Predicate};
 
 use super::concrete::Semantics;
 use super::moments::{Moments, Stretch};
-use super::moves::{Error, Part, State, is_same_entry};
+use super::moves::{Error, Move, Part, State, is_same_entry};
 use super::rules::{Aim, Claim, Decisions, Owner, Rest, Rules};
 use super::timed::Timed;
 
@@ -345,41 +345,18 @@ impl View<'_> {
             self.situation.next = match action {
                 None => Next::Fails(Gap::NoDecision),
                 Some(action) => {
-                    let meant = self.rules.moves_of_action(action, &possible).into_iter();
-                    let legs: Vec<Vec<Part>> = meant.map(|(one, _)| one.parts.clone()).collect();
-                    if legs.is_empty() {
-                        Next::Fails(Gap::ImpossibleAction)
-                    } else {
-                        if legs.len() > 1 {
-                            let at_moment = Window {
-                                first: moment,
-                                is_first_open: false,
-                                ..window
-                            };
-                            for leg in &legs {
-                                add(&mut self.situation.replies, leg, at_moment);
-                            }
-                        }
-                        Next::Acts {
-                            action: action.clone(),
-                            legs,
-                        }
-                    }
+                    let at_moment = Window {
+                        first: moment,
+                        is_first_open: false,
+                        ..window
+                    };
+                    self.acts(action, &possible, at_moment)
                 }
             };
         }
         if self.rules.claim.is_permissive {
-            let network = self.rules.semantics.network();
             let actions = decisions.iter().filter_map(|one| one.action.as_ref());
-            let actions: Vec<&Vec<Part>> = actions.collect();
-            for (index, action) in actions.iter().enumerate() {
-                let mut before = actions[..index].iter();
-                if before.all(|one| !is_same_entry(network, one, action)) {
-                    for (one, _) in self.rules.moves_of_action(action, &possible) {
-                        add(&mut self.situation.allowed, &one.parts, window);
-                    }
-                }
-            }
+            self.note_allowed(&actions.collect::<Vec<_>>(), &possible, window);
         }
         // Where the environment acts the controller comes too late.
         let is_late = !waits && action.is_some() && self.rules.claim.owner == Owner::Environment;
@@ -393,6 +370,40 @@ impl View<'_> {
             }
         }
         Ok(!waits)
+    }
+
+    /// What an action comes to; if several legs are possible, notes them as replies.
+    fn acts(&mut self, action: &[Part], possible: &[(&Move, State)], at_moment: Window) -> Next {
+        let meant = self.rules.moves_of_action(action, possible).into_iter();
+        let legs: Vec<Vec<Part>> = meant.map(|(one, _)| one.parts.clone()).collect();
+        if legs.is_empty() {
+            return Next::Fails(Gap::ImpossibleAction);
+        }
+        if legs.len() > 1 {
+            for leg in &legs {
+                add(&mut self.situation.replies, leg, at_moment);
+            }
+        }
+        let action = action.to_vec();
+        Next::Acts { action, legs }
+    }
+
+    /// Notes the moves that actions of a permissive strategy allow, each entry once.
+    fn note_allowed(
+        &mut self,
+        actions: &[&Vec<Part>],
+        possible: &[(&Move, State)],
+        window: Window,
+    ) {
+        let network = self.rules.semantics.network();
+        for (index, action) in actions.iter().enumerate() {
+            let mut before = actions[..index].iter();
+            if before.all(|one| !is_same_entry(network, one, action)) {
+                for (one, _) in self.rules.moves_of_action(action, possible) {
+                    add(&mut self.situation.allowed, &one.parts, window);
+                }
+            }
+        }
     }
 
     /// Notes what becomes of play where time cannot pass on: `later` is beyond.

@@ -21,7 +21,7 @@ pub(super) fn proposed(rules: &Rules<'_>, place: &Place<'_>) -> Vec<usize> {
     let action = machine.action(place.stage);
     let is_proposed = |index: &usize| {
         let one = &place.moves[*index];
-        one.controllable && proposes(network, action, (&one.parts, one.channel))
+        one.controllable && proposes(network, action, &one.parts, one.channel)
     };
     (0..place.moves.len()).filter(is_proposed).collect()
 }
@@ -43,7 +43,7 @@ pub(super) fn pieces(
             pieces.push((zones.collect(), kind));
         }
     };
-    for (seen, zones) in looks(machine, symbolic, (&place.words, &hull))? {
+    for (seen, zones) in looks(machine, symbolic, &place.words, &hull)? {
         match machine.after(place.stage, &seen) {
             Some(stage) if stage == place.stage => {
                 let (mut acting, mut waiting) = (Vec::new(), zones.clone());
@@ -69,12 +69,13 @@ type Look = (Vec<bool>, Vec<Zone>);
 fn looks(
     machine: &Machine<'_>,
     symbolic: &Symbolic<'_>,
-    (words, zone): (&[i32], &Zone),
+    words: &[i32],
+    zone: &Zone,
 ) -> Result<Vec<Look>, Error> {
     let deadlock = |_: &Zone| Err(Error::Unsupported("the predicate deadlock"));
     let mut parts = vec![(Vec::new(), vec![zone.clone()])];
     for observation in machine.observations() {
-        let mut holds = symbolic.part(observation, (words, zone), &deadlock)?;
+        let mut holds = symbolic.part(observation, words, zone, &deadlock)?;
         holds.retain(|part| !part.is_empty());
         let mut finer = Vec::new();
         for (seen, zones) in parts {

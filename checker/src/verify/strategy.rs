@@ -53,6 +53,18 @@ pub enum Origin {
     Anywhere,
 }
 
+/// The regions that a strategy and what it claims distinguish.
+fn regions(network: &Network, strategy: &[Decisions], claim: &Claim<'_>) -> Result<Regions, Error> {
+    let under = claim.under.map_or(&[][..], |(under, _)| under);
+    let all = strategy.iter().chain(under);
+    let all = all.flat_map(|state| state.decisions.iter().chain(&state.legs));
+    let mut zones = all.flat_map(|decision| decision.zones.iter().flatten());
+    let constants = zones.clone().map(|one| i64::from(one.bound).abs());
+    let constant = constants.max().unwrap_or(0).max(claim.constant);
+    let has_differences = claim.has_differences || zones.any(|one| one.left != 0 && one.right != 0);
+    Regions::new(network, constant, has_differences)
+}
+
 /// Checks a strategy, with this effort.
 pub fn verify(
     network: &Network,
@@ -61,14 +73,6 @@ pub fn verify(
     start: &Origin,
     effort: &mut Effort<'_>,
 ) -> Result<Outcome, Error> {
-    let under = claim.under.map_or(&[][..], |(under, _)| under);
-    let all = strategy.iter().chain(under);
-    let all = all.flat_map(|state| state.decisions.iter().chain(&state.legs));
-    let zones = all.flat_map(|decision| decision.zones.iter().flatten());
-    let constants = zones.clone().map(|one| i64::from(one.bound).abs());
-    let constant = constants.max().unwrap_or(0).max(claim.constant);
-    let mut zones = zones;
-    let has_differences = claim.has_differences || zones.any(|one| one.left != 0 && one.right != 0);
     let mut ticks_per_unit = Regions::ticks_per_unit(network);
     if let Origin::State(timed) = start {
         ticks_per_unit = least_multiple(ticks_per_unit, timed.ticks_per_unit)
@@ -78,8 +82,7 @@ pub fn verify(
         return Err(Error::Unsupported("strict invariants"));
     }
     let rules = Rules::new(network, ticks_per_unit, strategy, claim);
-    let regions = Regions::new(network, constant, has_differences)?;
-    let regions = regions.with_ticks_per_unit(ticks_per_unit);
+    let regions = regions(network, strategy, claim)?.with_ticks_per_unit(ticks_per_unit);
     let mut first = match start {
         Origin::Initial | Origin::Anywhere => rules.semantics.initial()?,
         Origin::State(timed) => {
@@ -110,8 +113,8 @@ pub fn verify(
         Err(why) => return Ok(Outcome::GivenUp(why, coverage)),
     }
     let is_won = |state: &State| !is_everywhere && winning.wins(&state.words, &state.clocks);
-    let from = (first.clone(), is_everywhere);
-    let violation = defects::find(&rules, regions, from, &is_won, effort)?;
+    let start = first.clone();
+    let violation = defects::find(&rules, regions, start, is_everywhere, &is_won, effort)?;
     let violation = violation.unwrap_or_else(|| Violation {
         defect: Defect::Lost,
         states: vec![first],

@@ -133,7 +133,8 @@ impl<'a> Symbolic<'a> {
     pub(super) fn part(
         &self,
         predicate: &Predicate,
-        (words, zone): (&[i32], &Zone),
+        words: &[i32],
+        zone: &Zone,
         deadlock: &dyn Fn(&Zone) -> Result<Vec<Zone>, Error>,
     ) -> Result<Vec<Zone>, Error> {
         let all = || vec![zone.clone()];
@@ -153,15 +154,13 @@ impl<'a> Symbolic<'a> {
                 );
                 vec![zone.within([one])]
             }
-            Predicate::Not(inner) => {
-                without_all(all(), &self.part(inner, (words, zone), deadlock)?)
-            }
+            Predicate::Not(inner) => without_all(all(), &self.part(inner, words, zone, deadlock)?),
             Predicate::And(parts) => {
                 let mut rest = all();
                 for inner in parts {
                     let mut next = Vec::new();
                     for part in &rest {
-                        next.extend(self.part(inner, (words, part), deadlock)?);
+                        next.extend(self.part(inner, words, part, deadlock)?);
                     }
                     rest = next;
                     rest.retain(|part| !part.is_empty());
@@ -171,7 +170,7 @@ impl<'a> Symbolic<'a> {
             Predicate::Or(parts) => {
                 let mut found = Vec::new();
                 for inner in parts {
-                    found.extend(self.part(inner, (words, zone), deadlock)?);
+                    found.extend(self.part(inner, words, zone, deadlock)?);
                 }
                 found
             }

@@ -33,7 +33,8 @@ impl<'v, 'a> View<'v, 'a> {
     pub(super) fn new(
         known: &'v Place<'a>,
         is_permissive: bool,
-        (moment, round): (Moment, Round),
+        moment: Moment,
+        round: Round,
     ) -> View<'v, 'a> {
         View {
             known,

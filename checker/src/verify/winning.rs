@@ -32,8 +32,8 @@ use std::collections::HashMap;
 use crate::cancellation::Room;
 use crate::exec::EmittedAssignment;
 
-use super::courses::courses;
 use super::effort::{Effort, GivenUp};
+use super::expected_moves::expected_moves;
 use super::machine::Machine;
 use super::moves::Error;
 use super::outcome::Coverage;
@@ -85,7 +85,7 @@ impl<'r, 'a> Winning<'r, 'a> {
             judged: 0,
             room: Room::default(),
         };
-        winning.place_of((0, words.into()));
+        winning.place_of(0, words.into());
         let mut next = 0;
         while next < winning.places.len() {
             if let Some(why) = effort.is_over(winning.coverage.parts) {
@@ -104,7 +104,7 @@ impl<'r, 'a> Winning<'r, 'a> {
         self.coverage
     }
 
-    fn place_of(&mut self, (stage, words): (u32, Box<[i32]>)) -> u32 {
+    fn place_of(&mut self, stage: u32, words: Box<[i32]>) -> u32 {
         let index = &mut self.index[stage as usize];
         if let Some(&place) = index.get(&words) {
             return place;
@@ -119,7 +119,7 @@ impl<'r, 'a> Winning<'r, 'a> {
     }
 
     fn view<'v>(&self, known: &'v Place<'a>, moment: Moment, round: Round) -> View<'v, 'a> {
-        View::new(known, self.rules.claim.is_permissive, (moment, round))
+        View::new(known, self.rules.claim.is_permissive, moment, round)
     }
 
     /// Whether what is not judged yet is taken to be won.
@@ -143,8 +143,8 @@ impl<'r, 'a> Winning<'r, 'a> {
     /// What is said at a place.
     fn described(&self, stage: u32, words: Box<[i32]>) -> Result<Place<'a>, Error> {
         let (rest, outer) = (self.start(Round::Inner), self.start(Round::Outer));
-        let goes_on = (words, self.is_everything);
-        let mut known = Place::new(&self.symbolic, self.rules, goes_on, (&rest, &outer))?;
+        let goes_on = self.is_everything;
+        let mut known = Place::new(&self.symbolic, self.rules, words, goes_on, &rest, &outer)?;
         known.stage = stage;
         if let Some(machine) = &self.rules.machine {
             let pieces = stages::pieces(self.rules, machine, &self.symbolic, &known)?;
@@ -181,23 +181,41 @@ impl<'r, 'a> Winning<'r, 'a> {
                 failing
             }
         };
+        for index in self.count_moves(&known) {
+            if let Target::Words(words) = &mut known.moves[index].target {
+                let target = self.place_of(stage, std::mem::take(words));
+                known.moves[index].target = Target::Place(target);
+                self.add_source(target, place);
+            }
+        }
+        for piece in &known.pieces {
+            if let Kind::Turns(next) = piece.kind {
+                let target = self.place_of(next, words.clone());
+                self.add_source(target, place);
+            }
+        }
+        self.room.take(known.bytes());
+        self.places[place] = known;
+        Ok(())
+    }
+
+    /// Counts the pieces of a place and the moves that are to be expected in them; returns these
+    /// moves.
+    fn count_moves(&mut self, known: &Place<'_>) -> Vec<usize> {
         let hull = known.hull(self.symbolic.clocks);
-        let mut targets = Vec::new();
-        for piece in 0..known.pieces.len() {
-            for zone in parts_in(&hull, &known.pieces[piece].zones) {
+        let mut all = Vec::new();
+        for (number, piece) in known.pieces.iter().enumerate() {
+            let kind = if self.is_everything {
+                Kind::Anything
+            } else {
+                piece.kind
+            };
+            let is_won = piece.kind == Kind::Over && matches!(piece.rest, Rest::Nothing);
+            for zone in parts_in(&hull, &piece.zones) {
                 self.coverage.parts += 1;
-                let kind = known.pieces[piece].kind;
-                if kind == Kind::Over {
-                    let is_won = matches!(known.pieces[piece].rest, Rest::Nothing);
-                    self.coverage.goals += u64::from(is_won);
-                }
-                let kind = if self.is_everything {
-                    Kind::Anything
-                } else {
-                    kind
-                };
-                let (courses, _) = courses(self.rules, &known, (piece, kind), &zone);
-                for (index, _) in courses {
+                self.coverage.goals += u64::from(is_won);
+                let (expected, _) = expected_moves(self.rules, known, number, kind, &zone);
+                for (index, _) in expected {
                     let is_own = known.moves[index].controllable
                         == (self.rules.claim.owner == Owner::Controller);
                     if is_own && matches!(kind, Kind::Acts(_) | Kind::Proposes) {
@@ -205,28 +223,13 @@ impl<'r, 'a> Winning<'r, 'a> {
                     } else {
                         self.coverage.opponent_moves += 1;
                     }
-                    targets.push(index);
+                    all.push(index);
                 }
             }
         }
-        targets.sort_unstable();
-        targets.dedup();
-        for index in targets {
-            if let Target::Words(words) = &mut known.moves[index].target {
-                let target = self.place_of((stage, std::mem::take(words)));
-                known.moves[index].target = Target::Place(target);
-                self.add_source(target, place);
-            }
-        }
-        for piece in &known.pieces {
-            if let Kind::Turns(next) = piece.kind {
-                let target = self.place_of((next, words.clone()));
-                self.add_source(target, place);
-            }
-        }
-        self.room.take(known.bytes());
-        self.places[place] = known;
-        Ok(())
+        all.sort_unstable();
+        all.dedup();
+        all
     }
 
     /// Notes that a place is judged by another one.
@@ -375,8 +378,9 @@ impl<'r, 'a> Winning<'r, 'a> {
             let parts = others.into_iter().map(|part| (part, 0));
             for (part, group) in parts.chain(goals.into_iter().map(|part| (part, 1))) {
                 let round = [Round::Inner, Round::Outer][group];
-                let (courses, mut bad) = courses(self.rules, known, (index, piece.kind), &part);
-                for (one, region) in courses {
+                let (expected, mut bad) =
+                    expected_moves(self.rules, known, index, piece.kind, &part);
+                for (one, region) in expected {
                     bad.extend(self.leading_out(&known.moves[one], &region, round));
                 }
                 groups[group].1.extend(bad);
@@ -386,7 +390,7 @@ impl<'r, 'a> Winning<'r, 'a> {
         let mut rest = Vec::new();
         for ((parts, bad), round) in groups.into_iter().zip([Round::Inner, Round::Outer]) {
             if matches!(piece.kind, Kind::Waits | Kind::Anything) && !parts.is_empty() {
-                rest.extend(self.waiting(place, index, (parts, bad), round));
+                rest.extend(self.waiting(place, index, parts, bad, round));
             } else {
                 rest.extend(bad);
             }
@@ -426,34 +430,32 @@ impl<'r, 'a> Winning<'r, 'a> {
         &self,
         place: usize,
         index: usize,
-        (parts, bad): (Vec<Zone>, Vec<Zone>),
+        parts: Vec<Zone>,
+        bad: Vec<Zone>,
         round: Round,
     ) -> Vec<Zone> {
         let known = &self.places[place];
         let kind = known.pieces[index].kind;
-        let arrives = self.has_to_arrive(round) && kind != Kind::Anything;
         // What other pieces lose.
         let view = self.view(known, Moment::Now, round);
         let blocked: Vec<Zone> = parts
             .iter()
             .flat_map(|part| view.refused_by_others(index, part.clone()))
             .collect();
-        let mut resting = Vec::new();
-        let mut stuck = Vec::new();
-        let mut passing = Vec::new();
+        let (mut resting, mut stuck, mut passing) = (Vec::new(), Vec::new(), Vec::new());
         for part in parts {
             if known.is_urgent {
-                self.rest(known, kind, part, (&mut resting, &mut stuck));
+                self.rest(known, kind, part, &mut resting, &mut stuck);
                 continue;
             }
             for stopped in parts_in(&part, &known.stops) {
-                self.rest(known, kind, stopped, (&mut resting, &mut stuck));
+                self.rest(known, kind, stopped, &mut resting, &mut stuck);
             }
             passing.extend(without_conjunctions(vec![part], &known.stops));
         }
         let mut lost = bad;
         lost.extend(stuck);
-        if arrives {
+        if self.has_to_arrive(round) && kind != Kind::Anything {
             let mut hindered = lost.clone();
             hindered.extend(blocked);
             let passing = without_all(passing, &hindered);
@@ -465,27 +467,25 @@ impl<'r, 'a> Winning<'r, 'a> {
             for (zone, reached) in passing.into_iter().zip(&reached) {
                 lost.extend(without_all(vec![zone], reached));
             }
-        } else {
-            let exits = |passing: &[Zone]| -> Vec<Zone> {
-                let exits = passing.iter();
-                exits
-                    .flat_map(|zone| self.bad_exits(known, zone, round))
-                    .collect()
-            };
-            let seeds = exits(&passing);
-            if seeds.is_empty() && lost.is_empty() && blocked.is_empty() {
-                return lost;
-            }
-            // Where a piece before it decides, the wait ends.
-            let others = |zones| self.outside_earlier(known, index, zones);
-            let passing = others(passing);
-            lost = others(lost);
-            let mut seeds = exits(&passing);
-            seeds.extend(lost.iter().cloned());
-            seeds.extend(blocked);
-            let seeds = without_covered(seeds);
-            lost.extend(reaching(&passing, seeds, false).into_iter().flatten());
+            return lost;
         }
+        let exits = |passing: &[Zone]| -> Vec<Zone> {
+            let exits = passing.iter();
+            exits
+                .flat_map(|zone| self.bad_exits(known, zone, round))
+                .collect()
+        };
+        if exits(&passing).is_empty() && lost.is_empty() && blocked.is_empty() {
+            return lost;
+        }
+        // Where a piece before it decides, the wait ends.
+        let passing = self.outside_earlier(known, index, passing);
+        let mut lost = self.outside_earlier(known, index, lost);
+        let mut seeds = exits(&passing);
+        seeds.extend(lost.iter().cloned());
+        seeds.extend(blocked);
+        let seeds = without_covered(seeds);
+        lost.extend(reaching(&passing, seeds, false).into_iter().flatten());
         lost
     }
 
@@ -496,7 +496,8 @@ impl<'r, 'a> Winning<'r, 'a> {
         known: &Place<'_>,
         kind: Kind,
         stopped: Zone,
-        (resting, stuck): (&mut Vec<Zone>, &mut Vec<Zone>),
+        resting: &mut Vec<Zone>,
+        stuck: &mut Vec<Zone>,
     ) {
         if kind == Kind::Anything {
             resting.push(stopped);

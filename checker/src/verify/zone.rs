@@ -474,8 +474,8 @@ mod tests {
         (0..=8).flat_map(|x| (0..=8).map(move |y| [0, 2 * x, 2 * y]))
     }
 
-    fn later([zero, x, y]: [i64; 3], ticks: i64) -> [i64; 3] {
-        [zero, x + ticks, y + ticks]
+    fn later(point: [i64; 3], ticks: i64) -> [i64; 3] {
+        [point[0], point[1] + ticks, point[2] + ticks]
     }
 
     #[test]
