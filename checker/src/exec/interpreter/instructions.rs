@@ -2,7 +2,6 @@
 
 use crate::builtins::{MOST_PARAMETERS, Number};
 use crate::cancellation;
-use crate::exec::arithmetic::Wrapping;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::external_words::{ExternalWords, ends_text};
 use crate::exec::libraries;
@@ -150,8 +149,8 @@ impl Execution<'_, '_> {
                 site,
             } => {
                 let (left, right) = (self.integer(active, *left), self.integer(active, *right));
-                let result = arithmetic::integer(*operator, left, right)?;
-                let value = self.wrapped(result, *site)?;
+                let (value, has_wrapped) = arithmetic::integer(*operator, left, right)?;
+                let value = self.wrapped(value, has_wrapped, *site)?;
                 self.set_integer(active, *target, value);
             }
             Instruction::DoubleToInteger { target, source, .. } => {
@@ -223,7 +222,8 @@ impl Execution<'_, '_> {
     /// The result of integer arithmetic at a site.
     fn wrapped(
         &self,
-        (value, has_wrapped): Wrapping,
+        value: i32,
+        has_wrapped: bool,
         site: SiteId,
     ) -> Result<i32, RunTimeErrorKind> {
         if has_wrapped {
@@ -255,7 +255,7 @@ impl Execution<'_, '_> {
         match function.evaluate(&numbers[..arguments.len()]) {
             None => return Err(RunTimeErrorKind::NotAnInteger),
             Some((Number::Integer(value), has_wrapped)) => {
-                let value = self.wrapped((value, has_wrapped), site)?;
+                let value = self.wrapped(value, has_wrapped, site)?;
                 self.set_integer(active, target, value);
             }
             Some((Number::Double(value), _)) => self.set_double(active, target, value),

@@ -18,9 +18,7 @@ use std::time::SystemTime;
 
 use cranelift_codegen::ir::condcodes::IntCC;
 use cranelift_codegen::ir::types::{F64, I8, I32, I64};
-use cranelift_codegen::ir::{
-    AbiParam, ArgumentExtension, InstBuilder, MemFlagsData, Signature, Type, UserFuncName,
-};
+use cranelift_codegen::ir::{AbiParam, InstBuilder, MemFlagsData, Signature, UserFuncName};
 use cranelift_codegen::settings::{self, Configurable};
 use cranelift_frontend::{FunctionBuilder, FunctionBuilderContext};
 use cranelift_jit::{JITBuilder, JITModule};
@@ -155,18 +153,11 @@ fn add(code: usize, signature: &ExternalSignature) -> Result<ExternalId, Library
 }
 
 /// The type of a value in native code, and how it fills a register.
-fn native(kind: ExternalType) -> (Type, ArgumentExtension) {
+fn native(kind: ExternalType) -> AbiParam {
     match kind {
-        ExternalType::Integer => (I32, ArgumentExtension::Sext),
-        ExternalType::Bool => (I8, ArgumentExtension::Uext),
-        ExternalType::Double => (F64, ArgumentExtension::None),
-    }
-}
-
-fn abi_parameter((value, extension): (Type, ArgumentExtension)) -> AbiParam {
-    AbiParam {
-        extension,
-        ..AbiParam::new(value)
+        ExternalType::Integer => AbiParam::new(I32).sext(),
+        ExternalType::Bool => AbiParam::new(I8).uext(),
+        ExternalType::Double => AbiParam::new(F64),
     }
 }
 
@@ -204,20 +195,13 @@ fn trampoline(code: usize, signature: &ExternalSignature) -> Result<Trampoline, 
     for (number, parameter) in signature.parameters.iter().enumerate() {
         let kind = match parameter {
             ExternalParameter::Value(kind) => native(*kind),
-            ExternalParameter::Pointer { .. } | ExternalParameter::Text => {
-                (I64, ArgumentExtension::None)
-            }
+            ExternalParameter::Pointer { .. } | ExternalParameter::Text => AbiParam::new(I64),
         };
-        called.params.push(abi_parameter(kind));
+        called.params.push(kind);
         let offset = 8 * number as i32;
-        arguments.push(builder.ins().load(kind.0, flags, source, offset));
+        arguments.push(builder.ins().load(kind.value_type, flags, source, offset));
     }
-    called.returns = signature
-        .result
-        .map(native)
-        .map(abi_parameter)
-        .into_iter()
-        .collect();
+    called.returns = signature.result.map(native).into_iter().collect();
     let called = builder.import_signature(called);
     let code = builder.ins().iconst(I64, code as i64);
     let call = builder.ins().call_indirect(called, code, &arguments);
@@ -293,7 +277,8 @@ impl Copied {
         &self,
         words: &mut [i32],
         stride: u32,
-        (low, high): (i32, i32),
+        low: i32,
+        high: i32,
     ) -> Result<(), RunTimeErrorKind> {
         let parts = words.chunks_exact_mut(stride.max(1) as usize);
         match self {
@@ -373,7 +358,7 @@ impl External {
                 && let ExternalWords::Memory(memory) = argument
                 && let Some(copied) = copied
             {
-                copied.write(memory, *stride, *range)?;
+                copied.write(memory, *stride, range.0, range.1)?;
             }
         }
         Ok(result)

@@ -67,13 +67,14 @@ impl Translator<'_> {
                 runtime::draw as *const ()
             }
         };
-        self.draw_elsewhere((distribution, code), &values, site)
+        self.draw_elsewhere(distribution, code, &values, site)
     }
 
     /// Calls back what draws; fails if an argument is out of its domain.
     fn draw_elsewhere(
         &mut self,
-        (distribution, code): (Distribution, *const ()),
+        distribution: Distribution,
+        code: *const (),
         values: &[Value],
         site: SiteId,
     ) -> Value {
@@ -112,9 +113,10 @@ impl Translator<'_> {
                 self.builder.ins().fadd(value, zero)
             }
         };
-        let code = runtime::draw_one::<UNIFORM> as *const ();
-        let elsewhere = (Distribution::Uniform, code);
-        self.take_if(is_finite, (stream, position, value), (elsewhere, max, site))
+        self.take_if(is_finite, stream, position, value, |this| {
+            let code = runtime::draw_one::<UNIFORM> as *const ();
+            this.draw_elsewhere(Distribution::Uniform, code, &[stream, max], site)
+        })
     }
 
     /// An exponential number with this rate, as [`Distribution::sample`] draws it.
@@ -162,13 +164,10 @@ impl Translator<'_> {
             Some(is_rate) => self.builder.ins().band(is_rate, is_inside),
         };
         let value = self.builder.ins().fmul(drawn, mean);
-        let code = runtime::draw_one::<EXPONENTIAL> as *const ();
-        let elsewhere = (Distribution::Exponential, code);
-        self.take_if(
-            Some(is_known),
-            (stream, position, value),
-            (elsewhere, rate, site),
-        )
+        self.take_if(Some(is_known), stream, position, value, |this| {
+            let code = runtime::draw_one::<EXPONENTIAL> as *const ();
+            this.draw_elsewhere(Distribution::Exponential, code, &[stream, rate], site)
+        })
     }
 
     /// Makes sure that there is a next number of a stream; returns how many were drawn before.
@@ -216,8 +215,10 @@ impl Translator<'_> {
     fn take_if(
         &mut self,
         condition: Option<Value>,
-        (stream, position, value): (Value, Value, Value),
-        (elsewhere, argument, site): ((Distribution, *const ()), Value, SiteId),
+        stream: Value,
+        position: Value,
+        value: Value,
+        elsewhere: impl FnOnce(&mut Self) -> Value,
     ) -> Value {
         let Some(condition) = condition else {
             self.take(stream, position);
@@ -235,7 +236,7 @@ impl Translator<'_> {
         self.take(stream, position);
         self.builder.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(unknown);
-        let value = self.draw_elsewhere(elsewhere, &[stream, argument], site);
+        let value = elsewhere(self);
         self.builder.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(done);
         self.builder.block_params(done)[0]
