@@ -73,7 +73,8 @@ impl<'a> Possibility<'a> {
         &mut self,
         truth: bool,
         predicate: &Predicate,
-        (process, location): (ProcessId, LocationId),
+        process: ProcessId,
+        location: LocationId,
     ) -> bool {
         self.words[process.0 as usize] = Some(location.0 as i32);
         let can_be = self.may_be(truth, predicate);

@@ -20,7 +20,7 @@ impl Solver<'_, '_, '_> {
         for (leg, hit) in legs {
             let edge = &self.graph.edges[leg as usize];
             into.unite(&self.before(edge, hit));
-            past.unite(&self.missing(edge, (hit, None)));
+            past.unite(&self.missing(edge, hit, None));
         }
         into.subtract(&past);
         into

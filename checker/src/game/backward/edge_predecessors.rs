@@ -43,7 +43,7 @@ impl Solver<'_, '_, '_> {
             return self.enabled(edge);
         }
         let is_missed = (edge.length == 1).then(|| self.won.lost(edge.target));
-        self.missing(edge, (&self.won.win[edge.target as usize], is_missed))
+        self.missing(edge, &self.won.win[edge.target as usize], is_missed)
     }
 
     /// The valuations from which an edge is possible and does not lead into the given valuations of
@@ -54,7 +54,8 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn missing(
         &self,
         edge: &Edge,
-        (hit, missed): (&Win, Option<Win>),
+        hit: &Win,
+        missed: Option<Win>,
     ) -> Federation {
         if edge.length == 1 {
             let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));

@@ -101,7 +101,7 @@ impl Solver<'_, '_, '_> {
         let delays = self.graph.nodes[node as usize].delays;
         let whole = self.whole(node);
         let zone = self.graph.zone(node).to_vec();
-        let mut stops = stops(self.graph.symbolic, words, (&zone, &whole), delays)?;
+        let mut stops = stops(self.graph.symbolic, words, &zone, &whole, delays)?;
         if let Some(urgent) = self.graph.urgent(node) {
             stops.push((None, urgent.standstill()));
         }
@@ -144,7 +144,8 @@ impl Solver<'_, '_, '_> {
 pub(in crate::game) fn stops(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
-    (zone, whole): (&[Bound], &Federation),
+    zone: &[Bound],
+    whole: &Federation,
     delays: bool,
 ) -> Result<Vec<(Option<u32>, Federation)>, Failure> {
     let dimension = symbolic.dimension();

@@ -55,16 +55,17 @@ impl BranchPoints {
         &mut self,
         network: &Network,
         node: u32,
-        (edges, first): (&mut [Edge], usize),
+        edges: &mut [Edge],
+        first: usize,
         moves: &Moves,
     ) {
         if !self.is_possible {
             return;
         }
         let mut entries = if self.are_edges {
-            apart(network, (edges, first), moves)
+            apart(network, edges, first, moves)
         } else {
-            successive(network, (edges, first), moves)
+            successive(network, edges, first, moves)
         };
         // Several edges of the same move are pieces of it.
         entries.retain(|legs| {
@@ -93,7 +94,7 @@ impl BranchPoints {
 }
 
 /// The controllable edges of a node by their entries, where those of an entry are successive.
-fn successive(network: &Network, (edges, first): (&[Edge], usize), moves: &Moves) -> Vec<Vec<u32>> {
+fn successive(network: &Network, edges: &[Edge], first: usize, moves: &Moves) -> Vec<Vec<u32>> {
     let parts = |edge: &Edge| moves.get(edge.ordinal as usize).parts;
     let is_same = |one: &Edge, other: &Edge| {
         other.controllable && is_same_entry(network, parts(one), parts(other))
@@ -107,7 +108,7 @@ fn successive(network: &Network, (edges, first): (&[Edge], usize), moves: &Moves
 }
 
 /// The controllable edges of a node by their entries.
-fn apart(network: &Network, (edges, first): (&[Edge], usize), moves: &Moves) -> Vec<Vec<u32>> {
+fn apart(network: &Network, edges: &[Edge], first: usize, moves: &Moves) -> Vec<Vec<u32>> {
     let mut places = FxHashMap::default();
     let mut entries: Vec<Vec<u32>> = Vec::new();
     for (number, edge) in edges.iter().enumerate().skip(first) {

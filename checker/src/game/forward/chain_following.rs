@@ -58,8 +58,8 @@ impl Graph<'_, '_> {
                     let trail = &trails.points[at as usize];
                     self.steps.clone_from(&trail.steps);
                     let zone = trail.zone.clone();
-                    let reached = (trail.length, trail.may_delay);
-                    self.continue_chain(origin, target, zone, reached)?;
+                    let (length, may_delay) = (trail.length, trail.may_delay);
+                    self.continue_chain(origin, target, zone, length, may_delay)?;
                     return Ok(true);
                 }
             }
@@ -90,7 +90,7 @@ impl Graph<'_, '_> {
         }
         let mut steps = Vec::new();
         push_step(&mut steps, false, &last.effect);
-        self.add_trail(trails, words, last, zone, (steps, 1))
+        self.add_trail(trails, words, last, zone, steps, 1)
     }
 
     /// How a chain continues from the end of a trail, in a state with these words.
@@ -155,7 +155,7 @@ impl Graph<'_, '_> {
         let mut steps = trail.steps.clone();
         push_step(&mut steps, trail.may_delay, &last.effect);
         let length = trail.length + 1;
-        self.add_trail(trails, words, last, zone, (steps, length))
+        self.add_trail(trails, words, last, zone, steps, length)
     }
 
     /// Adds the trail that ends with `last`, taken in a state with these words, and enters `zone`.
@@ -165,11 +165,12 @@ impl Graph<'_, '_> {
         words: &[i32],
         last: FixedMove,
         mut zone: Zone,
-        (steps, length): (Vec<ProgramStep>, u32),
+        steps: Vec<ProgramStep>,
+        length: u32,
     ) -> Result<Onward, Failure> {
         let mut target = words.to_vec();
         last.enter_locations(&mut target);
-        let may_delay = delay_after(self.symbolic, &mut target, (&steps, self.latest), &mut zone)?;
+        let may_delay = delay_after(self.symbolic, &mut target, &steps, self.latest, &mut zone)?;
         let is_end = length as usize == LONGEST_CHAIN
             || (may_delay && !self.chains_delays)
             || self.symbolic.is_almost_out_of_range(zone.bounds())

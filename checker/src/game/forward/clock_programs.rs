@@ -9,7 +9,7 @@ use crate::cancellation;
 use crate::network::ClockEffect;
 use crate::zones::dbm::Constraint;
 use crate::zones::federation::{block_bytes, table_bytes};
-use crate::zones::zone_table::ZoneId;
+use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, ClockSet, Federation, Zone};
 
 /// The index of a program.
@@ -133,11 +133,12 @@ impl Programs {
     }
 
     /// Whether the program leads from every valuation of the source zone into the target zone.
-    pub fn is_total(
+    pub(super) fn is_total(
         &mut self,
         program: ProgramId,
-        (source, source_zone): (ZoneId, &[Bound]),
-        (target, target_zone): (ZoneId, &[Bound]),
+        source: ZoneId,
+        target: ZoneId,
+        zones: &ZoneTable,
         dimension: usize,
     ) -> bool {
         if self.steps[program.0 as usize]
@@ -149,9 +150,9 @@ impl Programs {
         if let Some(&total) = self.totals.get(&(program, source, target)) {
             return total;
         }
-        let mut before = Federation::of_zone(dimension, target_zone);
+        let mut before = Federation::of_zone(dimension, zones.get(target));
         self.preimage(program, &mut before);
-        let total = before.includes_zone(source_zone);
+        let total = before.includes_zone(zones.get(source));
         self.totals.insert((program, source, target), total);
         total
     }

@@ -24,7 +24,7 @@ impl Graph<'_, '_> {
             self.push_node(discrete, id, Standing::Dead)
         });
         self.dead_ends.node = Some(node);
-        self.link(origin, node, program, (length, false));
+        self.link(origin, node, program, length, false);
     }
 
     /// Undoes that dead ends are left out: returns the nodes that lead to one, which are to be

@@ -33,8 +33,8 @@ impl DeadEnds {
         for (index, process) in network.processes.iter().enumerate() {
             let locations = 0..process.locations.len() as u32;
             let has_it = locations.map(|location| {
-                let at = (ProcessId(index as u32), LocationId(location));
-                possibility.can_be(truth, sought, at)
+                let process = ProcessId(index as u32);
+                possibility.can_be(truth, sought, process, LocationId(location))
             });
             let is_dead = cannot_reach(process, has_it.collect());
             if is_dead.contains(&true) {

@@ -54,8 +54,8 @@ impl Graph<'_, '_> {
             result?;
         }
         let network = self.symbolic.stepper.network();
-        let edges = (&mut self.edges[..], first as usize);
-        self.branch_points.find(network, node, edges, moves);
+        self.branch_points
+            .find(network, node, &mut self.edges, first as usize, moves);
         let node = &mut self.nodes[node as usize];
         node.edges = (first, self.edges.len() as u32);
         node.delays = delays;
@@ -115,8 +115,8 @@ impl Graph<'_, '_> {
             return self.end_in_pieces(target, origin);
         }
         let mut zone = self.entries.swap_remove(0);
-        let may_delay = delay_after(self.symbolic, target, (&self.steps, self.latest), &mut zone)?;
-        self.continue_chain(origin, target, zone, (1, may_delay))
+        let may_delay = delay_after(self.symbolic, target, &self.steps, self.latest, &mut zone)?;
+        self.continue_chain(origin, target, zone, 1, may_delay)
     }
 
     /// Continues a chain of which `length` moves were taken, and adds its edge. The zone contains
@@ -126,7 +126,8 @@ impl Graph<'_, '_> {
         origin: Origin,
         target: &mut Vec<i32>,
         mut zone: Zone,
-        (mut length, mut may_delay): (u32, bool),
+        mut length: u32,
+        mut may_delay: bool,
     ) -> Result<(), Failure> {
         while (length as usize) < self.longest_chain
             && !self.symbolic.is_almost_out_of_range(zone.bounds())
@@ -135,7 +136,7 @@ impl Graph<'_, '_> {
             push_step(&mut self.steps, may_delay, &self.effect);
             std::mem::swap(target, &mut self.spare);
             length += 1;
-            may_delay = delay_after(self.symbolic, target, (&self.steps, self.latest), &mut zone)?;
+            may_delay = delay_after(self.symbolic, target, &self.steps, self.latest, &mut zone)?;
         }
         self.end(target, zone, origin, length)
     }
@@ -190,7 +191,7 @@ impl Graph<'_, '_> {
             return Ok(());
         }
         for zone in &mut zones {
-            delay_after(self.symbolic, target, (&self.steps, self.latest), zone)?;
+            delay_after(self.symbolic, target, &self.steps, self.latest, zone)?;
         }
         if self.has_discrete_nodes {
             // All pieces end in the same node, and the steps say where each comes from.
@@ -257,20 +258,18 @@ impl Graph<'_, '_> {
         }
         let target = self.node_of(words, &ending.zone, ending.id, None)?;
         let program = ending.program;
-        let (from, to) = (
-            self.nodes[source as usize].zone,
-            self.nodes[target as usize].zone,
-        );
+        let from = self.nodes[source as usize].zone;
+        let to = self.nodes[target as usize].zone;
         let is_total = match ending.totality {
             Some((known, is_total)) if known == to => is_total,
             _ => {
-                let ends = ((from, self.zones.get(from)), (to, self.zones.get(to)));
+                let dimension = self.symbolic.dimension();
                 self.programs
-                    .is_total(program, ends.0, ends.1, self.symbolic.dimension())
+                    .is_total(program, from, to, &self.zones, dimension)
             }
         };
         ending.totality = Some((to, is_total));
-        self.link(origin, target, program, (length, is_total));
+        self.link(origin, target, program, length, is_total);
         Ok(())
     }
 
@@ -280,7 +279,8 @@ impl Graph<'_, '_> {
         origin: Origin,
         target: u32,
         program: ProgramId,
-        (length, is_total): (u32, bool),
+        length: u32,
+        is_total: bool,
     ) {
         let Origin {
             node: source,
@@ -310,7 +310,8 @@ impl Graph<'_, '_> {
 pub(super) fn delay_after(
     symbolic: &mut Symbolic<'_>,
     words: &mut [i32],
-    (steps, latest): (&[ProgramStep], Option<Constraint>),
+    steps: &[ProgramStep],
+    latest: Option<Constraint>,
     zone: &mut Zone,
 ) -> Result<bool, Failure> {
     let may_delay = symbolic.may_delay(words)?;

@@ -82,7 +82,7 @@ impl Graph<'_, '_> {
             Some(keep) => self.symbolic.extent(keep, words, zone.bounds())?,
             None => Extent::Everywhere,
         };
-        self.in_time(words, zone, (goal, keep))
+        self.in_time(words, zone, goal, keep)
     }
 
     /// Whether play continues: the goal holds nowhere in the state, nothing is broken, and it is
@@ -101,7 +101,8 @@ impl Graph<'_, '_> {
         &mut self,
         words: &mut [i32],
         zone: &Zone,
-        (goal, keep): (Extent, Extent),
+        goal: Extent,
+        keep: Extent,
     ) -> Result<(Extent, Extent), Failure> {
         let Some(deadline) = self.objective.deadline else {
             return Ok((goal, keep));

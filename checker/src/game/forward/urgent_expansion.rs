@@ -62,13 +62,13 @@ impl Graph<'_, '_> {
                 continue;
             }
             let is_cut = self.urgent(origin.node).is_some() || self.urgent(node).is_some();
-            let (from, to) = (
-                self.nodes[origin.node as usize].zone,
-                self.nodes[node as usize].zone,
-            );
-            let ends = ((from, self.zones.get(from)), (to, self.zones.get(to)));
-            let is_total = !is_cut && self.programs.is_total(program, ends.0, ends.1, dimension);
-            self.link(origin, node, program, (1, is_total));
+            let from = self.nodes[origin.node as usize].zone;
+            let to = self.nodes[node as usize].zone;
+            let is_total = !is_cut
+                && self
+                    .programs
+                    .is_total(program, from, to, &self.zones, dimension);
+            self.link(origin, node, program, 1, is_total);
         }
         Ok(())
     }

@@ -107,7 +107,7 @@ fn shrink(
         for (node, old) in kept.iter_mut().enumerate() {
             if !has_shrunk {
                 let node = node as u32;
-                has_shrunk = !is_within(solver, node, (old, &solver.won.win[node as usize]));
+                has_shrunk = !is_within(solver, node, old, &solver.won.win[node as usize]);
             }
             old.clone_from(&solver.won.win[node]);
         }
@@ -150,7 +150,7 @@ fn as_win(part: Federation) -> Win {
     }
 }
 
-fn is_within(solver: &Solver<'_, '_, '_>, node: u32, (one, other): (&Win, &Win)) -> bool {
+fn is_within(solver: &Solver<'_, '_, '_>, node: u32, one: &Win, other: &Win) -> bool {
     match (one, other) {
         (Win::Nothing, _) | (_, Win::Everything) => true,
         (_, Win::Nothing) => false,
@@ -200,7 +200,7 @@ pub(in crate::game) fn leave(
         if edge.controllable {
             back.unite(&solver.before(&edge, kept));
         } else {
-            let missing = solver.missing(&edge, (kept, None));
+            let missing = solver.missing(&edge, kept, None);
             out.unite(&missing);
         }
     }

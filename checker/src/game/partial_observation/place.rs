@@ -116,7 +116,7 @@ impl Place {
         symbolic.remembered_moves(&mut scratch, &mut moves)?;
         let delays = symbolic.may_delay_with(&mut scratch, &moves)?;
         let whole = Federation::of_zone(dimension, zone.bounds());
-        let stops = stops(symbolic, &mut scratch, (zone.bounds(), &whole), delays)?;
+        let stops = stops(symbolic, &mut scratch, zone.bounds(), &whole, delays)?;
         let cells = cells
             .into_iter()
             .map(|(values, part)| (values.into(), part));

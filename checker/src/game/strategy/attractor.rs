@@ -8,7 +8,7 @@ use crate::zones::{ClockSet, Federation};
 use super::chains::{Inner, walk};
 use super::extraction::{Choices, Chooser, Extracted, extract as extracted, moves_of, named};
 use super::safety::Evading;
-use super::{Decision, Selection, Strategy, StrategyState};
+use super::{Decision, Selection, Strategy, StrategyState, decide};
 use crate::game::Player;
 use crate::game::backward::winning_sets::{Gain, Win};
 use crate::game::forward::node::Edge;
@@ -83,8 +83,17 @@ impl Chooser for Seeking {
                 }
             };
             if gain.stamp > 0 || goes_on {
-                let part = (node, &mut rest, gain.stamp);
-                choose_moves(solver, part, (Selection::First, &earlier), &mut chosen)?;
+                let selection = Selection::First;
+                let rank = gain.stamp;
+                choose_moves(
+                    solver,
+                    node,
+                    &mut rest,
+                    rank,
+                    selection,
+                    &earlier,
+                    &mut chosen,
+                )?;
                 if solver.seeker == Player::Environment {
                     let whole = solver.gained_part(node, gain);
                     let mut picked = |solver: &Solver<'_, '_, '_>, leg: u32| {
@@ -93,13 +102,7 @@ impl Chooser for Seeking {
                     chosen.pick(gain.stamp, solver.picks(node, &whole, &mut picked)?);
                 }
             }
-            if !rest.is_empty() {
-                chosen.decisions.push(Decision {
-                    zones: rest,
-                    action: None,
-                    rank: gain.stamp,
-                });
-            }
+            decide(&mut chosen.decisions, rest, None, gain.stamp);
         }
         let opponent = solver.graph.edges_of(node).filter(|&edge| {
             let edge = &solver.graph.edges[edge];
@@ -126,28 +129,19 @@ impl Chooser for Seeking {
             for (inner, decisions) in inside.iter().zip(&mut decisions).rev() {
                 inner.effect.preimage(&mut won);
                 won.constrain_all(&inner.invariant);
-                decisions.push(Decision {
-                    zones: won.clone(),
-                    action: is_own(inner).then(|| inner.parts.clone()),
-                    rank: gain.stamp,
-                });
+                let action = is_own(inner).then(|| inner.parts.clone());
+                decide(decisions, won.clone(), action, gain.stamp);
                 if inner.delays {
                     won.down(&ClockSet::default());
                     won.constrain_all(&inner.invariant);
-                    decisions.push(Decision {
-                        zones: won.clone(),
-                        action: None,
-                        rank: gain.stamp,
-                    });
+                    decide(decisions, won.clone(), None, gain.stamp);
                 }
             }
         }
         let states = inside.into_iter().zip(decisions);
-        let states = states.map(|(inner, mut decisions)| {
-            decisions.retain(|decision| !decision.zones.is_empty());
-            inner.with(decisions)
-        });
-        Ok(states.collect())
+        Ok(states
+            .map(|(inner, decisions)| inner.with(decisions))
+            .collect())
     }
 }
 
@@ -185,8 +179,11 @@ pub(super) type Good<'g> = dyn Fn(&Solver<'_, '_, '_>, u32) -> Win + 'g;
 /// is none.
 pub(super) fn choose_moves(
     solver: &mut Solver<'_, '_, '_>,
-    (node, part, rank): (u32, &mut Federation, u32),
-    (selection, good): (Selection, &Good<'_>),
+    node: u32,
+    part: &mut Federation,
+    rank: u32,
+    selection: Selection,
+    good: &Good<'_>,
     chosen: &mut Choices,
 ) -> Result<(), Failure> {
     let moves = moves_of(solver, node)?;
@@ -204,11 +201,8 @@ pub(super) fn choose_moves(
         };
         if !zones.is_empty() {
             part.subtract(&zones);
-            chosen.decisions.push(Decision {
-                zones,
-                action: Some(named(solver, &moves, &first)),
-                rank,
-            });
+            let action = Some(named(solver, &moves, &first));
+            decide(&mut chosen.decisions, zones, action, rank);
             chosen.taken.extend(edges);
         }
     }

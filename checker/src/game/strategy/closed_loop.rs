@@ -39,8 +39,7 @@ impl ClosedLoop {
                 collect_atoms(&decision.zones, &mut atoms);
             }
             states.push(
-                (!one.is_goal)
-                    .then(|| allowed(network, &one, (strategy.owner, strategy.selection))),
+                (!one.is_goal).then(|| allowed(network, &one, strategy.owner, strategy.selection)),
             );
         }
         atoms.sort_by_key(|one| (one.left.first, one.right.first, one.low, one.strict));
@@ -157,11 +156,7 @@ pub fn counting<'d>(
     parts.collect()
 }
 
-fn allowed(
-    network: &Network,
-    joined: &Joined<'_>,
-    (owner, selection): (Player, Selection),
-) -> Allowed {
+fn allowed(network: &Network, joined: &Joined<'_>, owner: Player, selection: Selection) -> Allowed {
     let dimension = network.clocks.len().max(1);
     let counting = counting(&joined.decisions, selection, dimension);
     let mut decided = Federation::empty(dimension);

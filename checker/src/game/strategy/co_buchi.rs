@@ -22,7 +22,7 @@ use crate::zones::Federation;
 
 use super::chains::walk;
 use super::extraction::{self, Choices, Chooser, moves_of};
-use super::{Decision, Selection, Strategy, StrategyState};
+use super::{Decision, Selection, Strategy, StrategyState, decide};
 use crate::game::Player;
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, Standing};
@@ -80,7 +80,7 @@ impl Chooser for Denying<'_> {
                         continue;
                     }
                     let kept = &kept[edge.target as usize];
-                    let acting = solver.missing(&edge, (kept, None));
+                    let acting = solver.missing(&edge, kept, None);
                     let acting = acting.intersection(&part);
                     if !acting.is_empty() {
                         waiting.subtract(&acting);
@@ -92,7 +92,7 @@ impl Chooser for Denying<'_> {
                 push(&mut chosen.decisions, after, waiting, None);
                 let mut picked = |solver: &Solver<'_, '_, '_>, leg| {
                     let edge = &solver.graph.edges[leg as usize];
-                    solver.missing(edge, (&kept[edge.target as usize], None))
+                    solver.missing(edge, &kept[edge.target as usize], None)
                 };
                 chosen.pick(after as u32, solver.picks(node, &part, &mut picked)?);
             }
@@ -152,11 +152,6 @@ fn push(
     mut zones: Federation,
     action: Option<Vec<Part>>,
 ) {
-    if !zones.is_empty() {
-        zones.reduce();
-        decisions.push(Decision {
-            rank: rank as u32,
-            ..Decision::new(zones, action)
-        });
-    }
+    zones.reduce();
+    decide(decisions, zones, action, rank as u32);
 }

@@ -49,10 +49,10 @@ impl Choices {
     /// Adds legs that are picked, all of one rank.
     pub(super) fn pick(&mut self, rank: u32, picks: Vec<Pick>) {
         for Pick { leg, zones, parts } in picks {
-            let action = Some(parts);
             self.legs.push(Decision {
+                zones,
+                action: Some(parts),
                 rank,
-                ..Decision::new(zones, action)
             });
             self.taken.push(leg);
         }

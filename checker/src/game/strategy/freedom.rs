@@ -22,7 +22,7 @@ use crate::zones::Federation;
 use super::attractor::{choose_moves, won_before};
 use super::extraction::{Choices, Chooser, extract as extracted};
 use super::safety::allowed_waiting;
-use super::{Decision, Selection, Strategy, StrategyState};
+use super::{Selection, Strategy, StrategyState, decide};
 use crate::game::Player;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
@@ -105,16 +105,13 @@ fn choose_winning(
         solver.won.win[target as usize].clone()
     };
     let mut rest = free.clone();
-    let part = (node, &mut rest, 0);
-    choose_moves(solver, part, (Selection::Any, &won), chosen)?;
+    choose_moves(solver, node, &mut rest, 0, Selection::Any, &won, chosen)?;
     let mut acting = free.clone();
     acting.subtract(&rest);
     let safe = solver.federation_of(node, &solver.won.win[node as usize]);
-    let mut waiting = allowed_waiting(solver, node, (&safe, free), &acting)?;
-    if !waiting.is_empty() {
-        waiting.reduce();
-        chosen.decisions.push(Decision::new(waiting, None));
-    }
+    let mut waiting = allowed_waiting(solver, node, &safe, free, &acting)?;
+    waiting.reduce();
+    decide(&mut chosen.decisions, waiting, None, 0);
     Ok(())
 }
 
@@ -133,15 +130,11 @@ fn choose_nearer(
             let target = solver.graph.edges[edge as usize].target;
             won_before(solver, target, gain.stamp)
         };
-        let part = (node, &mut rest, gain.stamp);
-        choose_moves(solver, part, (Selection::Any, &earlier), chosen)?;
-        if !rest.is_empty() {
-            chosen.decisions.push(Decision {
-                zones: rest,
-                action: None,
-                rank: gain.stamp,
-            });
-        }
+        let selection = Selection::Any;
+        choose_moves(
+            solver, node, &mut rest, gain.stamp, selection, &earlier, chosen,
+        )?;
+        decide(&mut chosen.decisions, rest, None, gain.stamp);
     }
     Ok(())
 }

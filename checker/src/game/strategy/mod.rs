@@ -164,13 +164,13 @@ impl Strategy {
     }
 }
 
-impl Decision {
-    /// A decision without a rank.
-    pub(super) fn new(zones: Federation, action: Option<Vec<Part>>) -> Decision {
-        Decision {
+/// Adds a decision, if it applies anywhere.
+fn decide(decisions: &mut Vec<Decision>, zones: Federation, action: Option<Vec<Part>>, rank: u32) {
+    if !zones.is_empty() {
+        decisions.push(Decision {
             zones,
             action,
-            rank: 0,
-        }
+            rank,
+        });
     }
 }

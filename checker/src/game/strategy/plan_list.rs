@@ -15,7 +15,6 @@ use rustc_hash::FxHashMap;
 
 use crate::cancellation;
 use crate::network::{Failure, FixedMove, Moves, OfferId, Part};
-use crate::zones::federation::block_bytes;
 
 use super::plans::{NoPlans, Plans, UNITS_FOR_STEP};
 use crate::game::backward::winning_sets::Win;
@@ -84,22 +83,6 @@ impl PlanList {
     /// The distinct chains of transitions, by their indices.
     pub fn chains(&self) -> &[Vec<u32>] {
         &self.chains
-    }
-
-    /// The bytes that the list takes.
-    pub fn heap_bytes(&self) -> usize {
-        let ways = match &self.ways {
-            Ways::Graph(nodes, edges) => {
-                block_bytes(nodes.capacity() * size_of::<WayNode>())
-                    + block_bytes(edges.capacity() * size_of::<Way>())
-            }
-            Ways::Written(words) => block_bytes(words.capacity() * size_of::<u32>()),
-        };
-        let chains = self.chains.iter().map(|chain| size_of_val(&**chain));
-        let steps = self.steps.iter().map(|step| size_of_val(&*step.parts));
-        ways + block_bytes(self.chains.capacity() * size_of::<Vec<u32>>())
-            + block_bytes(self.steps.capacity() * size_of::<PlanStep>())
-            + chains.chain(steps).map(block_bytes).sum::<usize>()
     }
 }
 

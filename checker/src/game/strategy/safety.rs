@@ -10,7 +10,7 @@ use crate::zones::{Bound, ClockSet, Federation, instants, past};
 
 use super::chains::walk;
 use super::extraction::{Choices, Chooser, moves_of, named};
-use super::{Decision, Selection, StrategyState};
+use super::{Selection, StrategyState, decide};
 use crate::game::Player;
 use crate::game::forward::node::{Edge, Standing};
 use crate::game::solver::Solver;
@@ -52,25 +52,22 @@ impl Chooser for Evading {
                 }
                 continue;
             }
-            let spoiling = solver.spoiling(&edge);
-            let zones = spoiling.intersection(&free);
+            let zones = solver.spoiling(&edge).intersection(&free);
             if !zones.is_empty() {
                 acting.unite(&zones);
                 let action = Some(named(solver, &moves, &edge));
-                chosen.decisions.push(Decision::new(zones, action));
+                decide(&mut chosen.decisions, zones, action, 0);
                 chosen.taken.push(index as u32);
             }
         }
         if solver.seeker == Player::Environment {
             for entry in solver.graph.branch_points.of(node) {
-                let spoiling = solver.spoiling_all(entry);
-                let zones = spoiling.intersection(&free);
+                let zones = solver.spoiling_all(entry).intersection(&free);
                 if !zones.is_empty() {
                     acting.unite(&zones);
                     let first = &solver.graph.edges[entry[0] as usize];
-                    chosen
-                        .decisions
-                        .push(Decision::new(zones, Some(named(solver, &moves, first))));
+                    let action = Some(named(solver, &moves, first));
+                    decide(&mut chosen.decisions, zones, action, 0);
                     chosen.taken.extend(entry);
                 }
             }
@@ -87,13 +84,11 @@ impl Chooser for Evading {
             }
             Player::Environment => {
                 let safe = solver.federation_of(node, &solver.won.lost(node));
-                allowed_waiting(solver, node, (&safe, &free), &acting)?
+                allowed_waiting(solver, node, &safe, &free, &acting)?
             }
         };
-        if !waiting.is_empty() {
-            waiting.reduce();
-            chosen.decisions.push(Decision::new(waiting, None));
-        }
+        waiting.reduce();
+        decide(&mut chosen.decisions, waiting, None, 0);
         Ok(chosen)
     }
 
@@ -112,12 +107,8 @@ impl Chooser for Evading {
                 inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));
             waiting.subtract(&acting);
             let mut decisions = Vec::new();
-            if !acting.is_empty() {
-                decisions.push(Decision::new(acting, Some(inner.parts.clone())));
-            }
-            if !waiting.is_empty() {
-                decisions.push(Decision::new(waiting, None));
-            }
+            decide(&mut decisions, acting, Some(inner.parts.clone()), 0);
+            decide(&mut decisions, waiting, None, 0);
             states.push(inner.with(decisions));
         }
         states.reverse();
@@ -142,7 +133,8 @@ fn ended(solver: &Solver<'_, '_, '_>, node: u32) -> Federation {
 pub(super) fn allowed_waiting(
     solver: &mut Solver<'_, '_, '_>,
     node: u32,
-    (safe, free): (&Federation, &Federation),
+    safe: &Federation,
+    free: &Federation,
     acting: &Federation,
 ) -> Result<Federation, Failure> {
     let situation = solver.situation(node)?;
