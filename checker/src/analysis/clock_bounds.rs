@@ -143,13 +143,12 @@ impl ClockBounds {
         tuning: Tuning,
     ) -> ClockBounds {
         let clock_count = network.clocks.len();
-        let (abstraction, differences) = if abstraction == Abstraction::Differences {
-            match Differences::new(network, atoms) {
+        let (abstraction, differences) = match abstraction {
+            Abstraction::Differences => match Differences::new(network, atoms) {
                 Some(differences) => (abstraction, differences),
                 None => (Abstraction::Exact, Differences::default()),
-            }
-        } else {
-            (abstraction, Differences::default())
+            },
+            _ => (abstraction, Differences::default()),
         };
         let reset = differences.greatest_reset;
         let partners = Partners::new(network).filter(|_| tuning.joint_resets);

@@ -15,23 +15,20 @@
 
 use std::collections::BTreeSet;
 
-use crate::ir::{AssignedValue, ClockAtom, ClockRange, Edge, Network, Process, Update};
+use crate::ir::{AssignedValue, ClockAtom, ClockRange, Edge, Network, Process};
 use crate::zones::Bound;
 use crate::zones::dbm::Constraint;
 
 /// Comparisons of a network, at most.
 const MOST_DIFFERENCES: usize = 256;
 
-/// `x_left - x_right` against a bound: left, right, and the bound's encoding.
-type Difference = (usize, usize, i32);
-
 /// The comparisons of two clocks that matter in each location.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Differences {
     /// By process and location.
-    locations: Vec<Vec<BTreeSet<Difference>>>,
+    locations: Vec<Vec<BTreeSet<Constraint>>>,
     /// Those that matter everywhere.
-    everywhere: BTreeSet<Difference>,
+    everywhere: BTreeSet<Constraint>,
     /// The greatest constant that a clock may be set to.
     pub(super) greatest_reset: i32,
 }
@@ -63,12 +60,7 @@ impl Differences {
         for (locations, &location) in self.locations.iter().zip(words) {
             all.extend(&locations[location as usize]);
         }
-        let constraint = |(left, right, bound)| Constraint {
-            left,
-            right,
-            bound: Bound::from_raw(bound),
-        };
-        all.into_iter().map(constraint).collect()
+        all.into_iter().collect()
     }
 
     /// With `x := y + k` each comparison of x becomes one of y, everywhere; `None` if that does not
@@ -76,9 +68,8 @@ impl Differences {
     fn spread_over_copies(&mut self, network: &Network) -> Option<()> {
         let all = std::mem::take(&mut self.locations);
         self.everywhere.extend(all.into_iter().flatten().flatten());
-        let assignments: Vec<_> = updates(network)
-            .flat_map(|update| &update.assignments)
-            .collect();
+        let assignments = network.updates().flat_map(|update| &update.assignments);
+        let assignments: Vec<_> = assignments.collect();
         loop {
             let mut more = self.everywhere.clone();
             for assignment in &assignments {
@@ -88,10 +79,9 @@ impl Differences {
                     }
                     for source in clocks(source) {
                         for increment in low..=high {
-                            let copy = (assignment.target, source, increment);
-                            self.everywhere
-                                .iter()
-                                .for_each(|one| substitute(*one, copy, &mut more));
+                            for one in &self.everywhere {
+                                substitute(one, assignment.target, source, increment, &mut more);
+                            }
                         }
                     }
                 }
@@ -114,11 +104,13 @@ fn clocks(range: ClockRange) -> impl Iterator<Item = usize> {
 /// Adds what a comparison says of the source if a clock of the range was set to it plus the
 /// increment.
 fn substitute(
-    (left, right, bound): Difference,
-    (target, source, increment): (ClockRange, usize, i32),
-    into: &mut BTreeSet<Difference>,
+    one: &Constraint,
+    target: ClockRange,
+    source: usize,
+    increment: i32,
+    into: &mut BTreeSet<Constraint>,
 ) {
-    let bound = Bound::from_raw(bound);
+    let &Constraint { left, right, bound } = one;
     let is_target = |clock: usize| clocks(target).any(|one| one == clock);
     if is_target(left) && source != right {
         into.insert(canonical(
@@ -132,19 +124,9 @@ fn substitute(
     }
 }
 
-fn updates(network: &Network) -> impl Iterator<Item = &Update> {
-    let edges = network.processes.iter().flat_map(|process| &process.edges);
-    edges
-        .flat_map(|edge| {
-            std::iter::once(&edge.update).chain(edge.branches.iter().map(|branch| &branch.update))
-        })
-        .chain(&network.before_update)
-        .chain(&network.after_update)
-}
-
 /// The greatest constant that a clock may be set to, increments of copies included.
 pub fn greatest_reset(network: &Network) -> i32 {
-    let assignments = updates(network).flat_map(|update| &update.assignments);
+    let assignments = network.updates().flat_map(|update| &update.assignments);
     let constants = assignments.map(|assignment| match assignment.value {
         AssignedValue::Integer(_, high) => high,
         AssignedValue::Clock(_, _, increment) => increment.saturating_abs(),
@@ -171,7 +153,7 @@ pub fn greatest_in_atom(atom: &ClockAtom) -> i32 {
 
 /// Adds the comparisons that an atom stands for, if it is one of two clocks; `None` if there are
 /// too many.
-fn collect(atom: &ClockAtom, into: &mut BTreeSet<Difference>) -> Option<()> {
+fn collect(atom: &ClockAtom, into: &mut BTreeSet<Constraint>) -> Option<()> {
     if !atom.is_difference() {
         return Some(());
     }
@@ -199,17 +181,18 @@ fn collect(atom: &ClockAtom, into: &mut BTreeSet<Difference>) -> Option<()> {
 }
 
 /// A comparison and its complement cut alike: of both, the one whose left clock comes first.
-fn canonical(left: usize, right: usize, bound: Bound) -> Difference {
-    if left < right {
-        (left, right, bound.raw())
+fn canonical(left: usize, right: usize, bound: Bound) -> Constraint {
+    let (left, right, bound) = if left < right {
+        (left, right, bound)
     } else {
-        (right, left, bound.negated().raw())
-    }
+        (right, left, bound.negated())
+    };
+    Constraint { left, right, bound }
 }
 
 /// Those of each location of a process: of its invariant and the guards of its edges, and those of
 /// every target that survive the edge.
-fn fixpoint(process: &Process) -> Option<Vec<BTreeSet<Difference>>> {
+fn fixpoint(process: &Process) -> Option<Vec<BTreeSet<Constraint>>> {
     let mut table = vec![BTreeSet::new(); process.locations.len()];
     for (location, found) in process.locations.iter().zip(&mut table) {
         for atom in &location.invariant.atoms {
@@ -234,7 +217,7 @@ fn fixpoint(process: &Process) -> Option<Vec<BTreeSet<Difference>>> {
     }
 }
 
-fn propagate(edge: &Edge, branch: usize, table: &mut [BTreeSet<Difference>]) -> bool {
+fn propagate(edge: &Edge, branch: usize, table: &mut [BTreeSet<Constraint>]) -> bool {
     let (source, target) = (
         edge.source.0 as usize,
         edge.branches[branch].target.0 as usize,
@@ -245,8 +228,8 @@ fn propagate(edge: &Edge, branch: usize, table: &mut [BTreeSet<Difference>]) -> 
         .iter()
         .chain(&edge.branches[branch].update.fixed);
     let resets: Vec<usize> = resets.map(|&(clock, _)| clock.0 as usize).collect();
-    let survives = |one: &&Difference| !resets.contains(&one.0) && !resets.contains(&one.1);
-    let kept: Vec<Difference> = table[target].iter().filter(survives).copied().collect();
+    let survives = |one: &&Constraint| !resets.contains(&one.left) && !resets.contains(&one.right);
+    let kept: Vec<Constraint> = table[target].iter().filter(survives).copied().collect();
     let before = table[source].len();
     table[source].extend(kept);
     table[source].len() != before

@@ -14,8 +14,9 @@
 //! An edge that needs more of a clock than any assignment gives it *sleeps* where the clock is
 //! lower: only time could wake it.
 
-use crate::ir::{AssignedValue, ClockRange, Edge, LocationId, Network, ProcessId, Urgency};
+use std::ops::Range;
 
+use crate::ir::{AssignedValue, ClockRange, Edge, LocationId, Network, ProcessId, Urgency};
 use crate::zones::Bound;
 use crate::zones::dbm::Constraint;
 
@@ -32,23 +33,22 @@ pub(crate) enum Still {
 }
 
 /// An edge's part in synchronisations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Offer {
-    first: u32,
-    count: u32,
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Synchronisation {
+    channels: Range<u32>,
     sends: bool,
     is_broadcast: bool,
     /// Whether it leaves a committed location.
     is_committed: bool,
 }
 
-impl Offer {
+impl Synchronisation {
     /// Whether one may synchronise with the other, where a move must leave a committed location if
     /// `still` says so.
-    fn fits(self, other: Offer, still: Still) -> bool {
+    fn fits(&self, other: &Synchronisation, still: Still) -> bool {
         self.sends != other.sends
-            && self.first < other.first + other.count
-            && other.first < self.first + self.count
+            && self.channels.start < other.channels.end
+            && other.channels.start < self.channels.end
             && (still == Still::Urgent
                 || self.is_broadcast
                 || self.is_committed
@@ -65,7 +65,7 @@ pub(crate) type Sleeper = Constraint;
 pub(crate) struct Footprint {
     reads: Cells,
     writes: Cells,
-    offers: Vec<Offer>,
+    synchronisations: Vec<Synchronisation>,
     /// Constraints that keep edges asleep as long as they do not hold: one for each edge that may
     /// sleep.
     pub(crate) sleepers: Vec<Sleeper>,
@@ -79,9 +79,9 @@ impl Footprint {
     fn add(&mut self, other: &Footprint) {
         self.reads.extend(&other.reads);
         self.writes.extend(&other.writes);
-        for offer in &other.offers {
-            if !self.offers.contains(offer) {
-                self.offers.push(*offer);
+        for one in &other.synchronisations {
+            if !self.synchronisations.contains(one) {
+                self.synchronisations.push(one.clone());
             }
         }
         self.sleepers.extend_from_slice(&other.sleepers);
@@ -99,10 +99,10 @@ impl Footprint {
         self.writes.meet(&other.reads)
             || self.reads.meet(&other.writes)
             || self.writes.meet(&other.writes)
-            || self
-                .offers
-                .iter()
-                .any(|one| other.offers.iter().any(|two| one.fits(*two, still)))
+            || self.synchronisations.iter().any(|one| {
+                let others = &mut other.synchronisations.iter();
+                others.any(|other| one.fits(other, still))
+            })
     }
 }
 
@@ -157,9 +157,10 @@ impl Footprints {
         for branch in leaving.iter().flat_map(|edge| &edge.branches) {
             let definition = &ground.network.processes[start.process];
             for &index in &definition.locations[branch.target.0 as usize].edges {
-                let there = &self.edge(ground, start.process, index.0 as usize).offers;
-                let heard = there.iter().filter(|one| one.is_broadcast && !one.sends);
-                all.offers.extend(heard);
+                let there = self.edge(ground, start.process, index.0 as usize);
+                let there = there.synchronisations.iter();
+                let heard = there.filter(|one| one.is_broadcast && !one.sends);
+                all.synchronisations.extend(heard.cloned());
             }
         }
         all.settle();
@@ -291,17 +292,13 @@ fn of_edge(
         touches || targets().any(|target| watched.may_be_fulfilled(owner, target, edge.source));
     footprint.sleepers.extend(sleeper(edge, greatest));
     let location = &definition.locations[edge.source.0 as usize];
-    footprint.offers = edge
-        .sync
-        .map(|sync| Offer {
-            first: sync.channel.0,
-            count: sync.count,
-            sends: sync.send,
-            is_broadcast: network.channels[sync.channel.0 as usize].broadcast,
-            is_committed: location.urgency == Urgency::Committed,
-        })
-        .into_iter()
-        .collect();
+    let synchronisation = edge.sync.map(|sync| Synchronisation {
+        channels: sync.channels(),
+        sends: sync.send,
+        is_broadcast: network.channels[sync.channel.0 as usize].broadcast,
+        is_committed: location.urgency == Urgency::Committed,
+    });
+    footprint.synchronisations.extend(synchronisation);
     footprint
 }
 

@@ -194,9 +194,8 @@ impl LiveSearch<'_> {
             } else {
                 &mut self.receivers
             };
-            let first = sync.channel.0 as usize;
-            for all in &mut side[first..first + sync.count as usize] {
-                all.intersect(&writes);
+            for channel in sync.channels() {
+                side[channel as usize].intersect(&writes);
             }
         }
     }
@@ -215,11 +214,10 @@ impl LiveSearch<'_> {
         let Some(sync) = edge.sync else {
             return (before, after);
         };
-        let first = sync.channel.0 as usize;
-        let channels = first..first + sync.count as usize;
-        let is_broadcast = self.network.channels[channels.clone()]
-            .iter()
-            .any(|channel| channel.broadcast);
+        let channels = &self.network.channels;
+        let is_broadcast = sync
+            .channels()
+            .any(|channel| channels[channel as usize].broadcast);
         let (side, written) = if sync.send {
             (&self.receivers, &mut after)
         } else {
@@ -228,7 +226,9 @@ impl LiveSearch<'_> {
         // A broadcast needs no receiver.
         if !(sync.send && is_broadcast) {
             *written = WordSet::full(self.count);
-            side[channels].iter().for_each(|all| written.intersect(all));
+            for channel in sync.channels() {
+                written.intersect(&side[channel as usize]);
+            }
         }
         (before, after)
     }

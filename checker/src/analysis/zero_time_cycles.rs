@@ -46,11 +46,10 @@ pub(crate) fn recurrent_edges(network: &Network, greatest: &[i32]) -> Vec<Vec<bo
         let (senders, receivers) = partners(network, &recurrent);
         let has_partner = |process: usize, edge: &Edge| {
             edge.sync.is_none_or(|sync| {
-                let first = sync.channel.0 as usize;
-                let is_broadcast = network.channels[first].broadcast;
+                let is_broadcast = network.channels[sync.channel.0 as usize].broadcast;
                 let partners = if sync.send { &receivers } else { &senders };
-                let mut channels = partners[first..first + sync.count as usize].iter();
-                sync.send && is_broadcast || channels.any(|who| who.is_other_than(process))
+                let is_other = |channel: u32| partners[channel as usize].is_other_than(process);
+                sync.send && is_broadcast || sync.channels().any(is_other)
             })
         };
         let mut changed = false;
@@ -75,21 +74,15 @@ fn partners(network: &Network, recurrent: &[Vec<bool>]) -> (Vec<Who>, Vec<Who>) 
     let mut senders = vec![Who::Nobody; network.channels.len()];
     let mut receivers = senders.clone();
     for (index, process) in network.processes.iter().enumerate() {
-        for (edge, _) in process
-            .edges
-            .iter()
-            .zip(&recurrent[index])
-            .filter(|one| *one.1)
-        {
-            if let Some(sync) = edge.sync {
+        for (edge, &recurs) in process.edges.iter().zip(&recurrent[index]) {
+            if let Some(sync) = edge.sync.filter(|_| recurs) {
                 let side = if sync.send {
                     &mut senders
                 } else {
                     &mut receivers
                 };
-                let first = sync.channel.0 as usize;
-                for who in &mut side[first..first + sync.count as usize] {
-                    who.add(index);
+                for channel in sync.channels() {
+                    side[channel as usize].add(index);
                 }
             }
         }

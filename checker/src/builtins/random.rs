@@ -21,8 +21,8 @@ use std::sync::LazyLock;
 
 use rand_core::TryRng;
 use rand_distr::{
-    Beta, Distribution as _, Exp1, Gamma, Normal, OpenClosed01, Poisson, StandardUniform,
-    Triangular, Uniform, Weibull,
+    Beta, Distribution as _, Exp1, Gamma, Normal, Poisson, StandardUniform, Triangular, Uniform,
+    Weibull,
 };
 
 /// The words that a stream of random numbers takes in the state.
@@ -78,12 +78,6 @@ impl<'a> Stream<'a> {
     #[inline]
     pub fn uniform(&mut self) -> f64 {
         StandardUniform.sample(self)
-    }
-
-    /// A number in `(0, 1]`, one of 2^53 equidistant ones.
-    #[inline]
-    pub fn open_uniform(&mut self) -> f64 {
-        OpenClosed01.sample(self)
     }
 
     /// An exponentially distributed number. The rate is greater than 0.

@@ -128,13 +128,6 @@ pub struct Update {
     pub writes: Vec<(u32, u32)>,
 }
 
-impl Update {
-    /// Whether it changes nothing.
-    pub fn is_trivial(&self) -> bool {
-        self.function.is_none() && self.fixed.is_empty()
-    }
-}
-
 /// An assignment to a clock as static analysis sees it.
 #[derive(Clone, Debug)]
 pub struct ClockAssignment {

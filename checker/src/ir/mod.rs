@@ -31,7 +31,6 @@ mod queries;
 mod statistical;
 
 mod accesses;
-mod print;
 
 pub use chances::*;
 pub use code::*;

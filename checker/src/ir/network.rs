@@ -153,8 +153,6 @@ pub struct Location {
     pub chances: LocationChances,
     /// The edges that leave it.
     pub edges: Vec<EdgeId>,
-    /// Where it is drawn, for pictures.
-    pub position: Option<(i32, i32)>,
     /// Where it is declared.
     pub span: Span,
 }
@@ -183,8 +181,6 @@ pub struct Edge {
     pub controllable: bool,
     /// What was written: for traces.
     pub labels: EdgeLabels,
-    /// The bends of the arrow, for pictures.
-    pub nails: Vec<(i32, i32)>,
     /// Where it stands.
     pub span: Span,
 }

@@ -47,7 +47,7 @@ impl Checker<'_> {
     ) -> Expr {
         if let Some(place) = self.target_left_out(&target) {
             let place = place.clone();
-            return self.assignment_left_out((target, &place), value, of_target, span);
+            return self.assignment_left_out(target, &place, value, of_target, span);
         }
         if !self.expect_mutable(&target) || value.is_error() {
             return Expr::error(span);
@@ -82,7 +82,8 @@ impl Checker<'_> {
     /// unknown, is used, and where the right side has other effects.
     fn assignment_left_out(
         &mut self,
-        (target, place): (Expr, &Expr),
+        target: Expr,
+        place: &Expr,
         value: Expr,
         of_target: Range<usize>,
         span: Span,

@@ -135,6 +135,20 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Checks something in a scope of its own, where the name stands for the entity.
+    pub(super) fn scoped<T>(
+        &mut self,
+        name: &crate::syntax::ast::Name,
+        entity: Entity,
+        check: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        self.scopes.push(Scope::default());
+        self.declare(name, entity);
+        let checked = check(self);
+        self.scopes.pop();
+        checked
+    }
+
     /// Reports a diagnostic, unless the same was reported at the same place (for another instance).
     pub(super) fn report(&mut self, diagnostic: Diagnostic) {
         if self
@@ -294,7 +308,8 @@ impl<'a> Checker<'a> {
     /// Room for a variable of the state, with the given initial words and the names of its parts.
     pub(super) fn allocate(
         &mut self,
-        (name, declared): (&str, Span),
+        name: &str,
+        declared: Span,
         ty: &Type,
         meta: bool,
         words: &[i32],

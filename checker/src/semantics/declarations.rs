@@ -190,8 +190,8 @@ impl Checker<'_> {
             self.hybrid_clocks.push((name, variable.name.span));
         }
         let words = words.unwrap_or_else(|| vec![0; ty.size().words as usize]);
-        let name = (variable.name.text.as_str(), variable.name.span);
-        let place = self.allocate(name, ty, meta, &words);
+        let ast::Name { text, span } = &variable.name;
+        let place = self.allocate(text, *span, ty, meta, &words);
         let clock_start = Type::Int {
             low: 0,
             high: CLOCK_LIMIT,

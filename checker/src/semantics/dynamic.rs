@@ -65,32 +65,13 @@ impl Checker<'_> {
         }
         let outer_locals = std::mem::take(&mut self.locals);
         self.scopes.push(Scope::default());
-        let parameters = declared.parameters.iter().map(|written| {
-            let ty = self.dimensioned(&written.ty, &written.dimensions);
-            self.check_parameter_type(written, &ty);
-            let is_channel = ty.size().channels > 0;
-            if written.reference && !is_channel && !ty.is_error() {
-                self.error(
-                    codes::DYNAMIC_MISUSED,
-                    written.name.span,
-                    format!(
-                        "{} cannot be given to an instance by reference",
-                        ty.described()
-                    ),
-                    "pass it by value, or let the template use the global variable itself",
-                );
-            }
-            let parameter = self.parameter_of_type(written, ty);
-            Parameter {
-                passes_channel: is_channel,
-                ..parameter
-            }
-        });
+        let parameters = declared.parameters.iter();
+        let parameters = parameters.map(|written| self.dynamic_parameter(written));
         let parameters: Vec<Parameter> = parameters.collect();
         self.scopes.pop();
         self.locals = outer_locals;
         let text = format!("numOf({})", name.text);
-        let counter = self.allocate((&text, name.span), &COUNT, false, &[0]);
+        let counter = self.allocate(&text, name.span, &COUNT, false, &[0]);
         // What it writes besides is added when the slots are known.
         let effects = Effects {
             writes: vec![(counter.base.words, 1)],
@@ -115,6 +96,27 @@ impl Checker<'_> {
             is_spawned: false,
         };
         self.world.dynamics.push(dynamic);
+    }
+
+    fn dynamic_parameter(&mut self, written: &ast::Parameter) -> Parameter {
+        let ty = self.dimensioned(&written.ty, &written.dimensions);
+        self.check_parameter_type(written, &ty);
+        let is_channel = ty.size().channels > 0;
+        if written.reference && !is_channel && !ty.is_error() {
+            self.error(
+                codes::DYNAMIC_MISUSED,
+                written.name.span,
+                format!(
+                    "{} cannot be given to an instance by reference",
+                    ty.described()
+                ),
+                "pass it by value, or let the template use the global variable itself",
+            );
+        }
+        Parameter {
+            passes_channel: is_channel,
+            ..self.parameter_of_type(written, ty)
+        }
     }
 
     /// The dynamic template with this name.
@@ -371,7 +373,7 @@ impl Checker<'_> {
                 declared.ty.clone()
             };
             let words = vec![0; ty.size().words as usize];
-            let mut place = self.allocate((name, span), &ty, false, &words);
+            let mut place = self.allocate(name, span, &ty, false, &words);
             places.push(place.clone());
             place.mutable = !self.carried(&formal.ty).constant;
             let entity = if declared.passes_channel {
@@ -450,7 +452,8 @@ impl Checker<'_> {
     pub(super) fn over_instances(
         &mut self,
         quantifier: Quantifier,
-        (name, ty): (&Name, &ast::TypeExpr),
+        name: &Name,
+        ty: &ast::TypeExpr,
         body: &ast::Expr,
         span: Span,
     ) -> Option<Expr> {
@@ -473,20 +476,12 @@ impl Checker<'_> {
         };
         let number = slot_type(slots.count);
         let local = self.new_local(number.clone());
-        let place = Place {
-            root: Root::Local(local),
-            base: Size::default(),
-            mutable: false,
-            declared: Span::default(),
-        };
-        let index = Expr::new(Kind::Variable(place), number, name.span);
+        let index = Expr::new(Kind::Variable(Place::bound(local)), number, name.span);
         let member = Member::of_instance(dynamic.group(), index);
-        self.scopes.push(Scope::default());
-        self.declare(name, Entity::Instance(Arc::new(member.clone())));
+        let entity = Entity::Instance(Arc::new(member.clone()));
         let outer = std::mem::take(&mut self.needs_unrolling);
-        let checked = self.expression(body);
+        let checked = self.scoped(name, entity, |checker| checker.expression(body));
         let is_unknown = std::mem::replace(&mut self.needs_unrolling, outer);
-        self.scopes.pop();
         if is_unknown {
             self.error(
                 codes::DYNAMIC_MISUSED,
@@ -502,34 +497,44 @@ impl Checker<'_> {
         };
         let place = self.location_number(&member, None, span);
         let absent = Expr::int(slots.absent.0 as i32, place.ty.clone(), span);
-        let relation = if quantifier == Quantifier::ForAll {
-            Relation::Equal
-        } else {
-            Relation::NotEqual
-        };
-        let is_used = Box::new(compare_integers(relation, place, absent, span));
-        let checked = Box::new(checked);
-        let body = match quantifier {
-            Quantifier::ForAll => Kind::Or(is_used, checked),
-            Quantifier::Exists => Kind::And(is_used, checked),
-            Quantifier::Sum => {
-                let zero = if ty == Type::Double {
-                    Expr::new(Kind::Double(0.0), Type::Double, span)
-                } else {
-                    Expr::int(0, Type::ANY_INT, span)
-                };
-                Kind::Ternary(is_used, checked, Box::new(zero))
-            }
-        };
-        let body = Box::new(Expr::new(body, ty.clone(), span));
         let kind = Kind::Quantifier {
             quantifier,
             local,
             range: (0, slots.count as i32 - 1),
-            body,
+            body: Box::new(if_used(quantifier, place, absent, checked, &ty, span)),
         };
         Some(Expr::new(kind, ty, span))
     }
+}
+
+/// The body of a quantifier, of a slot that counts only if its place is not the absent one.
+fn if_used(
+    quantifier: Quantifier,
+    place: Expr,
+    absent: Expr,
+    body: Expr,
+    ty: &Type,
+    span: Span,
+) -> Expr {
+    let compared = |relation, place, absent| {
+        let compared = compare_integers(relation, place, absent, span);
+        Box::new(compared)
+    };
+    let body = Box::new(body);
+    let kind = match quantifier {
+        Quantifier::ForAll => Kind::Or(compared(Relation::Equal, place, absent), body),
+        Quantifier::Exists => Kind::And(compared(Relation::NotEqual, place, absent), body),
+        Quantifier::Sum => {
+            let zero = if *ty == Type::Double {
+                Expr::new(Kind::Double(0.0), Type::Double, span)
+            } else {
+                Expr::int(0, Type::ANY_INT, span)
+            };
+            let is_used = compared(Relation::NotEqual, place, absent);
+            Kind::Ternary(is_used, body, Box::new(zero))
+        }
+    };
+    Expr::new(kind, ty.clone(), span)
 }
 
 fn is_exit(update: &ast::Expr) -> bool {
@@ -554,7 +559,6 @@ fn absent_location(template: &ast::Template) -> ir::Location {
         rates: Vec::new(),
         chances: LocationChances::default(),
         edges: Vec::new(),
-        position: None,
         span: template.name.span,
     }
 }

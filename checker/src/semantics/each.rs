@@ -9,7 +9,7 @@ use super::groups::Member;
 use super::labels::collapse;
 use super::operators::compare_integers;
 use super::pools::slot_type;
-use super::scope::{Entity, Scope};
+use super::scope::Entity;
 use super::typed::{Expr, Kind};
 use super::types::Type;
 use crate::ir::{LocationId, Relation};
@@ -54,11 +54,9 @@ impl Checker<'_> {
             return Vec::new();
         }
         let shown = (low..=high).map(|number| {
-            self.scopes.push(Scope::default());
             let value = Expr::int(number, range.clone(), name.span);
-            self.declare(name, Entity::Constant { value, free: false });
-            let shown = self.expression(&item.value);
-            self.scopes.pop();
+            let entity = Entity::Constant { value, free: false };
+            let shown = self.scoped(name, entity, |checker| checker.expression(&item.value));
             (shown, texts(number))
         });
         shown.collect()
@@ -73,10 +71,8 @@ impl Checker<'_> {
         absent: LocationId,
     ) -> Expr {
         let span = value.span;
-        self.scopes.push(Scope::default());
-        self.declare(name, Entity::Instance(Arc::new(member.clone())));
-        let shown = self.expression(value);
-        self.scopes.pop();
+        let entity = Entity::Instance(Arc::new(member.clone()));
+        let shown = self.scoped(name, entity, |checker| checker.expression(value));
         let shown = self.clock_value(shown);
         if shown.is_error() || !shown.ty.is_number() {
             // What is wrong is reported where it is shown.

@@ -2,7 +2,7 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::scope::{Entity, Scope};
+use super::scope::Entity;
 use super::typed::Expr;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{Formula, Guard, Temporal};
@@ -74,7 +74,7 @@ impl Checker<'_> {
                 keep.release(interval?, goal)
             }
             ast::Formula::Quantified(is_for_all, name, ty, inner) => {
-                self.quantified(*is_for_all, (name, ty), inner, reading)?
+                self.quantified(*is_for_all, name, ty, inner, reading)?
             }
         })
     }
@@ -83,7 +83,8 @@ impl Checker<'_> {
     fn quantified(
         &mut self,
         is_for_all: bool,
-        (name, ty): (&ast::Name, &ast::TypeExpr),
+        name: &ast::Name,
+        ty: &ast::TypeExpr,
         inner: &ast::Formula,
         reading: &mut Reading,
     ) -> Option<Temporal> {
@@ -111,12 +112,9 @@ impl Checker<'_> {
         }
         let mut parts = Vec::new();
         for value in low..=high {
-            self.scopes.push(Scope::default());
             let value = Expr::int(value, range.clone(), name.span);
-            self.declare(name, Entity::Constant { value, free: false });
-            let part = self.temporal(inner, reading);
-            self.scopes.pop();
-            parts.push(part?);
+            let entity = Entity::Constant { value, free: false };
+            parts.push(self.scoped(name, entity, |checker| checker.temporal(inner, reading))?);
             if reading.atoms.len() > MOST_CONDITIONS {
                 self.error(
                     codes::RANGE_TOO_LARGE,
@@ -127,25 +125,7 @@ impl Checker<'_> {
                 return None;
             }
         }
-        // Halves, so that the tree is not high.
-        while parts.len() > 1 {
-            let mut pairs = parts.into_iter();
-            let mut joined = Vec::new();
-            while let Some(left) = pairs.next() {
-                joined.push(match pairs.next() {
-                    Some(right) if is_for_all => left.and(right),
-                    Some(right) => left.or(right),
-                    None => left,
-                });
-            }
-            parts = joined;
-        }
-        let of_nothing = if is_for_all {
-            Temporal::True
-        } else {
-            Temporal::True.negated()
-        };
-        Some(parts.pop().unwrap_or(of_nothing))
+        Some(balanced(is_for_all, parts))
     }
 
     fn both(
@@ -200,4 +180,27 @@ impl Checker<'_> {
             .help("bound the runs, Pr[<=10](<> p), or the operator, Pr(<>[0,10] p)"),
         );
     }
+}
+
+/// Conditions joined pair by pair, so that the tree is not high; of none, what holds of all or of
+/// some of nothing.
+fn balanced(is_for_all: bool, mut parts: Vec<Temporal>) -> Temporal {
+    while parts.len() > 1 {
+        let mut pairs = parts.into_iter();
+        let mut joined = Vec::new();
+        while let Some(left) = pairs.next() {
+            joined.push(match pairs.next() {
+                Some(right) if is_for_all => left.and(right),
+                Some(right) => left.or(right),
+                None => left,
+            });
+        }
+        parts = joined;
+    }
+    let of_nothing = if is_for_all {
+        Temporal::True
+    } else {
+        Temporal::True.negated()
+    };
+    parts.pop().unwrap_or(of_nothing)
 }

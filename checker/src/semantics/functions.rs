@@ -7,7 +7,7 @@ use super::codes;
 use super::initialisers::{InitialPart, InitialValue};
 use super::left_out::causes::declared_at;
 use super::scalars::is_order_irrelevant;
-use super::scope::{Entity, Scope};
+use super::scope::{Carried, Entity, Scope};
 use super::typed::{
     Effects, Expr, Kind, LocalId, Parameter, Place, Root, Signature, Statement, Unknown,
 };
@@ -122,10 +122,9 @@ impl Checker<'_> {
         let constant = self.carried(&parameter.ty).constant;
         let declared = declared_at(&ty, parameter.name.span);
         let place = Place {
-            root: Root::Local(local),
-            base: Size::default(),
             mutable: !constant,
             declared,
+            ..Place::bound(local)
         };
         let entity = if ty.is_error() {
             Entity::Broken
@@ -210,21 +209,7 @@ impl Checker<'_> {
             .map(|initialiser| self.local_initialiser(initialiser, &ty));
         self.expect_values(&ty, variable.ty.span);
         let prefixes = self.carried(&variable.ty);
-        let size = ty.size();
-        if size.clocks + size.channels > 0
-            || prefixes.meta
-            || matches!(ty, Type::Void | Type::String)
-        {
-            self.error(
-                codes::TYPE_MISPLACED,
-                variable.ty.span,
-                format!("{} cannot be a local of a function", ty.described()),
-                "declare it outside the function",
-            );
-            self.declare(&variable.name, Entity::Broken);
-            return None;
-        }
-        if ty.is_error() {
+        if !self.can_be_local(&ty, variable, prefixes) {
             self.declare(&variable.name, Entity::Broken);
             return None;
         }
@@ -269,6 +254,23 @@ impl Checker<'_> {
         Some(self.declare_local(variable, ty, parts))
     }
 
+    /// Whether a variable of a type may be a local of a function; reports it otherwise.
+    fn can_be_local(&mut self, ty: &Type, variable: &ast::Variable, prefixes: Carried) -> bool {
+        let size = ty.size();
+        let is_refused = size.clocks + size.channels > 0
+            || prefixes.meta
+            || matches!(ty, Type::Void | Type::String);
+        if is_refused {
+            self.error(
+                codes::TYPE_MISPLACED,
+                variable.ty.span,
+                format!("{} cannot be a local of a function", ty.described()),
+                "declare it outside the function",
+            );
+        }
+        !is_refused && !ty.is_error()
+    }
+
     fn declare_local(
         &mut self,
         variable: &ast::Variable,
@@ -296,10 +298,9 @@ impl Checker<'_> {
             })
             .collect();
         let place = Place {
-            root,
-            base: Size::default(),
             mutable: !self.carried(&variable.ty).constant,
             declared: declared_at(&ty, variable.name.span),
+            ..Place::bound(local)
         };
         self.declare(&variable.name, Entity::Variable { place, ty });
         Statement::Declare(local, assignments)
@@ -395,12 +396,7 @@ impl Checker<'_> {
         self.scopes.push(Scope::default());
         let (range, local) = if let Some((ty, range)) = iterated {
             let local = self.new_local(ty.clone());
-            let place = Place {
-                root: Root::Local(local),
-                base: Size::default(),
-                mutable: false,
-                declared: Span::default(),
-            };
+            let place = Place::bound(local);
             self.declare(name, Entity::Variable { place, ty });
             (range, local)
         } else {

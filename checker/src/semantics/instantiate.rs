@@ -350,11 +350,10 @@ impl Checker<'_> {
                 }
                 _ => continue,
             };
-            let name = (formal.name.text.as_str(), formal.name.span);
-            self.warn_if_left_out(name.0, &ty, name.1);
-            let place = self.allocate(name, &ty, false, &words);
-            let entity = Entity::Variable { place, ty };
-            scope.set(&formal.name.text, entity, formal.name.span);
+            let ast::Name { text, span } = &formal.name;
+            self.warn_if_left_out(text, &ty, *span);
+            let place = self.allocate(text, *span, &ty, false, &words);
+            scope.set(text, Entity::Variable { place, ty }, *span);
         }
         scope
     }
@@ -410,37 +409,7 @@ impl Checker<'_> {
             let words = self.known_words(&argument, ty, "an argument of a template")?;
             return Some(self.constant_entity(words, ty, free, span));
         }
-        if !is_fixed_place(&argument) {
-            self.error(
-                codes::REFERENCE_NOT_UNIQUE,
-                argument.span,
-                "a reference parameter needs one variable that is known when the model is loaded",
-                "name a variable, or a part of an array with a constant index",
-            );
-            return None;
-        }
-        if !constant && !argument.is_mutable_place() && argument.ty.size().words > 0 {
-            self.expect_mutable(&argument);
-            return None;
-        }
-        let fits = if constant {
-            ty.accepts(&argument.ty) && ty.size() == argument.ty.size()
-        } else {
-            let argument = argument.ty.with_hybrid_clocks();
-            ty.with_hybrid_clocks().is_equivalent(&argument)
-        };
-        if !fits || !(constant || ty.accepts_channel(&argument.ty)) {
-            self.error(
-                codes::REFERENCE_MISMATCHED,
-                argument.span,
-                format!(
-                    "the reference parameter '{}' needs {}, but this is {}",
-                    formal.name.text,
-                    ty.described(),
-                    argument.ty.described()
-                ),
-                "a reference needs a variable of the same type, range included",
-            );
+        if !self.can_be_referred_to(formal, ty, constant, &argument) {
             return None;
         }
         let variable = argument.variable()?;
@@ -461,6 +430,49 @@ impl Checker<'_> {
             place,
             ty: argument.ty,
         })
+    }
+
+    /// Whether an argument can be given to a reference parameter; reports it otherwise.
+    fn can_be_referred_to(
+        &mut self,
+        formal: &Parameter,
+        ty: &Type,
+        constant: bool,
+        argument: &Expr,
+    ) -> bool {
+        if !is_fixed_place(argument) {
+            self.error(
+                codes::REFERENCE_NOT_UNIQUE,
+                argument.span,
+                "a reference parameter needs one variable that is known when the model is loaded",
+                "name a variable, or a part of an array with a constant index",
+            );
+            return false;
+        }
+        if !constant && !argument.is_mutable_place() && argument.ty.size().words > 0 {
+            self.expect_mutable(argument);
+            return false;
+        }
+        let fits = if constant {
+            ty.accepts(&argument.ty) && ty.size() == argument.ty.size()
+        } else {
+            let given = argument.ty.with_hybrid_clocks();
+            ty.with_hybrid_clocks().is_equivalent(&given) && ty.accepts_channel(&argument.ty)
+        };
+        if !fits {
+            self.error(
+                codes::REFERENCE_MISMATCHED,
+                argument.span,
+                format!(
+                    "the reference parameter '{}' needs {}, but this is {}",
+                    formal.name.text,
+                    ty.described(),
+                    argument.ty.described()
+                ),
+                "a reference needs a variable of the same type, range included",
+            );
+        }
+        fits
     }
 
     /// Checks a template that no process uses: what is not supported there does no harm.

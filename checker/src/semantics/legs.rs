@@ -20,7 +20,7 @@ use super::scope::{Entity, Scope};
 use super::typed::{Expr, LocalId};
 use super::types::Type;
 use crate::cancellation;
-use crate::diagnostics::Diagnostic;
+use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, EdgeId, FunctionId, LocationId};
 use crate::syntax::ast::{self, BinaryOp, ExprKind};
 
@@ -29,6 +29,31 @@ const UNITS_FOR_EDGE: usize = 1 << 12;
 
 /// The most branches that the select bindings of one leg may stand for.
 const BRANCH_LIMIT: u64 = 1 << 16;
+
+/// What names of code call an edge with a leg.
+fn place_of_leg(ends: &Ends<'_>, entry: &ast::Edge, leg: &ast::Edge) -> String {
+    let template = ends.template;
+    let name = |node| node_name(template, ends.nodes, node);
+    format!(
+        "template {}, edge {} → {} → {}",
+        template.name.text,
+        name(&entry.source.text),
+        name(&entry.target.text),
+        name(&leg.target.text)
+    )
+}
+
+/// The bindings of an edge and of its leg; a name that both have gets a mark in the leg.
+fn joined(entry: Vec<Select>, own: Vec<Select>) -> Vec<ir::Select> {
+    let mut joined: Vec<ir::Select> = entry.into_iter().map(|select| select.range).collect();
+    for Select { mut range, .. } in own {
+        if joined.iter().any(|other| other.name == range.name) {
+            range.name.push('\'');
+        }
+        joined.push(range);
+    }
+    joined
+}
 
 /// The legs of a branch point, in the order of the file.
 fn legs_of<'t>(
@@ -102,20 +127,13 @@ impl Checker<'_> {
         cancellation::work(UNITS_FOR_EDGE);
         self.locals.clear();
         let template = ends.template;
-        let name = |node: &ast::Name| node_name(template, ends.nodes, &node.text).to_owned();
-        let place = format!(
-            "template {}, edge {} → {} → {}",
-            template.name.text,
-            name(&entry.source),
-            name(&entry.target),
-            name(&leg.target)
-        );
+        let place = place_of_leg(ends, entry, leg);
         self.scopes.push(Scope::default());
         let own = self.selects(&leg.select);
         let scope_of_leg = self.scopes.pop().unwrap_or_default();
         self.scopes.push(Scope::default());
-        let mut selects = self.selects(&entry.select);
-        let combinations = self.combinations((&selects, &own), leg);
+        let selects = self.selects(&entry.select);
+        let combinations = self.combinations(&selects, &own, leg);
         let bindings = selects.iter().chain(&own);
         let locals: Vec<LocalId> = bindings.map(|select| select.local).collect();
         let mut conditions = self.conditions_of(entry);
@@ -125,15 +143,7 @@ impl Checker<'_> {
         self.scopes.push(scope_of_leg);
         conditions.extend(self.conditions_of(leg));
         if let (Some(second), Some(_)) = (&leg.sync, &entry.sync) {
-            self.report(
-                Diagnostic::new(
-                    codes::SYNCHRONISES_TWICE,
-                    second.span,
-                    "the edge to this branch point synchronises too",
-                )
-                .note("an edge and a leg are one transition, which synchronises once")
-                .help("synchronise on the edge, or on its legs"),
-            );
+            self.report_second_sync(second.span);
         }
         sync = sync.or(self.sync_of(leg, &locals, &place));
         effects.extend(self.effects(&leg.update));
@@ -143,16 +153,9 @@ impl Checker<'_> {
         let update = self.make_update(&effects, &locals, &format!("{place}, update"));
         let target = self.unless_exit(template, &leg.update, exits(&entry.update), target);
         let target = self.unless_exit(template, &entry.update, 0, target);
-        for mut select in own {
-            let name = &mut select.range.name;
-            if selects.iter().any(|other| other.range.name == *name) {
-                name.push('\'');
-            }
-            selects.push(select);
-        }
         let edge = ir::Edge {
             source: ends.source,
-            select: selects.into_iter().map(|select| select.range).collect(),
+            select: joined(selects, own),
             guard,
             sync,
             update,
@@ -164,10 +167,21 @@ impl Checker<'_> {
             leg: None,
             controllable: entry.controllable,
             labels: self.labels_of_leg(entry, leg),
-            nails: entry.nails.iter().map(|point| (point.x, point.y)).collect(),
             span: leg.span,
         };
         (edge, combinations)
+    }
+
+    fn report_second_sync(&mut self, span: Span) {
+        self.report(
+            Diagnostic::new(
+                codes::SYNCHRONISES_TWICE,
+                span,
+                "the edge to this branch point synchronises too",
+            )
+            .note("an edge and a leg are one transition, which synchronises once")
+            .help("synchronise on the edge, or on its legs"),
+        );
     }
 
     fn conditions_of(&mut self, edge: &ast::Edge) -> Vec<Expr> {
@@ -182,7 +196,7 @@ impl Checker<'_> {
     }
 
     /// How many combinations the bindings of a leg have, if those of the edge are not too many.
-    fn combinations(&mut self, (entry, own): (&[Select], &[Select]), leg: &ast::Edge) -> u32 {
+    fn combinations(&mut self, entry: &[Select], own: &[Select], leg: &ast::Edge) -> u32 {
         let count = |selects: &[Select]| {
             let counts = selects.iter().map(|select| {
                 let (low, high) = (i64::from(select.range.low), i64::from(select.range.high));

@@ -4,8 +4,8 @@ use super::checker::Checker;
 use super::codes;
 use super::operators::truth_interval;
 use super::scope::Entity;
-use super::typed::{Expr, Kind, Place, Root};
-use super::types::{Class, Size, Type};
+use super::typed::{Expr, Kind, Place};
+use super::types::{Class, Interval, Type};
 use crate::diagnostics::Span;
 use crate::syntax::ast::{self, BinaryOp, Name, Quantifier, TypeExpr};
 
@@ -18,47 +18,34 @@ impl Checker<'_> {
         body: &ast::Expr,
         span: Span,
     ) -> Expr {
-        if let Some(checked) = self.over_instances(quantifier, (name, ty), body, span) {
+        if let Some(checked) = self.over_instances(quantifier, name, ty, body, span) {
             return checked;
         }
         let Some((range_type, range)) = self.iterated(ty) else {
-            self.scopes.push(super::scope::Scope::default());
-            self.declare(name, Entity::Broken);
-            self.expression(body);
-            self.scopes.pop();
+            self.scoped(name, Entity::Broken, |checker| checker.expression(body));
             return Expr::error(span);
         };
         if range.0 > range.1 {
             return over_nothing(quantifier, span);
         }
         let local = self.new_local(range_type.clone());
-        let place = Place {
-            root: Root::Local(local),
-            base: Size::default(),
-            mutable: false,
-            declared: Span::default(),
-        };
-        self.scopes.push(super::scope::Scope::default());
-        self.declare(
-            name,
-            Entity::Variable {
-                place,
-                ty: range_type.clone(),
-            },
-        );
+        let (place, ty) = (Place::bound(local), range_type.clone());
         let outer = std::mem::take(&mut self.needs_unrolling);
-        let mut checked = self.expression(body);
-        if quantifier == Quantifier::Sum && !self.is_query {
-            checked = self.clock_value(checked);
-        }
+        let checked = self.scoped(name, Entity::Variable { place, ty }, |checker| {
+            let checked = checker.expression(body);
+            if quantifier == Quantifier::Sum && !checker.is_query {
+                checker.clock_value(checked)
+            } else {
+                checked
+            }
+        });
         let members_differ = std::mem::replace(&mut self.needs_unrolling, outer);
-        self.scopes.pop();
         if quantifier == Quantifier::Sum && checked.ty == Type::Double {
             // The order of additions decides how they are rounded.
             self.distinguish_members(&range_type, span);
         }
         if members_differ || self.must_unroll(&checked) {
-            return self.unrolled(quantifier, (name, &range_type, range), body, span);
+            return self.unrolled(quantifier, name, &range_type, range, body, span);
         }
         self.expect_pure(&checked, "the body of a quantifier");
         let Some(ty) = self.quantified_type(quantifier, &checked) else {
@@ -106,15 +93,18 @@ impl Checker<'_> {
     }
 
     /// A quantifier as a conjunction or disjunction over all values, and a sum as a sum.
-    pub(super) fn unrolled(
+    fn unrolled(
         &mut self,
         quantifier: Quantifier,
-        (name, ty, (low, high)): (&Name, &Type, (i32, i32)),
+        name: &Name,
+        ty: &Type,
+        values: Interval,
         body: &ast::Expr,
         span: Span,
     ) -> Expr {
         /// The most instances that a quantifier over clocks is unrolled into.
         const UNROLLING_LIMIT: i64 = 100_000;
+        let (low, high) = values;
         if i64::from(high) - i64::from(low) >= UNROLLING_LIMIT {
             self.error(
                 codes::RANGE_TOO_LARGE,
@@ -126,11 +116,9 @@ impl Checker<'_> {
         }
         let mut parts = Vec::new();
         for value in low..=high {
-            self.scopes.push(super::scope::Scope::default());
             let value = Expr::int(value, ty.clone(), name.span);
-            self.declare(name, Entity::Constant { value, free: false });
-            parts.push(self.expression(body));
-            self.scopes.pop();
+            let entity = Entity::Constant { value, free: false };
+            parts.push(self.scoped(name, entity, |checker| checker.expression(body)));
         }
         self.balanced(quantifier, parts, span)
     }

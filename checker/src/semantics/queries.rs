@@ -417,7 +417,8 @@ impl Checker<'_> {
                 negated,
             } => self.clock_predicate(
                 *relation,
-                (left.as_deref(), right.as_deref()),
+                left.as_deref(),
+                right.as_deref(),
                 bound,
                 *negated,
             ),
@@ -465,7 +466,8 @@ impl Checker<'_> {
     fn clock_predicate(
         &mut self,
         relation: ClockRelation,
-        (left, right): (Option<&Expr>, Option<&Expr>),
+        left: Option<&Expr>,
+        right: Option<&Expr>,
         bound: &Expr,
         negated: bool,
     ) -> Option<Predicate> {

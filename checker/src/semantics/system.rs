@@ -234,18 +234,11 @@ fn features(network: &Network) -> Features {
         let invariants = locations().map(|location| &location.invariant);
         guards.chain(invariants).flat_map(|guard| &guard.atoms)
     };
-    let mut updates = edges()
-        .flat_map(|edge| {
-            let branches = edge.branches.iter().map(|branch| &branch.update);
-            std::iter::once(&edge.update).chain(branches)
-        })
-        .chain(&network.before_update)
-        .chain(&network.after_update);
     let synchronises = |with: fn(&crate::ir::Channel, bool) -> bool| {
         edges().any(|edge| {
             edge.sync.is_some_and(|sync| {
-                let channels = &network.channels[sync.channel.0 as usize..][..sync.count as usize];
-                !edge.guard.atoms.is_empty() && channels.iter().any(|c| with(c, sync.send))
+                let mut channels = sync.channels().map(|one| &network.channels[one as usize]);
+                !edge.guard.atoms.is_empty() && channels.any(|one| with(one, sync.send))
             })
         })
     };
@@ -260,12 +253,12 @@ fn features(network: &Network) -> Features {
             .any(super::templates::is_strict_upper_bound),
         guarded_receivers: synchronises(|channel, send| channel.broadcast && !send),
         clock_guarded_urgent: synchronises(|channel, _| channel.urgent),
-        clock_copies: updates.any(|update| {
-            let copies = |value: &AssignedValue| matches!(value, AssignedValue::Clock(..));
-            update
+        clock_copies: network.updates().any(|update| {
+            let mut values = update
                 .assignments
                 .iter()
-                .any(|assignment| copies(&assignment.value))
+                .map(|assignment| &assignment.value);
+            values.any(|value| matches!(value, AssignedValue::Clock(..)))
         }),
         doubles: network
             .layout

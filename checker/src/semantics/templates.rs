@@ -10,8 +10,8 @@ use super::legs::legs_apart;
 use super::nodes::{Endpoint, Ends, SELECT_LIMIT, has_instances, node_name, nodes};
 use super::operators::is_clock_term;
 use super::scope::{Entity, Scope};
-use super::typed::{Expr, Kind, LocalId, Place, Root, conjuncts};
-use super::types::{Class, Size, Type};
+use super::typed::{Expr, Kind, LocalId, Place, conjuncts};
+use super::types::{Class, Type};
 use crate::cancellation;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{self, ClockId, EdgeId, FunctionId, Guard, LocationChances, LocationId, Urgency};
@@ -36,35 +36,14 @@ impl Checker<'_> {
         }
         self.expect_different_branchpoints(template);
         let nodes = nodes(template);
-        let mut locations: Vec<ir::Location> = template
-            .locations
-            .iter()
+        let locations = template.locations.iter();
+        let mut locations: Vec<ir::Location> = locations
             .map(|location| self.location(template, location))
             .collect();
-        let mut edges = Vec::new();
-        for edge in &template.edges {
-            let Some(Endpoint::Location(source)) = self.node(&nodes, &edge.source) else {
-                continue;
-            };
-            let first = EdgeId(edges.len() as u32);
-            let made = match legs_apart(template, edge, &nodes) {
-                Some(legs) => {
-                    let ends = Ends {
-                        template,
-                        nodes: &nodes,
-                        source: LocationId(source),
-                    };
-                    self.edges_of_legs(&ends, edge, &legs, first)
-                }
-                None => vec![self.edge(template, edge, &nodes, LocationId(source))],
-            };
-            // One of which a binding has no value stands for no edge at all.
-            for edge in made.into_iter().filter(has_instances) {
-                locations[source as usize]
-                    .edges
-                    .push(EdgeId(edges.len() as u32));
-                edges.push(edge);
-            }
+        let edges = self.edges(template, &nodes);
+        for (number, edge) in edges.iter().enumerate() {
+            let source = &mut locations[edge.source.0 as usize];
+            source.edges.push(EdgeId(number as u32));
         }
         let initial = template
             .initial
@@ -96,6 +75,34 @@ impl Checker<'_> {
             group: ir::ProcessId(0),
             coordinates: Vec::new(),
         }
+    }
+
+    fn edges(
+        &mut self,
+        template: &ast::Template,
+        nodes: &FxHashMap<&str, Endpoint>,
+    ) -> Vec<ir::Edge> {
+        let mut edges = Vec::new();
+        for edge in &template.edges {
+            let Some(Endpoint::Location(source)) = self.node(nodes, &edge.source) else {
+                continue;
+            };
+            let source = LocationId(source);
+            let made = match legs_apart(template, edge, nodes) {
+                Some(legs) => {
+                    let ends = Ends {
+                        template,
+                        nodes,
+                        source,
+                    };
+                    self.edges_of_legs(&ends, edge, &legs, EdgeId(edges.len() as u32))
+                }
+                None => vec![self.edge(template, edge, nodes, source)],
+            };
+            // If a binding has no value, there is no edge at all.
+            edges.extend(made.into_iter().filter(has_instances));
+        }
+        edges
     }
 
     /// Refuses branch points that edges cannot tell from one another or from a location.
@@ -183,7 +190,6 @@ impl Checker<'_> {
             rates,
             chances,
             edges: Vec::new(),
-            position: location.position.map(|point| (point.x, point.y)),
             span: location.span,
         }
     }
@@ -299,7 +305,6 @@ impl Checker<'_> {
             leg: None,
             controllable: edge.controllable,
             labels: self.edge_labels(edge),
-            nails: edge.nails.iter().map(|point| (point.x, point.y)).collect(),
             span: edge.span,
         }
     }
@@ -323,12 +328,7 @@ impl Checker<'_> {
                 continue;
             };
             let local = self.new_local(ty.clone());
-            let place = Place {
-                root: Root::Local(local),
-                base: Size::default(),
-                mutable: false,
-                declared: Span::default(),
-            };
+            let place = Place::bound(local);
             let set = ty.scalar_set();
             self.declare(name, Entity::Variable { place, ty });
             let range = ir::Select {

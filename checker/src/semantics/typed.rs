@@ -44,6 +44,18 @@ pub(super) struct Place {
     pub(super) declared: Span,
 }
 
+impl Place {
+    /// A local that a quantifier, a loop or a `select` binds.
+    pub(super) fn bound(local: LocalId) -> Place {
+        Place {
+            root: Root::Local(local),
+            base: Size::default(),
+            mutable: false,
+            declared: Span::default(),
+        }
+    }
+}
+
 /// Offsets of words below this are variables; from it on, `meta` variables, until the layout is
 /// final.
 pub(super) const META_WORDS: u32 = 1 << 29;

@@ -48,11 +48,6 @@ pub enum Assignment {
         /// What is added.
         increment: i32,
     },
-    /// `x_clock` gets any value from 0.
-    Free {
-        /// The clock that is freed.
-        clock: usize,
-    },
 }
 
 /// Lets any time pass: the zone becomes its future.
@@ -254,7 +249,6 @@ pub fn assign(zone: &mut [Bound], dimension: usize, assignments: &[Assignment]) 
     assignments.iter().all(|assignment| {
         match *assignment {
             Assignment::Value { clock, value } => reset(zone, dimension, clock, value),
-            Assignment::Free { clock } => free_clock(zone, dimension, clock),
             Assignment::Copy {
                 clock,
                 source,
@@ -286,10 +280,6 @@ pub fn preimage(
 /// frees it.
 fn unassign(zone: &mut [Bound], dimension: usize, assignment: &Assignment) -> bool {
     let (clock, source, increment) = match *assignment {
-        Assignment::Free { clock } => {
-            free_clock(zone, dimension, clock);
-            return true;
-        }
         Assignment::Copy {
             clock,
             source,

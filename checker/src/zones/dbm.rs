@@ -33,21 +33,8 @@ use crate::cancellation;
 use super::rows::{for_small_dimension, relax_row, rows_mut, with_row};
 use super::{Bound, ClockSet, wide};
 
-/// How two zones of the same dimension relate to each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Relation {
-    /// The same set.
-    Equal,
-    /// The first is a proper subset of the second.
-    Subset,
-    /// The first is a proper superset of the second.
-    Superset,
-    /// Neither contains the other.
-    Incomparable,
-}
-
 /// One bound on one difference: `x_left - x_right` is bounded by `bound`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Constraint {
     /// The clock with the positive sign.
     pub left: usize,
@@ -398,16 +385,6 @@ pub fn is_equal(zone: &[Bound], other: &[Bound]) -> bool {
         .zip(other_blocks)
         .all(|(block, other)| !differ(block, other))
         && !differ(rest, other_rest)
-}
-
-/// How the two zones relate to each other.
-pub fn relation(zone: &[Bound], other: &[Bound]) -> Relation {
-    match (is_subset(zone, other), is_subset(other, zone)) {
-        (true, true) => Relation::Equal,
-        (true, false) => Relation::Subset,
-        (false, true) => Relation::Superset,
-        (false, false) => Relation::Incomparable,
-    }
 }
 
 /// Whether the zone contains the valuation in which clock i has the value `numerators[i] /

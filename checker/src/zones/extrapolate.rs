@@ -136,11 +136,6 @@ impl Ceilings {
         }
     }
 
-    /// The ceilings that do not distinguish comparisons from below and from above.
-    pub fn maximal(constants: &[Option<i32>]) -> Ceilings {
-        Ceilings::lower_upper(constants, constants)
-    }
-
     /// Raises each ceiling to the greater of both: the result is sound wherever one of the two was.
     pub fn raise(&mut self, other: &Ceilings) {
         for (row, other) in self.rows.iter_mut().zip(&other.rows) {
@@ -237,7 +232,7 @@ pub(super) fn forgotten_from(limit: Bound, lower: Bound) -> Bound {
 }
 
 /// Extrapolates further than `Extra_LU+`, but stays within `aLU`. With the ceilings of
-/// [`Ceilings::maximal`] it extrapolates further than `Extra_M+`.
+/// [`Ceilings::to_maximal`] it extrapolates further than `Extra_M+`.
 ///
 /// After forgetting, a path from one clock to another can only visit two kinds of clocks. The first
 /// kind is neither certainly above L (its row would be infinite) nor certainly above U (only the
@@ -342,7 +337,7 @@ fn relax_rows(zone: &mut [Bound], dimension: usize, targets: &ClockSet, via: usi
     }
 }
 
-/// Extrapolates by `Extra_LU`, or by `Extra_M` with the ceilings of [`Ceilings::maximal`].
+/// Extrapolates by `Extra_LU`, or by `Extra_M` with the ceilings of [`Ceilings::to_maximal`].
 pub fn lu(zone: &mut [Bound], dimension: usize, ceilings: &Ceilings) {
     let columns = &ceilings.columns[..dimension];
     let mut weakened = ClockSet::EMPTY;

@@ -19,7 +19,7 @@
 use crate::cancellation;
 
 use super::clocks::{self, Assignment};
-use super::dbm::{self, Constraint, Relation};
+use super::dbm::{self, Constraint};
 use super::rows::rows;
 use super::{Bound, ClockSet, Zone, minimal};
 
@@ -282,16 +282,6 @@ impl Federation {
         self.is_subset(other) && other.is_subset(self)
     }
 
-    /// How the two sets lie to each other; exact.
-    pub fn relation(&self, other: &Federation) -> Relation {
-        match (self.is_subset(other), other.is_subset(self)) {
-            (true, true) => Relation::Equal,
-            (true, false) => Relation::Subset,
-            (false, true) => Relation::Superset,
-            (false, false) => Relation::Incomparable,
-        }
-    }
-
     /// Whether some valuation is in both.
     pub fn intersects(&self, other: &Federation) -> bool {
         let mut scratch = vec![Bound::LE_ZERO; self.size()];
@@ -324,12 +314,6 @@ impl Federation {
             clocks::down_stopped(zone, dimension, stopped);
             true
         });
-    }
-
-    /// Carries out the assignments in order.
-    pub fn assign(&mut self, assignments: &[Assignment]) {
-        let dimension = self.dimension;
-        self.update(|zone| clocks::assign(zone, dimension, assignments));
     }
 
     /// Replaces the federation by its preimage under a guard and assignments; see

@@ -19,14 +19,14 @@ use super::{Bound, ClockSet, dbm};
 /// The valuations from which every small enough delay leads into the federation.
 #[must_use]
 pub fn before(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, (&weak, &strict))
+    moved(federation, stopped, &weak, &strict)
 }
 
 /// The valuations that every small enough delay has just led out of the federation, or further
 /// within it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, (&strict, &weak))
+    moved(federation, stopped, &strict, &weak)
 }
 
 fn weak(bound: Bound) -> Bound {
@@ -49,7 +49,8 @@ fn strict(bound: Bound) -> Bound {
 fn moved(
     federation: &Federation,
     stopped: &ClockSet,
-    (from_below, from_above): (&dyn Fn(Bound) -> Bound, &dyn Fn(Bound) -> Bound),
+    from_below: &dyn Fn(Bound) -> Bound,
+    from_above: &dyn Fn(Bound) -> Bound,
 ) -> Federation {
     let dimension = federation.dimension();
     let mut result = Federation::empty(dimension);

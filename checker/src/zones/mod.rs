@@ -52,6 +52,5 @@ mod tests;
 
 pub use bound::Bound;
 pub use clock_set::ClockSet;
-pub use dbm::Relation;
 pub use federation::Federation;
 pub use zone::Zone;

@@ -2,7 +2,7 @@
 //! for code outside the innermost loops.
 
 use super::clocks::{self, Assignment};
-use super::dbm::{self, Constraint, Relation};
+use super::dbm::{self, Constraint};
 use super::{Bound, ClockSet};
 
 /// A zone with its own storage; may be empty.
@@ -131,16 +131,6 @@ impl Zone {
         self.is_empty() || !other.is_empty() && dbm::is_subset(&self.bounds, &other.bounds)
     }
 
-    /// How the two zones relate to each other.
-    pub fn relation(&self, other: &Zone) -> Relation {
-        match (self.is_subset(other), other.is_subset(self)) {
-            (true, true) => Relation::Equal,
-            (true, false) => Relation::Subset,
-            (false, true) => Relation::Superset,
-            (false, false) => Relation::Incomparable,
-        }
-    }
-
     /// Whether the zone contains the valuation of the clocks; see [`dbm::contains`].
     pub fn contains(&self, numerators: &[i64], denominator: i64) -> bool {
         !self.is_empty() && dbm::contains(&self.bounds, numerators, denominator)
@@ -149,7 +139,7 @@ impl Zone {
 
 impl PartialEq for Zone {
     fn eq(&self, other: &Zone) -> bool {
-        self.relation(other) == Relation::Equal
+        self.is_subset(other) && other.is_subset(self)
     }
 }
 

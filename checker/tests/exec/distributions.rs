@@ -175,8 +175,6 @@ fn the_simulators_numbers_lie_where_they_should() {
     for _ in 0..DRAWS {
         counts[stream.below(6) as usize] += 1;
         assert!((0.0..1.0).contains(&stream.uniform()));
-        let open = stream.open_uniform();
-        assert!(0.0 < open && open <= 1.0);
         waited += stream.exponential(4.0);
     }
     // Five standard errors: of a count, and of a mean whose deviation is 1/4.
@@ -284,7 +282,7 @@ fn all_engines_draw_the_same_thousand_numbers() {
         let function = thousand_draws(distribution, arguments);
         for (name, engine) in engines(std::slice::from_ref(&function), &[], Overflow::Wrap) {
             let outcome = run(&*engine, FunctionId(0), &[], &start(1000));
-            assert_eq!(outcome.result, Ok(0), "{name}: {function}");
+            assert_eq!(outcome.result, Ok(0), "{name}: {function:?}");
             let (stream, results) = outcome.state.split_at(STREAM_WORDS);
             let results = doubles(results);
             assert!(
@@ -292,9 +290,9 @@ fn all_engines_draw_the_same_thousand_numbers() {
                     .iter()
                     .copied()
                     .eq(results.iter().map(|one| one.to_bits())),
-                "{name}: {function}"
+                "{name}: {function:?}"
             );
-            assert_eq!(stream, &expected[..STREAM_WORDS], "{name}: {function}");
+            assert_eq!(stream, &expected[..STREAM_WORDS], "{name}: {function:?}");
         }
     }
 }
@@ -323,8 +321,8 @@ fn equal_draws_are_all_made() {
     let function = straight_line(0, &registers, instructions, Some(2));
     for (name, engine) in engines(std::slice::from_ref(&function), &[], Overflow::Wrap) {
         let outcome = run(&*engine, FunctionId(0), &[], &start(0));
-        assert_eq!(outcome.result, Ok(1), "{name}: {function}");
-        assert_eq!(outcome.state[4], 2, "{name}: {function}");
+        assert_eq!(outcome.result, Ok(1), "{name}: {function:?}");
+        assert_eq!(outcome.state[4], 2, "{name}: {function:?}");
     }
 }
 
@@ -369,7 +367,7 @@ fn streams_lie_anywhere() {
         let drawn = doubles(&outcome.state);
         assert!(
             drawn.iter().map(|one| one.to_bits()).eq(expected),
-            "{name}: {function}"
+            "{name}: {function:?}"
         );
     }
 }
@@ -413,17 +411,7 @@ fn parameters_out_of_their_domains_are_errors() {
         };
         for (name, engine) in engines(std::slice::from_ref(&function), &[], Overflow::Wrap) {
             let outcome = run(&*engine, FunctionId(0), &[], &start(0));
-            assert_eq!(outcome.result, Err(error), "{name}: {function}");
+            assert_eq!(outcome.result, Err(error), "{name}: {function:?}");
         }
     }
-}
-
-#[test]
-fn draws_are_printed_with_their_stream() {
-    let instruction = draw(D::Triangular, &[0.0, 1.0, 2.0], state_word(8)).pop();
-    let text = instruction.map(|one| one.to_string());
-    assert_eq!(
-        text.as_deref(),
-        Some("r3 = random_tri(r0, r1, r2) from state[8]  @77")
-    );
 }

@@ -43,9 +43,8 @@ pub(super) fn has_ordered_receivers(network: &Network, set: u32) -> bool {
 
 fn receives_broadcast(network: &Network, edge: &Edge) -> bool {
     edge.sync.is_some_and(|sync| {
-        let first = sync.channel.0 as usize;
-        let channels = &network.channels[first..first + sync.count as usize];
-        !sync.send && channels.iter().any(|channel| channel.broadcast)
+        let mut channels = sync.channels();
+        !sync.send && channels.any(|channel| network.channels[channel as usize].broadcast)
     })
 }
 

@@ -71,20 +71,9 @@ impl<'a> Symbolic<'a> {
                 return Ok(None);
             }
         }
-        let effects = &mut self.memo.effects;
-        effects.begin();
-        effects.add_constraints(one.constraints);
-        effects.end(GUARD);
-        for assignment in self.stepper.fire(one.parts, words)? {
-            check_limit(assignment.value)?;
-            effects.add_assignment(*assignment);
+        if !self.pack_effect(one, words)? {
+            return Ok(None);
         }
-        effects.end(ASSIGNMENTS);
-        match self.stepper.invariants(words)? {
-            Some(emitted) => effects.add_constraints(emitted),
-            None => return Ok(None),
-        }
-        effects.end(INVARIANT);
         self.forget(words);
         let may_delay = match self.may_delay(words) {
             Ok(may_delay) => may_delay,
@@ -122,6 +111,26 @@ impl<'a> Symbolic<'a> {
             self.memo.insert(outcome);
         }
         Ok(self.memo.result(outcome, zone))
+    }
+
+    /// Takes a move and packs its effect on clocks; false if the invariants of its target do not
+    /// hold.
+    fn pack_effect(&mut self, one: MoveRef<'_>, words: &mut [i32]) -> Result<bool, Failure> {
+        let effects = &mut self.memo.effects;
+        effects.begin();
+        effects.add_constraints(one.constraints);
+        effects.end(GUARD);
+        for assignment in self.stepper.fire(one.parts, words)? {
+            check_limit(assignment.value)?;
+            effects.add_assignment(*assignment);
+        }
+        effects.end(ASSIGNMENTS);
+        match self.stepper.invariants(words)? {
+            Some(emitted) => effects.add_constraints(emitted),
+            None => return Ok(false),
+        }
+        effects.end(INVARIANT);
+        Ok(true)
     }
 
     /// Caches the effect of a move of an offer, which led to these words, unless it may depend on

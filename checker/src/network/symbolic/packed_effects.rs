@@ -65,11 +65,7 @@ impl PackedEffects {
     }
 
     pub(super) fn guard(&self) -> Vec<EmittedConstraint> {
-        self.pairs(FRONT, GUARD)
-            .iter()
-            .copied()
-            .map(to_constraint)
-            .collect()
+        constraints(self.pairs(FRONT, GUARD))
     }
 
     pub(super) fn assignments(&self) -> Vec<EmittedAssignment> {
@@ -85,8 +81,7 @@ impl PackedEffects {
     }
 
     pub(super) fn invariant(&self) -> Vec<EmittedConstraint> {
-        let pairs = self.pairs(self.key[ASSIGNMENTS] as usize, INVARIANT);
-        pairs.iter().copied().map(to_constraint).collect()
+        constraints(self.pairs(self.key[ASSIGNMENTS] as usize, INVARIANT))
     }
 
     /// The number of the current effect.
@@ -130,13 +125,15 @@ fn packed(first: ClockId, second: ClockId) -> u32 {
     first.0 | second.0 << CLOCK_BITS
 }
 
-fn to_constraint([clocks, bound]: [u32; 2]) -> EmittedConstraint {
-    EmittedConstraint {
+/// The constraints in pairs of words.
+fn constraints(pairs: &[[u32; 2]]) -> Vec<EmittedConstraint> {
+    let constraint = |&[clocks, bound]: &[u32; 2]| EmittedConstraint {
         left: ClockId(clocks & MOST_CLOCKS),
         right: ClockId(clocks >> CLOCK_BITS & MOST_CLOCKS),
         bound: bound.cast_signed(),
         strict: clocks >> 31 != 0,
-    }
+    };
+    pairs.iter().map(constraint).collect()
 }
 
 /// A hash of words: two lanes of multiply and fold.

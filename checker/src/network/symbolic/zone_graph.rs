@@ -216,14 +216,6 @@ impl<'a> Symbolic<'a> {
         self.is_approximate
     }
 
-    /// The initial words and zone.
-    pub fn initial(&mut self) -> Result<(Vec<i32>, Zone), Failure> {
-        let (mut words, mut zone, invariant) = self.start()?;
-        let may_delay = self.may_delay(&mut words)?;
-        self.delay(&words, may_delay, &invariant, zone.bounds_mut())?;
-        Ok((words, zone))
-    }
-
     /// The initial words, the zone before time passes, and the invariants.
     pub fn start(&mut self) -> Result<(Vec<i32>, Zone, Vec<Constraint>), Failure> {
         let (mut words, mut zone) = self.origin()?;

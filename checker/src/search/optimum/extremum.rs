@@ -607,7 +607,7 @@ fn assign<T: Copy>(known: &mut [T], assignments: &[Assignment], lost: T) {
                 source,
                 increment,
             } => known[clock] = if increment < 0 { lost } else { known[source] },
-            Assignment::Value { clock, .. } | Assignment::Free { clock } => known[clock] = lost,
+            Assignment::Value { clock, .. } => known[clock] = lost,
         }
     }
 }

@@ -78,7 +78,7 @@ fn take_all(
         cancellation::work(bytes);
         trace.states.truncate(open.len() - 1);
         trace.states.push((words.clone(), zone.clone()));
-        let Some(step) = path.get(open.len() - 1) else {
+        let Some((step, exchanged)) = path.get(open.len() - 1) else {
             let is_end = match &mut goal {
                 None => true,
                 Some(goal) => goal.confirms(symbolic, &mut words, &zone)?,
@@ -89,7 +89,7 @@ fn take_all(
             continue;
         };
         trace.moves.truncate(open.len() - 1);
-        if let Some((parts, next)) = take(symbolic, step, words, &zone)? {
+        if let Some((parts, next)) = take(symbolic, step, exchanged, words, &zone)? {
             trace.moves.push(parts);
             open.push(next);
         }
@@ -101,7 +101,8 @@ fn take_all(
 /// to, the last first.
 fn take(
     symbolic: &mut Symbolic<'_>,
-    (step, exchanged): (Step, Option<&Permutation>),
+    step: Step,
+    exchanged: Option<&Permutation>,
     mut words: Vec<i32>,
     zone: &Zone,
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
@@ -111,8 +112,9 @@ fn take(
     // possible.
     let one = match exchanged {
         None => moves.with_rank(step),
-        Some(exchanged) => original(symbolic, (step, exchanged), (&words, zone), &moves)?
-            .map(|index| moves.get(index)),
+        Some(exchanged) => {
+            original(symbolic, step, exchanged, &words, zone, &moves)?.map(|index| moves.get(index))
+        }
     };
     let Some(one) = one else {
         return Ok(None);
@@ -134,8 +136,10 @@ fn take(
 /// Which of the moves of a state a step of the state with exchanged members stands for.
 fn original(
     symbolic: &mut Symbolic<'_>,
-    (step, exchanged): (Step, &Permutation),
-    (words, zone): (&[i32], &Zone),
+    step: Step,
+    exchanged: &Permutation,
+    words: &[i32],
+    zone: &Zone,
     moves: &Moves,
 ) -> Result<Option<usize>, Failure> {
     let Some(symmetry) = symbolic.symmetry().cloned() else {

@@ -184,16 +184,6 @@ impl StateStore {
         }
     }
 
-    /// How many states are stored.
-    pub fn len(&self) -> usize {
-        self.count as usize
-    }
-
-    /// Whether no state is stored.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
     /// The bytes that the store takes.
     pub fn bytes(&self) -> usize {
         let block = self.stride << self.block_bits;

@@ -429,7 +429,6 @@ impl<'s, 'a> Plan<'s, 'a> {
                     // No clock is negative.
                     self.require_all(event, &[at_least_zero(clock)])?;
                 }
-                Assignment::Free { .. } => return Err(Unscheduled::Impossible),
             }
         }
         self.require_all(event, &effect.invariant)?;

@@ -146,6 +146,13 @@ pub(super) struct LinearBound {
     pub(super) least: (i64, i64),
 }
 
+impl LinearBound {
+    fn least(&self) -> Amount {
+        let (whole, infinitesimals) = self.least;
+        Amount(Fraction::whole(whole), Fraction::whole(infinitesimals))
+    }
+}
+
 /// Multiples of variables, by ascending variable; none is 0.
 type Row = Vec<(usize, Fraction)>;
 
@@ -198,7 +205,7 @@ impl Durations {
 
     /// Whether the current durations satisfy a bound.
     pub(super) fn is_met(&self, bound: &LinearBound) -> Result<bool, TooHard> {
-        Ok(!self.left_side(bound)?.is_less(amount(bound.least))?)
+        Ok(!self.left_side(bound)?.is_less(bound.least())?)
     }
 
     /// The sum that a bound is about.
@@ -240,7 +247,7 @@ impl Durations {
         waits.sort_by_key(|&(wait, _)| wait);
         add_multiple(&mut row, &waits, Fraction::ONE)?;
         self.value[variable] = self.sum(&row)?;
-        self.least[variable] = Some(amount(bound.least));
+        self.least[variable] = Some(bound.least());
         self.row_of[variable] = Some(self.rows.len());
         self.rows.push((variable, row));
         self.required.push(variable);
@@ -371,7 +378,7 @@ impl Durations {
         let required = variables.filter_map(|(value, least)| Some(Ok((*value, (*least)?))));
         let others = others
             .iter()
-            .map(|bound| Ok((self.left_side(bound)?, amount(bound.least))));
+            .map(|bound| Ok((self.left_side(bound)?, bound.least())));
         for pair in required.chain(others) {
             let (value, least) = pair?;
             let Amount(room, infinitesimals) = value.minus(least)?;
@@ -384,10 +391,6 @@ impl Durations {
         }
         Ok(epsilon)
     }
-}
-
-fn amount((whole, infinitesimals): (i64, i64)) -> Amount {
-    Amount(Fraction::whole(whole), Fraction::whole(infinitesimals))
 }
 
 /// Where the multiple of a variable stands.
