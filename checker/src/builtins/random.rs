@@ -4,7 +4,7 @@
 //! three numbers alone. So a run is the same whatever ran before it, and on whichever thread. All
 //! that it has to remember lies in [`STREAM_WORDS`] words of the state, which are copied with it.
 //! The generator `numpy.random.Philox` gives the same numbers, with key `(s, 0)` and counter
-//! `(n, k, 0, 0)`, of which it takes the successor first.
+//! `(n, k, 0, 0)`; it takes the successor of the counter first.
 //!
 //! Invariant: unless the buffer must be filled, what was read beforehand of the next number is what
 //! the buffer says of it. Interpreted and compiled code read different parts.

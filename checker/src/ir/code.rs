@@ -347,8 +347,8 @@ pub enum IntegerOperator {
     Remainder,
     /// Power; may wrap round; a negative exponent is an error; `0 ** 0` is 1.
     Power,
-    /// Shift left by 0 to 31 bits; bits are lost without a word, as in C; other distances, of which
-    /// C says nothing, are errors.
+    /// Shift left by 0 to 31 bits; bits are lost without a word, as in C. C says nothing about
+    /// other distances: they are errors.
     ShiftLeft,
     /// Arithmetic shift right by 0 to 31 bits; other distances are errors.
     ShiftRight,

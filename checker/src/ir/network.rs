@@ -89,12 +89,12 @@ pub struct ScalarSet {
     /// How many members it has.
     pub size: u32,
     /// What tells its members apart nevertheless, so that exchanging them would change what the
-    /// network does; `None` if nothing does but, possibly, the order in which broadcast receivers
-    /// run their updates.
+    /// network does; `None` if nothing does, or only the order of the updates of broadcast
+    /// receivers.
     pub told_apart_by: Option<Span>,
 }
 
-/// A coordinate of something of which there is one for each member of a scalar set.
+/// A coordinate of something that exists once for each member of a scalar set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coordinate {
     /// The scalar set.

@@ -22,7 +22,7 @@ pub use symbolic::constant_effect::FixedMove;
 
 pub use discrete::entry::{entry_of, is_same_entry};
 pub use discrete::stepper::Stepper;
-pub use discrete::transition::{MoveRef, Moves, OfferId, Part};
+pub use discrete::transition::{MoveListId, MoveRef, Moves, Part};
 pub use discrete::transition_cache::VectorId;
 pub use reduction::partial_order::PartialOrder;
 pub use reduction::scalar_swaps::Obstacle;

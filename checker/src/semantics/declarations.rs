@@ -67,6 +67,16 @@ impl Checker<'_> {
         self.declare(&variable.name, entity);
     }
 
+    /// Reports a constant without a value.
+    pub(super) fn report_no_value(&mut self, name: &ast::Name) {
+        self.error(
+            codes::CONSTANT_NOT_INITIALISED,
+            name.span,
+            format!("the constant '{}' has no value", name.text),
+            "write = and a value",
+        );
+    }
+
     fn constant(
         &mut self,
         variable: &ast::Variable,
@@ -77,12 +87,7 @@ impl Checker<'_> {
             return Entity::Broken;
         }
         let Some(mut parts) = parts else {
-            self.error(
-                codes::CONSTANT_NOT_INITIALISED,
-                variable.name.span,
-                format!("the constant '{}' has no value", variable.name.text),
-                "write = and a value",
-            );
+            self.report_no_value(&variable.name);
             return Entity::Broken;
         };
         let free = self.free_parameter_seen;
@@ -99,12 +104,7 @@ impl Checker<'_> {
         parts: Option<Vec<InitialPart>>,
     ) -> Entity {
         let Some(parts) = parts else {
-            self.error(
-                codes::CONSTANT_NOT_INITIALISED,
-                variable.name.span,
-                format!("the constant '{}' has no value", variable.name.text),
-                "write = and a value",
-            );
+            self.report_no_value(&variable.name);
             return Entity::Broken;
         };
         match parts.first().and_then(InitialPart::expr) {

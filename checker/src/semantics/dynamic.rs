@@ -1,7 +1,7 @@
 //! Dynamic templates: instances come and go while the model runs.
 //!
 //! A dynamic template has a *pool* of slots, each a process of the network. A slot that is not in
-//! use is in a location of its own behind all others, `absent`, from which no edge leads. `spawn`
+//! use is in a location of its own behind all others, `absent`, that no edge leaves. `spawn`
 //! is a function that takes the first slot that is free: it gives its variables their initial
 //! values and the arguments, and puts it into its initial location. An edge with `exit()` leads to
 //! `absent`. So nothing but this file knows of dynamic templates, and a run does not depend on the

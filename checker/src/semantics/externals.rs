@@ -236,7 +236,7 @@ fn external_type(ty: &Type) -> Option<ExternalType> {
     match ty {
         Type::Int { .. } => Some(ExternalType::Integer),
         Type::Bool => Some(ExternalType::Bool),
-        // A clock has words in the stochastic reading, in which alone it is passed.
+        // A clock is passed in the stochastic reading only, where it has words.
         Type::Double | Type::RealClock | Type::Clock { .. } => Some(ExternalType::Double),
         _ => None,
     }

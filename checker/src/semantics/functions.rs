@@ -214,12 +214,7 @@ impl Checker<'_> {
             return None;
         }
         if prefixes.constant && parts.is_none() {
-            self.error(
-                codes::CONSTANT_NOT_INITIALISED,
-                variable.name.span,
-                format!("the constant '{}' has no value", variable.name.text),
-                "write = and a value",
-            );
+            self.report_no_value(&variable.name);
         }
         let declared = declared_at(&ty, variable.name.span);
         for part in parts.iter().flatten() {

@@ -87,7 +87,7 @@ impl Checker<'_> {
         })
     }
 
-    /// How queries write the first member of the first group of which this is true.
+    /// How queries write the first member of the first group that is wanted.
     fn first_group(&self, is_wanted: impl Fn(&Group) -> bool) -> Option<String> {
         let groups = self.world.processes.groups.iter();
         let (name, group) = groups

@@ -41,8 +41,8 @@ impl InitialPart {
     }
 }
 
-/// Numbers of a table that are no words of their type: the starts of clocks, of which there are not
-/// as many, and mistakes, of which nobody reads as many.
+/// Numbers of a table that are no words of their type: starts of clocks, and mistakes. No model has
+/// more clocks, and nobody reads more mistakes.
 const MOST_NUMBERS_APART: usize = 5_000;
 
 /// What a table gives: the words, and the parts that are no words.

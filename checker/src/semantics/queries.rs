@@ -306,7 +306,8 @@ impl Checker<'_> {
         self.lower_predicate(&expr)
     }
 
-    fn checked_predicate(&mut self, expr: &ast::Expr, allows_deadlock: bool) -> Option<Expr> {
+    /// A condition that a query asks for.
+    pub(super) fn query_condition(&mut self, expr: &ast::Expr) -> Option<Expr> {
         let span = expr.span;
         let expr = self.expression(expr);
         self.report_members(&expr, span);
@@ -314,6 +315,12 @@ impl Checker<'_> {
             return None;
         }
         self.expect_pure(&expr, "a query");
+        Some(expr)
+    }
+
+    fn checked_predicate(&mut self, expr: &ast::Expr, allows_deadlock: bool) -> Option<Expr> {
+        let span = expr.span;
+        let expr = self.query_condition(expr)?;
         self.refuse_doubles(&expr);
         if expr.any(&|e| matches!(e.kind, Kind::Deadlock)) {
             self.check_deadlock(&expr, allows_deadlock);

@@ -2,13 +2,13 @@
 //!
 //! The language lets scalars only be compared for equality, assigned and used as indices, so that
 //! exchanging two members everywhere turns what a network can do into what it can do. Four things
-//! break this, and are noted of a set where they stand: code that runs through the members in their
-//! order and for which the order matters, constants that differ from member to member, values that
-//! nothing chose (the first member, for a scalar of a function without a value), and places where
-//! members are numbered.
+//! break this, and are noted of a set where they stand: code that runs through the members and
+//! depends on their order, constants that differ from member to member, values that nothing chose
+//! (the first member, for a scalar of a function without a value), and places where members are
+//! numbered.
 //!
-//! Invariant: what is noted here is conservative. A loop counts as one for which the order does not
-//! matter only if it is of the simple kinds of [`is_order_irrelevant`].
+//! Invariant: what is noted here is conservative. A loop counts as independent of the order only if
+//! it is of the simple kinds of [`is_order_irrelevant`].
 //!
 //! Source: M. Hendriks, G. Behrmann, K. G. Larsen, P. Niebert, F. Vaandrager, "Adding Symmetry
 //! Reduction to UPPAAL", FORMATS 2003 (which trusts loops; here they are looked at).
@@ -136,8 +136,8 @@ impl Touched {
 struct Body {
     local: LocalId,
     writes: Vec<(Touched, Write)>,
-    /// The variables that are read, and how far apart the parts are of which the loop variable
-    /// chooses one.
+    /// The variables that are read. If the loop variable chooses a part of one: how far apart its
+    /// parts are.
     reads: Vec<(Touched, Option<(u32, u32)>)>,
     /// The values that end the loop.
     returns: Vec<i32>,
@@ -276,7 +276,7 @@ impl Body {
         self.indices(target);
     }
 
-    /// How far apart the parts are of which the loop variable chooses one.
+    /// If the loop variable chooses a part of a place: how far apart its parts are.
     fn own_stride(&self, place: &Expr) -> Option<(u32, u32)> {
         match &place.kind {
             Kind::Index {

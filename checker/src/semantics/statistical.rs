@@ -248,12 +248,7 @@ impl Checker<'_> {
     /// The mask of a condition on states.
     pub(super) fn state_condition(&mut self, expr: &ast::Expr) -> Option<Guard> {
         let span = expr.span;
-        let expr = self.expression(expr);
-        self.report_members(&expr, span);
-        if !self.expect_condition(&expr) {
-            return None;
-        }
-        self.expect_pure(&expr, "a query");
+        let expr = self.query_condition(expr)?;
         let is_strange = |e: &Expr| matches!(e.kind, Kind::Deadlock | Kind::Rate { .. });
         if expr.any(&is_strange) {
             self.error(

@@ -377,15 +377,24 @@ impl Type {
             (Type::Error, _) | (_, Type::Error) | (Type::Channel { .. }, Type::Channel { .. }) => {
                 true
             }
-            (Type::Array(a), Type::Array(b)) => a.index == b.index && a.part.is_equivalent(&b.part),
-            (Type::Struct(a), Type::Struct(b)) => {
-                a.fields.len() == b.fields.len()
-                    && a.fields
-                        .iter()
-                        .zip(&b.fields)
-                        .all(|(a, b)| a.0 == b.0 && a.1.is_equivalent(&b.1))
+            _ => {
+                let parts = self.parts_agree(other, Type::is_equivalent);
+                parts.unwrap_or_else(|| self == other)
             }
-            _ => self == other,
+        }
+    }
+
+    /// Whether the parts of two arrays or of two structs are the same in number and agree; `None`
+    /// for other types.
+    fn parts_agree(&self, other: &Type, agree: fn(&Type, &Type) -> bool) -> Option<bool> {
+        match (self, other) {
+            (Type::Array(a), Type::Array(b)) => Some(a.index == b.index && agree(&a.part, &b.part)),
+            (Type::Struct(a), Type::Struct(b)) => {
+                let mut pairs = a.fields.iter().zip(&b.fields);
+                let agree = pairs.all(|(a, b)| a.0 == b.0 && agree(&a.1, &b.1));
+                Some(a.fields.len() == b.fields.len() && agree)
+            }
+            _ => None,
         }
     }
 
@@ -412,37 +421,21 @@ impl Type {
     /// Whether every value of the other type, read word by word, is one of this type: ranges may be
     /// wider here.
     pub(super) fn holds(&self, other: &Type) -> bool {
-        match (self, other) {
-            (Type::Array(a), Type::Array(b)) => a.index == b.index && a.part.holds(&b.part),
-            (Type::Struct(a), Type::Struct(b)) => {
-                a.fields.len() == b.fields.len()
-                    && a.fields
-                        .iter()
-                        .zip(&b.fields)
-                        .all(|(a, b)| a.0 == b.0 && a.1.holds(&b.1))
-            }
-            (Type::Int { low, high }, Type::Int { .. }) => {
-                let (least, greatest) = other.bounds();
-                *low <= least && greatest <= *high
-            }
-            _ => self.is_equivalent(other),
+        if let (Type::Int { low, high }, Type::Int { .. }) = (self, other) {
+            let (least, greatest) = other.bounds();
+            return *low <= least && greatest <= *high;
         }
+        let parts = self.parts_agree(other, Type::holds);
+        parts.unwrap_or_else(|| self.is_equivalent(other))
     }
 
     /// Whether values of the two types have the same parts, ranges apart.
     pub(super) fn has_parts_of(&self, other: &Type) -> bool {
-        match (self, other) {
-            (Type::Array(a), Type::Array(b)) => a.index == b.index && a.part.has_parts_of(&b.part),
-            (Type::Struct(a), Type::Struct(b)) => {
-                a.fields.len() == b.fields.len()
-                    && a.fields
-                        .iter()
-                        .zip(&b.fields)
-                        .all(|(a, b)| a.0 == b.0 && a.1.has_parts_of(&b.1))
-            }
-            (Type::Int { .. }, Type::Int { .. }) => true,
-            _ => self.is_equivalent(other),
+        if let (Type::Int { .. }, Type::Int { .. }) = (self, other) {
+            return true;
         }
+        let parts = self.parts_agree(other, Type::has_parts_of);
+        parts.unwrap_or_else(|| self.is_equivalent(other))
     }
 
     /// Whether the words are those of a value of this type; returns the rest.

@@ -710,7 +710,7 @@ pub enum Statistical {
 /// What `simulate` shows: an expression, alone or behind `foreach (name : type)`.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    /// The name and its type, of which each value is shown.
+    /// The name and its type; each value of the type is shown.
     pub each: Option<(Name, TypeExpr)>,
     /// The expression.
     pub value: Expr,

@@ -1,8 +1,8 @@
 //! The reserved words of the three dialects: models, models in the old syntax, queries.
 //!
-//! Source: the language reference ("reserved keywords") and utap's table of which word is reserved
-//! where. Where we differ: names of built-in functions are not reserved, a declaration hides them
-//! (with a warning), because models older than UPPAAL 4.1.20 use them as names.
+//! Source: the language reference ("reserved keywords") and utap's table that says where each word
+//! is reserved. Where we differ: names of built-in functions are not reserved, a declaration hides
+//! them (with a warning), because models older than UPPAAL 4.1.20 use them as names.
 
 use crate::builtins::{self, Builtin};
 

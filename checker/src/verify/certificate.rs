@@ -186,21 +186,18 @@ impl ClosureCheck<'_> {
             let barriers: Vec<Zone> = urgent
                 .flat_map(|one| guarded(&one.guard, &one.excluded, &around))
                 .collect();
-            let later = if is_urgent {
-                Vec::new()
-            } else {
-                futures(&zone, &stopped, &barriers)
-            };
-            let mut later = later
-                .iter()
-                .map(|one| one.within(invariant.iter().copied()));
-            if later.any(|later| !later.is_covered(&own)) {
-                let what = "waits that may lead out of it, with a clock that stands still beside two that run,";
-                return if is_exact(&stopped) {
-                    Ok(Some(Defect::DelayLeaves))
-                } else {
-                    Err(Error::Unsupported(what))
-                };
+            if !is_urgent {
+                for later in futures(&zone, &stopped, &barriers) {
+                    let later = later.within(invariant.iter().copied());
+                    if !later.is_covered(&own) {
+                        let what = "waits that may lead out of it, with a clock that stands still beside two that run,";
+                        return if is_exact(&stopped) {
+                            Ok(Some(Defect::DelayLeaves))
+                        } else {
+                            Err(Error::Unsupported(what))
+                        };
+                    }
+                }
             }
             let possible = self.symbolic.possible(&combinations, words, &zone)?;
             let enabled = self.enabled(&possible);
@@ -220,15 +217,13 @@ impl ClosureCheck<'_> {
                 return Ok(Some(Defect::Met));
             }
             self.coverage.moves += possible.len() as u64;
-            let mut leaving = possible.iter().zip(&enabled).filter(|(one, enabled)| {
-                let covering = self.of(&one.effect.target);
-                let mut entered = enabled
-                    .iter()
-                    .map(|part| part.after(&one.effect.assignments));
-                entered.any(|entered| !entered.is_covered(covering))
-            });
-            if let Some((one, _)) = leaving.next() {
-                return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
+            for (one, enabled) in possible.iter().zip(&enabled) {
+                for part in enabled {
+                    let entered = part.after(&one.effect.assignments);
+                    if !entered.is_covered(self.of(&one.effect.target)) {
+                        return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
+                    }
+                }
             }
         }
         Ok(None)

@@ -107,7 +107,7 @@ fn add(choices: &mut Vec<Choice>, parts: &[Part], window: (i64, Option<i64>)) {
     }
 }
 
-fn doubled(state: &State) -> State {
+pub(super) fn doubled(state: &State) -> State {
     let clocks = state.clocks.iter().map(|clock| 2 * clock);
     State {
         words: state.words.clone(),

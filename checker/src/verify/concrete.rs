@@ -1,6 +1,6 @@
 //! States with exact clock values, and their moves, from the definitions.
 //!
-//! Clock values are integers: numbers of *ticks*, of which [`Semantics::ticks_per_unit`] make one
+//! Clock values are integers: numbers of *ticks*. [`Semantics::ticks_per_unit`] of them make one
 //! unit of the model's time. Every rational valuation can be had by choosing it large enough.
 //!
 //! The definitions (the documentation's page on semantics; [`super::code`] has those about which

@@ -20,8 +20,8 @@ use super::rules::{Aim, Owner, Rules};
 pub(super) const MOST_REGIONS: u64 = 200_000;
 
 /// A run that shows that the owner of a strategy does not win from a state, or, if it has to win
-/// from everywhere, from one that the model can get to from there. `is_won` says of some states
-/// from which the owner wins that it does. `None` if the run is too long.
+/// from everywhere, from one that the model can get to from there. `is_won` knows of some states
+/// that the owner wins from them. `None` if the run is too long.
 pub(super) fn find(
     rules: &Rules<'_>,
     regions: Regions,
@@ -358,8 +358,8 @@ impl Play<'_, '_> {
         Ok(can_pass.then_some(later))
     }
 
-    /// Whether an urgent synchronisation is possible at all moments that follow a region: there is
-    /// no first one to which time could pass.
+    /// Whether an urgent synchronisation is possible at all moments that follow a region: time
+    /// could not pass to a first one.
     fn is_stopped_at_once(&self, state: &State, later: &State) -> Result<bool, Error> {
         let semantics = &self.rules.semantics;
         Ok(semantics.network().features.clock_guarded_urgent

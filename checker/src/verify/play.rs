@@ -10,6 +10,7 @@ use std::cmp::Ordering;
 
 use crate::ir::{Network, Predicate};
 
+use super::choices::doubled;
 use super::concrete::Semantics;
 use super::moments::{Moments, Stretch};
 use super::moves::{Error, Move, Part, State, is_same_entry};
@@ -460,12 +461,4 @@ pub fn after(
         state,
         ticks_per_unit: unit,
     }))
-}
-
-fn doubled(state: &State) -> State {
-    let clocks = state.clocks.iter().map(|clock| 2 * clock);
-    State {
-        words: state.words.clone(),
-        clocks: clocks.collect(),
-    }
 }

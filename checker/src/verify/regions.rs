@@ -61,7 +61,7 @@ impl Regions {
         Ok(Regions::with_bounding(network, constant, has_differences))
     }
 
-    /// Sets that stand for all with stopwatches too, of which there may be infinitely many: clocks
+    /// Sets that stand for all with stopwatches too; there may be infinitely many of them. Clocks
     /// have the same values, or both are above the greatest constant if no two are compared. So
     /// they do after the same delays, and if they stand still.
     pub fn of_values(network: &Network, constant: i64, has_differences: bool) -> Regions {

@@ -42,8 +42,8 @@ impl Bound {
     /// The greatest constant, and the negative of the least one, with which sums of bounds need no
     /// more than 32 bits.
     pub const NARROW_VALUE: i32 = wide::NARROW;
-    /// The greatest constant that a search may compare clocks of its own with, beside constants of
-    /// the model of which the greatest is given: sums need no more bits than without it.
+    /// The greatest constant that a search may compare clocks of its own with, given the greatest
+    /// constant of the model: sums need no more bits than without it.
     pub const fn reach(greatest: i32) -> i32 {
         const NARROW: i32 = (Bound::NARROW_VALUE + 1) / 2;
         if greatest > NARROW {

@@ -485,8 +485,8 @@ pub fn block_bytes(bytes: usize) -> usize {
     (bytes + size_of::<usize>()).next_multiple_of(16).max(32)
 }
 
-/// The bytes of a hash table with room for so many entries: a power of two of places, of which an
-/// eighth stays free, and a byte for each.
+/// The bytes of a hash table with room for so many entries: it has a power of two of places, with a
+/// byte for each, and an eighth of them stays free.
 pub fn table_bytes<T>(capacity: usize) -> usize {
     if capacity == 0 {
         return 0;

@@ -181,8 +181,8 @@ impl Jit {
         }
     }
 
-    /// Compiles those of the functions of which a single call runs so much that interpreting it
-    /// would cost more, as long as this takes no more than some milliseconds in all.
+    /// Compiles a function if interpreting a single call of it would cost more, as long as this
+    /// takes no more than some milliseconds in all.
     pub fn prepare(&self, functions: impl IntoIterator<Item = FunctionId>) {
         for function in functions {
             let mut compiler = locked(&self.compiler);

@@ -125,7 +125,7 @@ pub(super) extern "C" fn power(base: i32, exponent: i32) -> IntegerResult {
     })
 }
 
-/// Makes the next numbers of a stream, of which none is left.
+/// Makes the next numbers of a stream that has none left.
 #[expect(unsafe_code, reason = "compiled code passes raw addresses")]
 pub(super) unsafe extern "C" fn fill(stream: *mut i32) {
     // SAFETY: as in [`draw_one`].

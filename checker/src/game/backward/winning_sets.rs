@@ -2,7 +2,7 @@
 //! valuations, and when each part was gained.
 //!
 //! Invariants:
-//! * Only nodes of which a part is won have a rest. The part and the rest make up the whole node.
+//! * A node has a rest only if a part of it is won. The part and the rest make up the whole node.
 //! * Gains are in the order of ascending stamps; together they are what is won.
 //! * The stored valuations have no unused room.
 
@@ -54,7 +54,7 @@ pub(super) enum Gained {
 pub struct WinningSets {
     /// For each node: the valuations from which the seeker wins.
     pub win: Vec<Win>,
-    /// The rest of each node of which a part is won.
+    /// The rest of each node that is won in part.
     pub(in crate::game) rest: FxHashMap<u32, Federation>,
     /// For each node: the gains, by ascending stamp. The target has stamp 0.
     pub gains: Vec<Vec<Gain>>,

@@ -66,8 +66,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// Moves forward in the list those nodes to which the evader may move from a node of which more
-    /// may be won.
+    /// If more of a node may be won, moves forward in the list the nodes that the evader may move
+    /// to from there.
     pub(in crate::game) fn note_spoilers(&mut self, node: u32) {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         if edges.all(|edge| matches!(self.won.win[edge.target as usize], Win::Nothing)) {
@@ -104,7 +104,7 @@ impl Solver<'_, '_, '_> {
         true
     }
 
-    /// A predecessor of which more may be won.
+    /// A predecessor that is not won everywhere yet.
     fn open_predecessor(&self, node: u32) -> Option<u32> {
         let mut edge = self.graph.nodes[node as usize].first_in;
         while edge != NONE {

@@ -57,8 +57,8 @@ impl Solver<'_, '_, '_> {
         }
     }
 
-    /// The node to which the evader must move from a node in which time does not pass: the first
-    /// one of which nothing is won.
+    /// Where the evader must move from a node in which time does not pass: to the first node that
+    /// is not won anywhere.
     fn chosen(&self, node: u32) -> Option<u32> {
         let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
         let open = edges.find(|edge| {

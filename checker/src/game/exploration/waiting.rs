@@ -6,8 +6,8 @@
 //! order of moves (C. P. Gomes, B. Selman, H. Kautz, "Boosting Combinatorial Search Through
 //! Randomization", AAAI 1998). The random numbers are the same in every run.
 //!
-//! After a dive, the first nodes are those to which the evader may move from where the seeker has
-//! won something, since the win depends on them. Then the next dive starts from a random waiting
+//! Where the seeker has won something, the win depends on the nodes that the evader may move to
+//! from there: these come first after a dive. Then the next dive starts from a random waiting
 //! node. Sometimes it starts from the oldest node instead, so that a win near the start is found
 //! however deep dives are.
 //!

@@ -3,8 +3,8 @@
 //! The effect of a move on clocks mostly depends on the locations, the zone and the answers of
 //! guards, not on variables. A *trail* holds what is known at a point of a chain: the zone there,
 //! and the effect of the moves until there on clocks. Trails form trees, whose roots are moves of
-//! nodes, by offer and zone. To follow a chain along its trail, the graph evaluates guards and runs
-//! updates, but computes no zones.
+//! nodes, by list of moves and zone. To follow a chain along its trail, the graph evaluates guards
+//! and runs updates, but computes no zones.
 //!
 //! Invariants:
 //! * A trail gives the same result as [`super::graph::Graph`] when it follows the chain move by
@@ -17,7 +17,7 @@ use rustc_hash::FxHashMap;
 
 use crate::cancellation;
 use crate::ir::Predicate;
-use crate::network::{FixedMove, Moves, OfferId, VectorId};
+use crate::network::{FixedMove, MoveListId, Moves, VectorId};
 use crate::zones::federation::block_bytes;
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, Zone};
@@ -60,8 +60,8 @@ pub(super) struct Trail {
     pub(super) steps: Vec<ProgramStep>,
     /// Whether every chain ends here.
     pub(super) is_end: bool,
-    /// How the chain continues, for each offer.
-    pub(super) onward: Vec<(OfferId, Onward)>,
+    /// How the chain continues, for each move list.
+    pub(super) onward: Vec<(MoveListId, Onward)>,
     pub(super) ending: Option<Ending>,
 }
 
@@ -86,9 +86,9 @@ pub(super) struct ChainCache {
     pub(super) is_useful: bool,
     /// Whether locations alone decide where the objective holds.
     pub(super) is_objective_fixed: bool,
-    /// For each offer and zone of a node: where its moves start in `first`; `None` if the two were
-    /// met only once.
-    pub(super) roots: FxHashMap<(OfferId, ZoneId), Option<u32>>,
+    /// For each list of moves and zone of a node: where its moves start in `first`; `None` if the
+    /// two were met only once.
+    pub(super) roots: FxHashMap<(MoveListId, ZoneId), Option<u32>>,
     /// The results of the first moves.
     pub(super) first: Vec<Onward>,
     /// The ends of all trails.
@@ -122,13 +122,13 @@ impl ChainCache {
         self.is_useful
     }
 
-    /// The root of the moves of an offer at a zone. `None` if they were not met before: most are
-    /// met only once.
-    pub(super) fn root(&mut self, offer: OfferId, zone: ZoneId, moves: &Moves) -> Option<Root> {
+    /// The root of a list of moves at a zone. `None` if they were not met before: most are met only
+    /// once.
+    pub(super) fn root(&mut self, list: MoveListId, zone: ZoneId, moves: &Moves) -> Option<Root> {
         if self.bytes > MOST_BYTES {
-            return self.roots.get(&(offer, zone)).copied().flatten().map(Root);
+            return self.roots.get(&(list, zone)).copied().flatten().map(Root);
         }
-        match self.roots.entry((offer, zone)) {
+        match self.roots.entry((list, zone)) {
             std::collections::hash_map::Entry::Vacant(entry) => {
                 entry.insert(None);
                 self.bytes += 32;

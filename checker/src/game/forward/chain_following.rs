@@ -1,6 +1,6 @@
 //! How chains are followed along their trails ([`super::chain_cache`]).
 
-use crate::network::{Failure, FixedMove, Moves, OfferId};
+use crate::network::{Failure, FixedMove, MoveListId, Moves};
 use crate::zones::Zone;
 
 use super::chain_cache::{ChainCache, Ending, MOST_BYTES, Onward, Root, Trail, TrailId};
@@ -110,29 +110,29 @@ impl Graph<'_, '_> {
         let Some(vector) = trail.vector else {
             return Ok(Onward::Varies);
         };
-        let Some(offer) = stepper.offer(vector, words)? else {
+        let Some(list) = stepper.move_list(vector, words)? else {
             return Ok(Onward::Varies);
         };
-        if let Some(&(_, onward)) = trail.onward.iter().find(|known| known.0 == offer) {
+        if let Some(&(_, onward)) = trail.onward.iter().find(|known| known.0 == list) {
             return Ok(onward);
         }
-        let onward = self.new_onward(trails, at, offer, words)?;
+        let onward = self.new_onward(trails, at, list, words)?;
         if !matches!(onward, Onward::Unknown) {
-            trails.points[at as usize].onward.push((offer, onward));
+            trails.points[at as usize].onward.push((list, onward));
         }
         Ok(onward)
     }
 
-    /// Like [`Graph::onward`], if the result of the offer is not known.
+    /// Like [`Graph::onward`], if the result of the list of moves is not known.
     fn new_onward(
         &mut self,
         trails: &mut ChainCache,
         at: TrailId,
-        offer: OfferId,
+        list: MoveListId,
         words: &[i32],
     ) -> Result<Onward, Failure> {
         let trail = &trails.points[at as usize];
-        let moves = self.symbolic.stepper.offered(offer);
+        let moves = self.symbolic.stepper.listed(list);
         if moves.len() != 1 {
             return Ok(Onward::Ends);
         }

@@ -73,11 +73,11 @@ impl Graph<'_, '_> {
         let stepper = &mut self.symbolic.stepper;
         if self.trails.is_useful()
             && let Some(vector) = stepper.vector(words)
-            && let Some(offer) = stepper.offer(vector, words)?
+            && let Some(list) = stepper.move_list(vector, words)?
         {
-            moves.copy_from(stepper.offered(offer));
+            moves.copy_from(stepper.listed(list));
             let zone = self.nodes[node as usize].zone;
-            return Ok(self.trails.root(offer, zone, moves));
+            return Ok(self.trails.root(list, zone, moves));
         }
         self.symbolic.remembered_moves(words, moves)?;
         Ok(None)
@@ -119,8 +119,8 @@ impl Graph<'_, '_> {
         self.continue_chain(origin, target, zone, 1, may_delay)
     }
 
-    /// Continues a chain of which `length` moves were taken, and adds its edge. The zone contains
-    /// its future if time may pass.
+    /// Continues a chain after `length` moves, and adds its edge. The zone contains its future if
+    /// time may pass.
     pub(super) fn continue_chain(
         &mut self,
         origin: Origin,

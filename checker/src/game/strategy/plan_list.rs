@@ -14,7 +14,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use crate::cancellation;
-use crate::network::{Failure, FixedMove, Moves, OfferId, Part};
+use crate::network::{Failure, FixedMove, MoveListId, Moves, Part};
 
 use super::plans::{NoPlans, Plans, UNITS_FOR_STEP};
 use crate::game::backward::winning_sets::Win;
@@ -388,8 +388,8 @@ struct Chains {
     step_ids: FxHashMap<PlanStep, u32>,
     found: Vec<Vec<u32>>,
     ids: FxHashMap<Vec<u32>, u32>,
-    /// The moves that were fixed: of an offer, by their ordinal.
-    fixed: FxHashMap<(OfferId, u32), (u32, Option<FixedMove>)>,
+    /// The moves of lists that were fixed, by list and ordinal.
+    fixed: FxHashMap<(MoveListId, u32), (u32, Option<FixedMove>)>,
     words: Vec<i32>,
     moves: Moves,
     /// The steps of the chain that is followed.
@@ -431,11 +431,11 @@ impl Chains {
         cancellation::work(UNITS_FOR_STEP);
         let symbolic = &mut *solver.graph.symbolic;
         // Moves depend on locations and answers of guards: most were met before.
-        let offer = match symbolic.stepper.vector(words) {
-            Some(vector) if symbolic.is_fixed() => symbolic.stepper.offer(vector, words)?,
+        let list = match symbolic.stepper.vector(words) {
+            Some(vector) if symbolic.is_fixed() => symbolic.stepper.move_list(vector, words)?,
             _ => None,
         };
-        let known = offer.and_then(|offer| self.fixed.get(&(offer, ordinal)));
+        let known = list.and_then(|list| self.fixed.get(&(list, ordinal)));
         if let Some((step, Some(one))) = known {
             symbolic.stepper.take(one, words)?;
             return Ok(*step);
@@ -451,9 +451,9 @@ impl Chains {
             self.steps.push(step.clone());
             count
         });
-        if let Some(offer) = offer {
+        if let Some(list) = list {
             let fixed = symbolic.stepper.fix(one, words);
-            self.fixed.insert((offer, ordinal), (step, fixed));
+            self.fixed.insert((list, ordinal), (step, fixed));
         }
         symbolic.stepper.fire(one.parts, words)?;
         Ok(step)

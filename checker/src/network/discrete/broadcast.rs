@@ -105,7 +105,7 @@ impl Stepper<'_> {
         }
         let (rank_after, scope) = self.ranks_and_scope(combinations, after, sender.scope)?;
         self.chosen.clear();
-        self.sieve.begin(scope);
+        self.filter.begin(scope);
         if self.choose(Choice::Takes(0), scope)? {
             self.combine_from(Sending { scope, ..sender }, groups, words, out)?;
         }
@@ -187,7 +187,7 @@ impl Stepper<'_> {
             ways = groups[depth].before;
             groups[depth].pick += 1;
             self.chosen.pop();
-            self.sieve.take_back();
+            self.filter.take_back();
         }
     }
 
@@ -203,14 +203,14 @@ impl Stepper<'_> {
             Choice::Takes(index) => {
                 let candidate = &candidates[index as usize];
                 let demand = Demand::Takes(candidate.part(), constraints_of(candidate));
-                self.sieve.choose(scope, [demand])?
+                self.filter.choose(scope, [demand])?
             }
             Choice::Abstains(first, last) => {
                 let candidates = candidates[first as usize..last as usize].iter();
                 let demands = candidates.map(|candidate| {
                     Demand::Abstains(candidate.process, constraints_of(candidate))
                 });
-                self.sieve.choose(scope, demands)?
+                self.filter.choose(scope, demands)?
             }
         };
         if is_chosen {

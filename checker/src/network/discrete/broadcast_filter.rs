@@ -48,7 +48,7 @@ pub(super) enum Demand<'c> {
 
 /// Follows the choices of a combination under a scope. Holds the buffers.
 #[derive(Debug)]
-pub(super) struct Sieve {
+pub(super) struct BroadcastFilter {
     dimension: usize,
     /// The valuations at which all choices are possible, after each choice that took something
     /// away; for [`Scope::Within`].
@@ -69,9 +69,9 @@ enum Leaves {
     Some,
 }
 
-impl Sieve {
-    pub(super) fn new(dimension: usize) -> Sieve {
-        Sieve {
+impl BroadcastFilter {
+    pub(super) fn new(dimension: usize) -> BroadcastFilter {
+        BroadcastFilter {
             dimension,
             left: Vec::new(),
             places: Vec::new(),

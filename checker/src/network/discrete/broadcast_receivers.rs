@@ -55,7 +55,7 @@ impl Stepper<'_> {
         }
         let (rank_after, scope) = self.ranks_and_scope(combinations, after, sender.scope)?;
         self.chosen.clear();
-        self.sieve.begin(scope);
+        self.filter.begin(scope);
         if self.choose(Choice::Takes(0), scope)? {
             let mut groups = self.combine_receivers(process);
             let sender = Sending { scope, ..sender };

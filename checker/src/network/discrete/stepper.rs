@@ -16,15 +16,15 @@ use crate::cancellation;
 use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
 use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
 
-use super::broadcast_filter::{Scope, Sieve};
+use super::broadcast_filter::{BroadcastFilter, Scope};
 use super::candidate::{Audience, Candidate, Choice, Group};
 use super::edge_tables::LocationTable;
 use super::partners::{Pair, Partners, partners};
 use super::receivers::Receivers;
 use super::select_cache::Instances;
 use super::selects::select_values;
-use super::transition::{MoveRef, Moves, OfferId, Part};
-use super::transition_cache::{Next, Offers, Record, VectorId};
+use super::transition::{MoveListId, MoveRef, Moves, Part};
+use super::transition_cache::{Next, Record, TransitionCache, VectorId};
 use crate::network::failure::Failure;
 use crate::tuning::Tuning;
 
@@ -51,7 +51,7 @@ pub struct Stepper<'a> {
     pub(super) parts: Vec<Part>,
     /// The rank of the next move; see [`super::broadcast`].
     pub(super) rank: u64,
-    pub(super) sieve: Sieve,
+    pub(super) filter: BroadcastFilter,
     /// The receivers of the channel of the last broadcast, and the buffer for their constraints.
     pub(super) audience: Audience,
     pub(super) heard: Vec<EmittedConstraint>,
@@ -65,14 +65,14 @@ pub struct Stepper<'a> {
     /// The bytes of moves that the caller holds while it asks for more.
     pub(crate) moves_beside: usize,
     /// Moves that were made before.
-    pub(super) offers: Offers,
+    pub(super) transitions: TransitionCache,
     /// What is evaluated while moves are made for the cache.
     pub(super) record: Option<Record>,
 }
 
 /// What the cache knows about the moves of a state.
 enum Found {
-    Offer(OfferId),
+    Moves(MoveListId),
     Nothing,
     /// A question failed, so the moves cannot be cached with those of the tree.
     Failure,
@@ -112,12 +112,12 @@ impl<'a> Stepper<'a> {
             groups: Vec::new(),
             parts: Vec::new(),
             rank: 0,
-            sieve: Sieve::new(network.clocks.len().max(1)),
+            filter: BroadcastFilter::new(network.clocks.len().max(1)),
             audience: Audience::default(),
             heard: Vec::new(),
             round: 0,
             moves_beside: 0,
-            offers: Offers::new(network.processes.len()),
+            transitions: TransitionCache::new(network.processes.len()),
             record: None,
         }
     }
@@ -189,9 +189,9 @@ impl<'a> Stepper<'a> {
     /// Writes all moves of the state that the words allow into `out`.
     pub fn moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         if let Some(vector) = self.vector(words)
-            && let Some(offer) = self.offer(vector, words)?
+            && let Some(list) = self.move_list(vector, words)?
         {
-            out.copy_from(self.offers.moves(offer));
+            out.copy_from(self.transitions.moves(list));
             return Ok(());
         }
         self.compute_moves(words, Scope::Everything, out)
@@ -202,7 +202,7 @@ impl<'a> Stepper<'a> {
         if !self.tuning.transition_cache {
             return None;
         }
-        self.offers.vector(words)
+        self.transitions.vector(words)
     }
 
     /// Like [`Stepper::moves`], without combinations that the scope leaves out. It is for a search,
@@ -214,16 +214,16 @@ impl<'a> Stepper<'a> {
         out: &mut Moves,
     ) -> Result<(), Failure> {
         if self.tuning.transition_cache
-            && self.offers.is_worth_asking()
-            && let Some(vector) = self.offers.vector(words)
+            && self.transitions.is_worth_asking()
+            && let Some(vector) = self.transitions.vector(words)
         {
-            match self.known_offer(vector, words)? {
-                Found::Offer(offer) => {
-                    self.offers.note_found();
-                    out.copy_from(self.offers.moves(offer));
+            match self.known_list(vector, words)? {
+                Found::Moves(list) => {
+                    self.transitions.note_found();
+                    out.copy_from(self.transitions.moves(list));
                     return Ok(());
                 }
-                Found::Nothing if self.offers.is_suited(vector) => {
+                Found::Nothing if self.transitions.is_suited(vector) => {
                     return self.remember(vector, words, scope, out).map(|_| ());
                 }
                 Found::Nothing | Found::Failure => {}
@@ -234,14 +234,14 @@ impl<'a> Stepper<'a> {
 
     /// The moves of a state with this location vector, if they depend only on locations and answers
     /// of guards, and the cache has room for them.
-    pub fn offer(
+    pub fn move_list(
         &mut self,
         vector: VectorId,
         words: &mut [i32],
-    ) -> Result<Option<OfferId>, Failure> {
-        match self.known_offer(vector, words)? {
-            Found::Offer(offer) => Ok(Some(offer)),
-            Found::Nothing if self.offers.is_suited(vector) => {
+    ) -> Result<Option<MoveListId>, Failure> {
+        match self.known_list(vector, words)? {
+            Found::Moves(list) => Ok(Some(list)),
+            Found::Nothing if self.transitions.is_suited(vector) => {
                 self.remember(vector, words, Scope::Everything, &mut Moves::default())
             }
             Found::Nothing | Found::Failure => Ok(None),
@@ -249,13 +249,13 @@ impl<'a> Stepper<'a> {
     }
 
     /// The moves of a state with this location vector, if they are in the cache.
-    fn known_offer(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
-        let Some(mut way) = self.offers.start(vector) else {
+    fn known_list(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
+        let Some(mut way) = self.transitions.start(vector) else {
             return Ok(Found::Nothing);
         };
         loop {
-            match self.offers.next(way) {
-                Next::Offer(offer) => return Ok(Found::Offer(offer)),
+            match self.transitions.next(way) {
+                Next::Moves(list) => return Ok(Found::Moves(list)),
                 Next::Ask(function, arguments) => {
                     let mut context = Context {
                         state: words,
@@ -263,7 +263,7 @@ impl<'a> Stepper<'a> {
                         assignments: &mut self.assignments,
                     };
                     match self.executor.call(function, arguments, &mut context) {
-                        Ok(answer) => self.offers.answer(&mut way, answer),
+                        Ok(answer) => self.transitions.answer(&mut way, answer),
                         Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
                             return Err(error.into());
                         }
@@ -285,28 +285,28 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
         scope: Scope<'_>,
         out: &mut Moves,
-    ) -> Result<Option<OfferId>, Failure> {
-        self.sieve.has_narrowed = false;
+    ) -> Result<Option<MoveListId>, Failure> {
+        self.filter.has_narrowed = false;
         self.record = Some(Record::default());
         // If this is cancelled, the record must not be taken for that of another state.
         let compute_moves = || self.compute_moves(words, scope, out);
         let result = cancellation::unless_cut(compute_moves).unwrap_or(Err(Failure::Interrupted));
         let mut record = self.record.take().unwrap_or_default();
         result?;
-        if self.sieve.has_narrowed {
+        if self.filter.has_narrowed {
             record.spoil();
         }
-        Ok(self.offers.remember(vector, record, out))
+        Ok(self.transitions.remember(vector, record, out))
     }
 
-    /// The moves of an offer.
-    pub fn offered(&self, offer: OfferId) -> &Moves {
-        self.offers.moves(offer)
+    /// The moves of a list.
+    pub fn listed(&self, list: MoveListId) -> &Moves {
+        self.transitions.moves(list)
     }
 
     /// The approximate number of bytes of the caches.
     pub fn bytes(&self) -> usize {
-        self.offers.bytes() + self.instances.bytes()
+        self.transitions.bytes() + self.instances.bytes()
     }
 
     /// Takes the move: changes locations and variables. The result has the clock assignments, in

@@ -10,7 +10,7 @@ const MOST_MOVES: usize = 1 << 20;
 
 /// The index of cached moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct OfferId(pub(super) u32);
+pub struct MoveListId(pub(super) u32);
 
 /// The part of one process in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -68,8 +68,8 @@ pub struct Moves {
     /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast
     /// receivers that abstain.
     excluded: Vec<(u32, u32)>,
-    /// The offer, if the moves are cached.
-    pub(super) offer: Option<OfferId>,
+    /// The move list, if the moves are cached.
+    pub(super) list: Option<MoveListId>,
 }
 
 /// One move of [`Moves`].
@@ -87,8 +87,8 @@ pub struct MoveRef<'a> {
     /// zone.
     pub rank: u64,
     pub(in crate::network) label: Label,
-    /// For cached moves: the offer and the place in it.
-    pub(in crate::network) offered: Option<(OfferId, u32)>,
+    /// For cached moves: the move list and the place in it.
+    pub(in crate::network) listed: Option<(MoveListId, u32)>,
     moves: &'a Moves,
     excluded: (u32, u32),
 }
@@ -115,7 +115,7 @@ impl Moves {
         self.parts.clear();
         self.constraints.clear();
         self.excluded.clear();
-        self.offer = None;
+        self.list = None;
     }
 
     /// The bytes that the moves take, without the value itself.
@@ -132,7 +132,7 @@ impl Moves {
         self.parts.clone_from(&other.parts);
         self.constraints.clone_from(&other.constraints);
         self.excluded.clone_from(&other.excluded);
-        self.offer = other.offer;
+        self.list = other.list;
     }
 
     /// How many moves there are.
@@ -164,7 +164,7 @@ impl Moves {
             controllable: header.label.controllable,
             rank: header.label.rank,
             label: header.label,
-            offered: self.offer.map(|offer| (offer, index as u32)),
+            listed: self.list.map(|list| (list, index as u32)),
             moves: self,
             excluded: header.excluded,
         }

@@ -2,14 +2,14 @@
 //!
 //! The locations and the answers of guards decide which moves a state has. So each location vector
 //! keeps a tree of *questions*, the functions that [`crate::network::Stepper`] evaluates for it in
-//! their order, with a branch for each answer met so far. At a leaf stands an [`OfferId`]: the
+//! their order, with a branch for each answer met so far. At a leaf stands a [`MoveListId`]: the
 //! moves, put together once. For a state whose answers were met before, only guards are evaluated.
 //!
 //! Invariants:
 //! * A tree asks what putting the moves together asks, in the same order, so that the first
 //!   run-time error is the same; only what was asked before, with the same arguments, is not asked
 //!   again.
-//! * The moves of an offer do not depend on variables otherwise. A location vector where some guard
+//! * The moves of a list do not depend on variables otherwise. A location vector where some guard
 //!   emits clock constraints is *unsuited* and has no tree.
 //! * Ids stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
 //!   later is not remembered.
@@ -22,13 +22,13 @@ use rustc_hash::FxHasher;
 use crate::ir::FunctionId;
 use crate::zones::federation::block_bytes;
 
-use super::transition::{Moves, OfferId};
+use super::transition::{MoveListId, Moves};
 use crate::network::trial::{Pause, Trial};
 
 /// The approximate number of bytes that the cache may take.
 const MOST_BYTES: usize = 24 << 20;
-/// A location vector with more offers is unsuited: its guards seldom answer the same.
-const MOST_OFFERS: u32 = 64;
+/// A location vector with more move lists is unsuited: its guards seldom answer the same.
+const MOST_LISTS: u32 = 64;
 /// A location vector that asks more is unsuited.
 const MOST_QUESTIONS: usize = 256;
 
@@ -59,7 +59,7 @@ struct Question {
 #[derive(Clone, Copy, Debug)]
 enum Point {
     Ask(u32),
-    Offer(OfferId),
+    Moves(MoveListId),
 }
 
 /// What is known of a location vector.
@@ -67,7 +67,7 @@ enum Point {
 enum Knowledge {
     /// It was met once.
     Met,
-    /// It has a tree with this many offers.
+    /// It has a tree with this many move lists.
     Tree(Point, u32),
     Unsuited,
 }
@@ -78,7 +78,7 @@ pub(super) enum Next<'o> {
     /// Evaluate this, and answer.
     Ask(FunctionId, &'o [i32]),
     /// These are the moves.
-    Offer(OfferId),
+    Moves(MoveListId),
     /// Nothing is known: the moves must be put together.
     Unknown,
 }
@@ -120,7 +120,7 @@ impl Record {
 
 /// All that is remembered.
 #[derive(Debug)]
-pub(super) struct Offers {
+pub(super) struct TransitionCache {
     /// How many processes there are.
     processes: usize,
     /// The location vectors, one after the other.
@@ -128,17 +128,17 @@ pub(super) struct Offers {
     table: HashTable<u32>,
     known: Vec<Knowledge>,
     questions: Vec<Question>,
-    /// The moves of every offer.
+    /// The moves of each list.
     moves: Vec<Moves>,
     bytes: usize,
     trial: Trial,
     pause: Pause,
 }
 
-impl Offers {
+impl TransitionCache {
     /// An empty cache, for a network of this many processes.
-    pub(super) fn new(processes: usize) -> Offers {
-        Offers {
+    pub(super) fn new(processes: usize) -> TransitionCache {
+        TransitionCache {
             processes,
             locations: Vec::new(),
             table: HashTable::new(),
@@ -211,7 +211,7 @@ impl Offers {
     pub(super) fn next(&self, way: Way) -> Next<'_> {
         match way.0 {
             None => Next::Unknown,
-            Some(Point::Offer(offer)) => Next::Offer(offer),
+            Some(Point::Moves(list)) => Next::Moves(list),
             Some(Point::Ask(question)) => {
                 let question = &self.questions[question as usize];
                 Next::Ask(question.function, &question.arguments)
@@ -226,9 +226,9 @@ impl Offers {
         }
     }
 
-    /// The moves of an offer.
-    pub(super) fn moves(&self, offer: OfferId) -> &Moves {
-        &self.moves[offer.0 as usize]
+    /// The moves of a list.
+    pub(super) fn moves(&self, list: MoveListId) -> &Moves {
+        &self.moves[list.0 as usize]
     }
 
     /// Remembers moves with the questions that led to them, and tells them so; `None` if the
@@ -238,23 +238,23 @@ impl Offers {
         vector: VectorId,
         record: Record,
         moves: &mut Moves,
-    ) -> Option<OfferId> {
+    ) -> Option<MoveListId> {
         let (root, count) = match self.known[vector.0 as usize] {
             Knowledge::Met => (None, 0),
             Knowledge::Tree(root, count) => (Some(root), count),
             Knowledge::Unsuited => return None,
         };
-        if record.is_unsuited || count == MOST_OFFERS || self.bytes > MOST_BYTES {
+        if record.is_unsuited || count == MOST_LISTS || self.bytes > MOST_BYTES {
             self.known[vector.0 as usize] = Knowledge::Unsuited;
             return None;
         }
-        let offer = OfferId(self.moves.len() as u32);
+        let list = MoveListId(self.moves.len() as u32);
         self.bytes += moves.heap_bytes() + size_of::<Moves>();
-        moves.offer = Some(offer);
+        moves.list = Some(list);
         self.moves.push(moves.clone());
-        let root = self.graft(root, record, Point::Offer(offer));
+        let root = self.graft(root, record, Point::Moves(list));
         self.known[vector.0 as usize] = Knowledge::Tree(root, count + 1);
-        Some(offer)
+        Some(list)
     }
 
     /// Adds to a tree the branch on which the questions have the recorded answers; returns the

@@ -2,9 +2,9 @@
 //! search needs to see only one.
 //!
 //! Exchange two members of a scalar set everywhere: in values, in arrays that the set indexes,
-//! among processes of which there is one for each member, and in their clocks. This turns runs into
-//! runs, and does not change whether a predicate holds: neither models nor queries can name a
-//! member. So a search may replace every state by another state of its orbit. If s is the start and
+//! among processes that stand for one member each, and in their clocks. This turns runs into runs,
+//! and does not change whether a predicate holds: neither models nor queries can name a member. So
+//! a search may replace every state by another state of its orbit. If s is the start and
 //! p a permutation, everything that is reachable from p(s) is p applied to what is reachable from
 //! s. So the initial state need not treat all members in the same way. Members *can* be
 //! distinguished in some models; this is found when the model is loaded ([`crate::ir::ScalarSet`])

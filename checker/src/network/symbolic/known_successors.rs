@@ -42,8 +42,8 @@ impl<'a> Symbolic<'a> {
     }
 
     /// Does the work of [`Symbolic::take`], [`Symbolic::forget`] and [`Symbolic::pass_time`], for a
-    /// move from a known zone of which each of its guards leaves something. It overwrites `zone`,
-    /// which has the same dimension. `None` if the move is not possible.
+    /// move from a known zone. Each guard of the move leaves something of the zone. It overwrites
+    /// `zone`, which has the same dimension. `None` if the move is not possible.
     pub fn enter_known(
         &mut self,
         one: MoveRef<'_>,
@@ -53,8 +53,8 @@ impl<'a> Symbolic<'a> {
         zone: &mut [Bound],
     ) -> Result<Option<KeptZone>, Failure> {
         cancellation::work(words.len() + zone.len());
-        if let Some(offered) = one.offered
-            && let Some(Some(fixed)) = self.memo.fixed.get(&offered)
+        if let Some(listed) = one.listed
+            && let Some(Some(fixed)) = self.memo.fixed.get(&listed)
             && let Some(outcome) = self.memo.find(known.zone, fixed.effect)
         {
             self.stepper.take(&fixed.one, words)?;
@@ -133,18 +133,18 @@ impl<'a> Symbolic<'a> {
         Ok(true)
     }
 
-    /// Caches the effect of a move of an offer, which led to these words, unless it may depend on
+    /// Caches the effect of a listed move, which led to these words, unless it may depend on
     /// variables.
     fn fix_effect(&mut self, one: MoveRef<'_>, words: &[i32], effect: u32) {
-        let Some(offered) = one.offered else { return };
-        if self.memo.fixed.contains_key(&offered) {
+        let Some(listed) = one.listed else { return };
+        if self.memo.fixed.contains_key(&listed) {
             return;
         }
         let is_fixed =
             self.tuning().constant_effect && self.is_fixed() && self.bounds.follow_locations();
         let fixed = self.stepper.fix(one, words).filter(|_| is_fixed);
         let fixed = fixed.map(|one| FixedEffect { one, effect });
-        self.memo.fixed.insert(offered, fixed);
+        self.memo.fixed.insert(listed, fixed);
     }
 
     /// Applies the current effect to a zone.

@@ -27,7 +27,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::packed_effects::{PackedEffects, fold};
 use crate::network::trial::Pause;
-use crate::network::{FixedMove, OfferId};
+use crate::network::{FixedMove, MoveListId};
 
 /// How much is remembered, and for how long though it does not pay.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ const FEWEST_ZONES: usize = 16;
 const LONGEST_PAUSE: u32 = 1 << 22;
 /// After this many pairs, earlier hits and misses count half.
 const LONG_AGO: u32 = 1 << 17;
-/// What a move of an offer takes, about.
+/// What a listed move takes, about.
 const FIXED_BYTES: usize = 256;
 
 /// A zone that moves from it may be looked up by.
@@ -115,8 +115,8 @@ pub(super) struct ZoneMemo {
     pub(super) reduced: ZoneTable,
     pub(super) effects: PackedEffects,
     pub(super) outcomes: HashTable<ZoneOutcome>,
-    /// Moves of offers that were taken; `None` where the effect may depend on variables.
-    pub(super) fixed: FxHashMap<(OfferId, u32), Option<FixedEffect>>,
+    /// Listed moves that were taken; `None` where the effect may depend on variables.
+    pub(super) fixed: FxHashMap<(MoveListId, u32), Option<FixedEffect>>,
     pub(super) balance: Balance,
     pause: Pause,
     pub(super) age: u32,

@@ -113,10 +113,9 @@ struct Passage {
     whole: Zone,
     /// The part of it in which the predicate does not hold.
     outside: Federation,
-    /// The set in which the result of a delay is searched, and its part in which the predicate does
-    /// not hold. The set is the same one; but if a clock stands still while two others run, it is
-    /// all that the invariants allow. A set whose comparisons never concern such clocks has an
-    /// exact past there.
+    /// Where the result of a delay is searched, and where the predicate does not hold there. The
+    /// set is the same one; but if a clock stands still while two others run, it is all that the
+    /// invariants allow. A set whose comparisons never concern such clocks has an exact past there.
     frame: Zone,
     left: Federation,
     /// The part of it in which an urgent synchronisation or a restriction stops time.

@@ -254,6 +254,15 @@ impl<'p> Liveness<'p> {
         Ok(None)
     }
 
+    /// The number of words; those that are new begin an empty list.
+    fn discrete(&mut self, words: &[i32]) -> DiscreteId {
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.heads.push(NONE);
+        }
+        discrete
+    }
+
     /// Moves to a node, unless it is known to start no run; checks whether it closes a loop.
     fn visit(
         &mut self,
@@ -261,10 +270,7 @@ impl<'p> Liveness<'p> {
         words: &[i32],
         zone: Zone,
     ) -> Result<Option<RunEnding>, Failure> {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
-        }
+        let discrete = self.discrete(words);
         let mut node = self.heads[discrete.0 as usize];
         let mut is_left = false;
         while node != NONE {
@@ -295,10 +301,7 @@ impl<'p> Liveness<'p> {
 
     /// Whether it is known that no run starts in the zone.
     fn is_left(&mut self, words: &[i32], zone: &Zone) -> bool {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
-        }
+        let discrete = self.discrete(words);
         let mut node = self.heads[discrete.0 as usize];
         while node != NONE {
             let Node {
@@ -322,10 +325,7 @@ impl<'p> Liveness<'p> {
         zone: Zone,
     ) -> Result<(), Failure> {
         self.explored += 1;
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
-        }
+        let discrete = self.discrete(words);
         let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,

@@ -40,8 +40,7 @@ const MOST_ROUNDS: usize = 16;
 /// The search looks for a run that stays in `keep` for ever.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'p> {
-    /// The run begins in a state, reached in any way, in which this holds; without it, in the
-    /// initial state.
+    /// The run begins in a reachable state that satisfies this; without it, in the initial state.
     pub open: Option<&'p Predicate>,
     /// What must stay true.
     pub keep: &'p Predicate,

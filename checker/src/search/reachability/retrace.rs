@@ -29,7 +29,7 @@ impl<'s> Path<'s> {
 /// The words of a state that was entered, and its zones.
 type Entered = (Vec<i32>, Vec<Zone>);
 
-/// A state is in the trace, and among those from which other ways are open.
+/// A state is in the trace, and among those that other ways may start from.
 const STATES_AT_HAND: usize = 2;
 
 /// What a state of the trace takes beside its words and bounds: six blocks of memory with their
@@ -108,7 +108,7 @@ fn take(
 ) -> Result<Option<(Vec<Part>, Entered)>, Failure> {
     let mut moves = Moves::default();
     symbolic.moves_within(&mut words, zone.bounds(), &mut moves)?;
-    // The zone is within that of the search, in which extrapolation made some impossible moves look
+    // The zone is within that of the search. There extrapolation made some impossible moves look
     // possible.
     let one = match exchanged {
         None => moves.with_rank(step),

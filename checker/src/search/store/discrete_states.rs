@@ -22,8 +22,8 @@ use super::segmented_table::PiecedTable;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DiscreteId(pub u32);
 
-/// An entry of the table: the state and a part of its hash, from which the table is rebuilt when it
-/// grows.
+/// An entry of the table: the state and a part of its hash. When the table grows, it is rebuilt
+/// from these parts.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     id: u32,

@@ -333,8 +333,8 @@ impl PackedZones {
         }
     }
 
-    /// Whether the second of two packed zones contains the first, of which only infinite entries
-    /// exceed their counterparts.
+    /// Whether the second of two packed zones contains the first. Only infinite entries of the
+    /// first exceed their counterparts.
     fn is_within(&mut self, of: impl Fn(&PackedZones) -> [&[u8]; 2], limits: &[Bound]) -> bool {
         if limits.is_empty() {
             return false;

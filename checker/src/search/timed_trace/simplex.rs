@@ -15,7 +15,7 @@
 //! for the simplex method", 1977 (why it ends).
 //!
 //! Cost: a step takes at most rows times columns, and hardly more than the coefficients that are
-//! not 0, of which rows have few; numbers that outgrow 128 bits end it.
+//! not 0. Rows have few of these. Numbers that outgrow 128 bits end it.
 
 use crate::cancellation;
 
@@ -398,7 +398,7 @@ fn place_in(row: &Row, variable: usize) -> Option<usize> {
     row.binary_search_by_key(&variable, |&(one, _)| one).ok()
 }
 
-/// Adds a multiple of a sum, in which variables may come several times, one after the other.
+/// Adds a multiple of a sum. A variable may come several times in it, one after the other.
 fn add_multiple(
     row: &mut Row,
     other: &[(usize, Fraction)],

@@ -7,8 +7,8 @@ use rustc_hash::FxHashSet;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::semantics::types::Type;
 
-/// How many times a model is checked at most: a longer chain of doubles, each of which takes the
-/// value of the next, is refused.
+/// How many times a model is checked at most. If each double of a chain takes the value of the
+/// next, a longer chain is refused.
 pub(in crate::semantics) const MOST_ROUNDS: usize = 12;
 
 /// Variables by the place of their declaration, each with the reason why ordinary variables could
