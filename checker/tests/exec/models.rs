@@ -11,8 +11,8 @@ use checker::engine::LoadedModel;
 use checker::engine::session::walk::{Point, successors, symbolic};
 use checker::exec::Executor;
 use checker::ir::{Network, Overflow};
-use checker::network::Symbolic;
-use checker::zones::Bound;
+use checker::network::{Failure, Symbolic};
+use checker::zones::{Bound, Zone};
 
 use crate::corpus;
 use crate::support::engines;
@@ -58,6 +58,14 @@ fn look(symbolic: &mut Symbolic<'_>, point: &Point) -> (Vec<Point>, String) {
     }
 }
 
+/// The initial words, and the zone after time has passed.
+fn initial(symbolic: &mut Symbolic<'_>) -> Result<(Vec<i32>, Zone), Failure> {
+    let (mut words, mut zone, invariant) = symbolic.start()?;
+    let may_delay = symbolic.may_delay(&mut words)?;
+    symbolic.delay(&words, may_delay, &invariant, zone.bounds_mut())?;
+    Ok((words, zone))
+}
+
 /// Walks with all engines at once; the first difference, if there is one.
 fn walk(
     network: &Network,
@@ -69,7 +77,7 @@ fn walk(
         .iter()
         .map(|(_, executor)| symbolic(network, executor.as_ref()))
         .collect();
-    let starts: Vec<_> = sides.iter_mut().map(Symbolic::initial).collect();
+    let starts: Vec<_> = sides.iter_mut().map(initial).collect();
     let shown: Vec<String> = starts
         .iter()
         .map(|start| match start {

@@ -42,13 +42,13 @@ fn check_on(overflow: Overflow, functions: &[Function], arguments: &[i32], expec
         let outcome = run(&*engine, FunctionId(0), arguments, &[0; 4]);
         let Outcome { result, state, .. } = outcome;
         let actual = result.map(|value| (value, state)).map_err(|error| {
-            assert_eq!(error.site, SITE, "{name}: {}", functions[0]);
+            assert_eq!(error.site, SITE, "{name}: {:?}", functions[0]);
             error.kind
         });
         assert_eq!(
             (&actual, outcome.wrapped),
             expected,
-            "{name} {arguments:?}: {}",
+            "{name} {arguments:?}: {:?}",
             functions[0]
         );
     }

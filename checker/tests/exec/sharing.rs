@@ -48,7 +48,7 @@ fn compare(program: &Program, engines: &[(&str, Box<dyn Executor>)]) {
         };
         for other in others {
             let text = &program.functions[0];
-            assert_eq!(other.1, expected.1, "{} of {argument}: {text}", other.0);
+            assert_eq!(other.1, expected.1, "{} of {argument}: {text:?}", other.0);
         }
     }
 }
