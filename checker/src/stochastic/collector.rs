@@ -6,7 +6,7 @@ use super::behaviour::Behaviour;
 use super::blocks::{Runs, from_anywhere, shown};
 use super::failure::Failure;
 use super::precision::{Estimate, MeanMethod, Precision};
-use super::run::RunId;
+use super::run_id::RunId;
 use super::run_watch::{Ends, RunWatch, Shown};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,

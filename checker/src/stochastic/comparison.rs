@@ -4,7 +4,7 @@ use super::blocks::{Runs, from_anywhere, pair_of_runs};
 use super::estimate::share;
 use super::failure::Failure;
 use super::precision::{Estimate, Precision};
-use super::run::RunId;
+use super::run_id::RunId;
 use super::run_watch::Ends;
 use super::statistics::DoubleSampling;
 use crate::ir::Statistical;

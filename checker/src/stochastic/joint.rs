@@ -18,7 +18,8 @@ use super::failure::Failure;
 use super::in_order::in_order;
 use super::mitl::Watch;
 use super::precision::{Estimate, Precision};
-use super::run::{RunId, Runner, watched};
+use super::run::{Runner, watched};
+use super::run_id::RunId;
 use super::run_watch::{Ends, Shows};
 use crate::ir::{Path, RunBound, Statistical};
 

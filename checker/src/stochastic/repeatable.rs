@@ -2,7 +2,8 @@
 
 use super::behaviour::Behaviour;
 use super::failure::Failure;
-use super::run::{RunId, Runner};
+use super::run::Runner;
+use super::run_id::RunId;
 use crate::ir::Statistical;
 
 /// How many runs are made twice.

@@ -15,21 +15,13 @@ use super::mitl::Watch;
 use super::program::Program;
 use super::race::Race;
 use super::race_code::{Asked, End, RaceCode, Stages, Watched};
+use super::run_id::RunId;
 use crate::cancellation;
 use crate::exec::Executor;
 use crate::ir::{Formula, FunctionId, Network, Path, RunBound, RunLimit, Simulation};
 
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
-
-/// A run of a seed, by its number: it has the same random numbers wherever it is made.
-#[derive(Clone, Copy, Debug)]
-pub struct RunId {
-    /// The seed of all runs of a query.
-    pub seed: u64,
-    /// The number of the run.
-    pub run: u64,
-}
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -43,7 +43,7 @@ use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
 use super::program::Program;
 use super::rules;
-use super::run::RunId;
+use super::run_id::RunId;
 use crate::ir::{FunctionId, LocationId, Network, ProcessId, Urgency};
 
 /// The changes of a condition that are followed within one delay.

@@ -38,8 +38,8 @@ impl Race<'_> {
         Ok(urgent)
     }
 
-    /// Adds the times until `bound` at which an instance is enabled; returns the first, or looks for
-    /// that alone.
+    /// Adds the times until `bound` at which an instance is enabled; returns the first, or looks
+    /// for that alone.
     pub(super) fn instance_windows(
         &mut self,
         program: &Program<'_>,

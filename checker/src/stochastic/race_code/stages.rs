@@ -7,7 +7,7 @@ use super::asked::{End, Watched};
 use super::runs::{RaceCode, WrittenRace};
 use crate::exec::Executor;
 use crate::stochastic::program::Program;
-use crate::stochastic::run::RunId;
+use crate::stochastic::run_id::RunId;
 
 /// The moves before it is looked at whether there is code for a race.
 const MOVES_BEFORE_WRITING: u64 = 20_000;
