@@ -852,7 +852,7 @@ fn describe(
     let mut text =
         format!("{engine} differs for {seed}\nexpected {expected:?}\nactual   {actual:?}\n");
     for (index, function) in functions.iter().enumerate() {
-        write!(text, "f{index} = {function:#?}\n").expect("strings can be written");
+        writeln!(text, "f{index} = {function:#?}").expect("strings can be written");
     }
     text
 }
