@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import accumulate, count
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.checker.edges import EdgeTable, EngineEdge, EnginePlan, EngineStep, step_of
 from ntagen.checker.errors import rejecting
 from ntagen.errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.errors import InputError, ModelError
 
 

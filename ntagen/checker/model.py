@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.checker.answer import Answer, Interrupted
 from ntagen.checker.constants import Value, written
 from ntagen.checker.edges import EdgeTable

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of, state_of
 from ntagen.errors import InputError, ModelError
 

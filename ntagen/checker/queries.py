@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from typing import Any, Final
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.values import dataclass
 
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.checker.edges import EdgeTable, EngineStep, step_of
 from ntagen.checker.errors import failing
 

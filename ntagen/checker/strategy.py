@@ -17,7 +17,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from ntagen import _checker
+import ntagen._checker as _checker
 from ntagen.checker.play import Play, played
 from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of
 from ntagen.errors import InputError, ModelError, UndecidedError

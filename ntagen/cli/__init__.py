@@ -36,7 +36,7 @@ __all__ = ["main", "verifyta"]
 
 COMMANDS: Final = {
     "compile": ("needle.compile", "Turn an environment into a UPPAAL model and its queries."),
-    "check": ("models.check", "Answer the queries of a model or an environment."),
+    "check": ("check", "Answer the queries of a model or an environment."),
     "plan": ("needle.plan", "Find the best plans of a task within a budget of time."),
     "verify": ("models.verify", "Check a trace, certificate or strategy independently."),
     "play": ("models.play", "Play a timed game against a strategy."),

@@ -41,10 +41,10 @@ def stages(task_file: Path) -> None:
         rows.append((stage, end - begin, imports - begin))
         moments.append(end)
 
-    import ntagen.cli.models.check
+    import ntagen.cli.check
 
     imported()
-    done(f"command `{ntagen.cli.models.check.command.name}`")
+    done(f"command `{ntagen.cli.check.command.name}`")
 
     import ntagen.nsl.build
     import ntagen.nsl.resolve

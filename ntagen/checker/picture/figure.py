@@ -18,8 +18,6 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ntagen.checker.picture.page import Svg
-
 _INCHES_PER_PIXEL: Final = 1.0 / 96.0
 _POINTS_PER_PIXEL: Final = 72.0 / 96.0
 _FONT_SCALE: Final = 0.87
@@ -106,12 +104,12 @@ def saved(
     return picture.getvalue()
 
 
-def converted(picture: Svg, kind: str) -> bytes:
-    """A picture of this package as the bytes of a PNG or PDF file."""
-    figure = picture.figure or figure_of(picture.text)
+def converted(svg: str, chart: Figure | None, kind: str) -> bytes:
+    """A chart, or the SVG document of a diagram, as the bytes of a PNG or PDF file."""
+    figure = chart or figure_of(svg)
     width, height = figure.get_size_inches()
     fine = min(_DPI, _MOST_PIXELS / max(width, height), math.sqrt(_MOST_AREA / (width * height)))
-    return saved(figure, kind, fine, CHART_STYLE if picture.figure else None)
+    return saved(figure, kind, fine, CHART_STYLE if chart else None)
 
 
 def figure_of(svg: str) -> Figure:

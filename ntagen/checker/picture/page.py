@@ -78,7 +78,7 @@ class Svg:
         # Matplotlib takes half a second to load, and the SVG of a diagram does not need it.
         from ntagen.checker.picture.figure import converted
 
-        write_files({Path(path): converted(self, kind)})
+        write_files({Path(path): converted(self.text, self.figure, kind)})
 
 
 def kind_of(path: str | os.PathLike[str], more: Sequence[str] = ()) -> str:

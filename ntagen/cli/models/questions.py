@@ -10,9 +10,8 @@ from ntagen.cli.models.plan_lists import LINES, Written, write_document, write_l
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options
-    from ntagen.cli.models.evidence import Outputs
+    from ntagen.cli.models.outputs import Outputs
     from ntagen.cli.models.queries import Asked
-    from ntagen.loading import Loaded
 
 
 class Questions:
@@ -49,12 +48,3 @@ class Questions:
     def completed(self, outcome: Outcome, outputs: Outputs) -> Outcome:
         """An outcome whose evidence is written, with what else is to be said of it."""
         return outcome
-
-
-def questions_about(loaded: Loaded) -> Questions:
-    """How the queries of what is loaded are asked: of a task, as those of its plans."""
-    if loaded.task is None:
-        return Questions(loaded.model)
-    from ntagen.cli.needle.task_questions import TaskQuestions
-
-    return TaskQuestions(loaded.model, loaded.task)

@@ -18,7 +18,7 @@ from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options
-    from ntagen.cli.models.evidence import Outputs
+    from ntagen.cli.models.outputs import Outputs
     from ntagen.cli.models.queries import Asked
     from ntagen.nsl import Task
     from ntagen.plan.against_tissue import Defence

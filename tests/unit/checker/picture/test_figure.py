@@ -29,7 +29,7 @@ system R, S;
 def drawn(*parts: str) -> np.ndarray:
     """The dots of a page of 100 by 100 pixels, each three colours from 0 to 1."""
     diagram = Svg(page((0.0, 0.0, 100.0, 100.0), "", parts, 12))
-    dots = imread(io.BytesIO(converted(diagram, "png")), format="png")[..., :3]
+    dots = imread(io.BytesIO(converted(diagram.text, diagram.figure, "png")), format="png")[..., :3]
     assert dots.shape == (200, 200, 3)
     return dots
 

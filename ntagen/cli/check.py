@@ -26,14 +26,15 @@ from ntagen.cli.loading import (
 from ntagen.cli.models.answer_formats import FORMATS, Format, GitHub, JsonLines, JUnit, Sarif
 from ntagen.cli.models.answer_rows import Human
 from ntagen.cli.models.cluster_runs import Spreading
-from ntagen.cli.models.evidence import Outputs, backed
+from ntagen.cli.models.evidence import backed
 from ntagen.cli.models.idle_options import idle_options, unwritten
 from ntagen.cli.models.joint_answers import joint_answers
 from ntagen.cli.models.options import SETTINGS, engine_options
 from ntagen.cli.models.outcomes import Outcome, exit_code
+from ntagen.cli.models.outputs import Outputs
 from ntagen.cli.models.plan_lists import LINES, ListLimits
 from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
-from ntagen.cli.models.questions import Questions, questions_about
+from ntagen.cli.models.questions import Questions
 from ntagen.cli.models.run_progress import progress_of, say_interrupted
 from ntagen.cli.notes import given_options, say
 from ntagen.cli.rules import overflow_rule
@@ -237,7 +238,7 @@ def command(
         todo = _queries(loaded, asked, query_path)
         if expect == "file" and not any(query.expected is not None for query in todo):
             raise InputError(_NOTHING_EXPECTED)
-    questions = questions_about(loaded)
+    questions = _questions_about(loaded)
     forms = [query.form for query in todo if query.form]
     values = click.get_current_context().params | settings
     named = given_options()
@@ -258,6 +259,15 @@ def command(
         # Where a limit came first, its note has said it.
         say(unwritten(outputs.wanted(), outputs.written))
     return exit_code(outcomes)
+
+
+def _questions_about(loaded: Loaded) -> Questions:
+    """How the queries of what is loaded are asked: of a task, as those of its plans."""
+    if loaded.task is None:
+        return Questions(loaded.model)
+    from ntagen.cli.needle.task_questions import TaskQuestions
+
+    return TaskQuestions(loaded.model, loaded.task)
 
 
 def _options(outputs: Outputs, given: dict[str, Any], settings: dict[str, Any]) -> Options:
