@@ -52,7 +52,8 @@ def stop_in(monkeypatch: pytest.MonkeyPatch) -> Stop:
                 raise LimitReached(limit, f"{now} was stopped by the {limit} limit")
             yield
 
-        for module in ("check", "evidence", "info", "plot_models", "verify"):
+        monkeypatch.setattr("ntagen.cli.check.doing", doing)
+        for module in ("evidence", "info", "plot_models", "verify"):
             monkeypatch.setattr(f"ntagen.cli.models.{module}.doing", doing)
         monkeypatch.setattr("ntagen.cli.plot.doing", doing)
 
