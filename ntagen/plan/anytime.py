@@ -181,7 +181,7 @@ def best_plans(
         scene: The scene.
         engine: Answers the questions, with its margins, ranking and memory limit.
         clock: Gives the time in seconds.
-        count: So many plans are wanted.
+        count: How many plans to find.
         budget_s: The search ends after about this time; None: when everything is settled.
 
     Raises:

@@ -42,8 +42,8 @@ STOPPED: Final = 3
     default=1,
     show_default=True,
     type=click.IntRange(min=1),
-    help="So many plans are wanted. With --rank probability, so many are compared; for the "
-    "best one, 10.",
+    help="How many plans to find. With --rank probability, that many are compared, or 10 if only "
+    "the best one is asked for.",
 )
 @click.option(
     "--within",
