@@ -7,18 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from ntagen.shapes.shape import (
-    UPRIGHT,
-    Axes,
-    Bounds,
-    Points,
-    Shape,
-    Vector,
-    around,
-    moved,
-    own_points,
-    turned,
-)
+from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Centred, Points, Vector, around, own_points
 from ntagen.values import dataclass
 
 _LEAST_RATIO: Final = 1e-10
@@ -29,7 +18,7 @@ _MOST_STEPS: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Ellipsoid(Shape):
+class Ellipsoid(Centred):
     """An ellipsoid.
 
     Attributes:
@@ -46,11 +35,6 @@ class Ellipsoid(Shape):
     radii_mm: Vector
     axes: Axes = UPRIGHT
     rounding_mm: float = 0.0
-
-    @property
-    def center_mm(self) -> Vector:
-        """The centre."""
-        return self.middle_mm
 
     @property
     def depth_mm(self) -> float:
@@ -117,11 +101,6 @@ class Ellipsoid(Shape):
         edges = _over_sphere(a * a, b * b, c * c)
         surface = a * b * c * _over_sphere(a**-2, b**-2, c**-2)
         return volume + r * (surface + r * (edges + r * 4.0 / 3.0 * math.pi))
-
-    def placed(self, axes: Axes, shift_mm: Vector) -> Ellipsoid:
-        """The ellipsoid at another place."""
-        middle_mm = moved(axes, shift_mm, self.middle_mm)
-        return replace(self, middle_mm=middle_mm, axes=turned(axes, self.axes))
 
     def grown(self, by_mm: float) -> Ellipsoid:
         """The ellipsoid with a greater rounding."""

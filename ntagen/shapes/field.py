@@ -17,6 +17,7 @@ is that of the outside of the solid, with its sign turned.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -25,13 +26,12 @@ from typing import Final
 from ntagen.shapes.shape import (
     Axes,
     Bounds,
+    Centred,
     Points,
-    Shape,
     Vector,
     along,
     moved,
     own_points,
-    turned,
     vector_of,
 )
 from ntagen.values import dataclass
@@ -44,7 +44,7 @@ _PIECE: Final = 2**16
 
 
 @dataclass(frozen=True, slots=True)
-class Field(Shape):
+class Field(Centred):
     """A solid, as signed distances at the points of a grid.
 
     Attributes:
@@ -67,6 +67,8 @@ class Field(Shape):
             negative, the points at least so deep inside.
     """
 
+    places = ("corner_mm", "middle_mm")
+
     corner_mm: Vector
     axes: Axes
     extent_mm: Vector
@@ -81,11 +83,6 @@ class Field(Shape):
     body_mm3: float
     is_inner: bool = False
     rounding_mm: float = 0.0
-
-    @property
-    def center_mm(self) -> Vector:
-        """A point deep inside."""
-        return self.middle_mm
 
     @property
     def depth_mm(self) -> float:
@@ -192,18 +189,12 @@ class Field(Shape):
 
     def bounds_mm(self) -> Bounds:
         """The bounds of its box along its own axes, with the rounding on each side."""
-        axes, r = self.axes, self.rounding_mm
-        low = tuple(a - r for a in self.low_mm)
-        high = tuple(b + r for b in self.high_mm)
-        ends = [
-            moved(axes, self.corner_mm, (x, y, z))
-            for x in (low[0], high[0])
-            for y in (low[1], high[1])
-            for z in (low[2], high[2])
-        ]
-        a, b, c = (min(end[i] for end in ends) for i in range(3))
-        d, e, f = (max(end[i] for end in ends) for i in range(3))
-        return (a, b, c), (d, e, f)
+        r = self.rounding_mm
+        sides = [(a - r, b + r) for a, b in zip(self.low_mm, self.high_mm, strict=True)]
+        corners = map(vector_of, itertools.product(*sides))
+        ends = [moved(self.axes, self.corner_mm, corner) for corner in corners]
+        columns = list(zip(*ends, strict=True))
+        return vector_of(map(min, columns)), vector_of(map(max, columns))
 
     def volume_mm3(self) -> float:
         """The volume; what a rounding adds is counted in the grid, to a few percent."""
@@ -219,15 +210,6 @@ class Field(Shape):
 
         cell_mm3 = math.prod(self.steps_mm)
         return max(0.0, self.body_mm3 + cell_mm3 * (filled(self.rounding_mm) - filled(0.0)))
-
-    def placed(self, axes: Axes, shift_mm: Vector) -> Field:
-        """The field at another place."""
-        return replace(
-            self,
-            corner_mm=moved(axes, shift_mm, self.corner_mm),
-            middle_mm=moved(axes, shift_mm, self.middle_mm),
-            axes=turned(axes, self.axes),
-        )
 
     def grown(self, by_mm: float) -> Field:
         """The field with a greater rounding."""

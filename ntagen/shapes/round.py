@@ -6,23 +6,30 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from ntagen.shapes.shape import Axes, Bounds, Points, Shape, Vector, along, around, moved
+from ntagen.shapes.shape import (
+    Axes,
+    Bounds,
+    Centred,
+    Points,
+    Shape,
+    Vector,
+    along,
+    around,
+    between,
+    moved,
+    vector_of,
+)
 from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Sphere(Shape):
+class Sphere(Centred):
     """All points at most `radius_mm` from `middle_mm`."""
 
     is_convex = True
 
     middle_mm: Vector
     radius_mm: float
-
-    @property
-    def center_mm(self) -> Vector:
-        """The centre."""
-        return self.middle_mm
 
     @property
     def depth_mm(self) -> float:
@@ -47,10 +54,6 @@ class Sphere(Shape):
     def volume_mm3(self) -> float:
         """The volume."""
         return 4.0 / 3.0 * math.pi * self.radius_mm**3
-
-    def placed(self, axes: Axes, shift_mm: Vector) -> Sphere:
-        """The sphere at another place."""
-        return Sphere(moved(axes, shift_mm, self.middle_mm), self.radius_mm)
 
     def grown(self, by_mm: float) -> Sphere:
         """The sphere with a greater radius."""
@@ -78,6 +81,7 @@ class Capsule(Shape):
     """
 
     is_convex = True
+    places = ("start_mm", "end_mm")
 
     start_mm: Vector
     end_mm: Vector
@@ -95,8 +99,7 @@ class Capsule(Shape):
         length = self.length_mm
         ahead = 0.5 * (length + self.end_radius_mm - self.start_radius_mm)
         share = min(1.0, max(0.0, ahead / length)) if length > 0.0 else 0.0
-        x, y, z = (a + share * (b - a) for a, b in zip(self.start_mm, self.end_mm, strict=True))
-        return (x, y, z)
+        return between(self.start_mm, self.end_mm, share)
 
     @property
     def depth_mm(self) -> float:
@@ -166,14 +169,6 @@ class Capsule(Shape):
         frustum = math.pi * height / 3.0 * (wide**2 + wide * narrow + narrow**2)
         return frustum + _cap(big, big * (1.0 + share)) + _cap(small, small * (1.0 - share))
 
-    def placed(self, axes: Axes, shift_mm: Vector) -> Capsule:
-        """The capsule at another place."""
-        return replace(
-            self,
-            start_mm=moved(axes, shift_mm, self.start_mm),
-            end_mm=moved(axes, shift_mm, self.end_mm),
-        )
-
     def grown(self, by_mm: float) -> Capsule:
         """The capsule with greater radii; one that would be smaller than 0 cuts it shorter."""
         start, end = self.start_radius_mm + by_mm, self.end_radius_mm + by_mm
@@ -181,10 +176,10 @@ class Capsule(Shape):
             return replace(self, start_radius_mm=start, end_radius_mm=end)
         # What is left ends where the radius has fallen to 0.
         share = start / (start - end)
-        x, y, z = (a + share * (b - a) for a, b in zip(self.start_mm, self.end_mm, strict=True))
+        tip_mm = between(self.start_mm, self.end_mm, share)
         if start < 0.0:
-            return Capsule((x, y, z), self.end_mm, 0.0, end)
-        return Capsule(self.start_mm, (x, y, z), start, 0.0)
+            return Capsule(tip_mm, self.end_mm, 0.0, end)
+        return Capsule(self.start_mm, tip_mm, start, 0.0)
 
     def parts(self) -> Iterator[tuple[str, tuple[float, ...], bool]]:
         """Ends and radii."""
@@ -257,8 +252,8 @@ class HalfSpace(Shape):
 
     def grown(self, by_mm: float) -> HalfSpace:
         """The half-space with its plane moved outwards."""
-        x, y, z = (p - by_mm * t for p, t in zip(self.point_mm, self.towards, strict=True))
-        return HalfSpace((x, y, z), self.towards)
+        pairs = zip(self.point_mm, self.towards, strict=True)
+        return replace(self, point_mm=vector_of(p - by_mm * t for p, t in pairs))
 
     def parts(self) -> Iterator[tuple[str, tuple[float, ...], bool]]:
         """Point and direction."""

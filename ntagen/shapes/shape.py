@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, ClassVar, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
 if TYPE_CHECKING:
     import numpy as np
@@ -44,6 +45,9 @@ class Shape(ABC):
     is_convex: ClassVar[bool] = False
     """Whether it contains all straight ways between its points; then its distance is a convex
     function, inside too, and the least one along an arc is found sooner."""
+
+    places: ClassVar[tuple[str, ...]]
+    """The names of the fields that are points in the world."""
 
     @property
     @abstractmethod
@@ -87,9 +91,13 @@ class Shape(ABC):
     def volume_mm3(self) -> float:
         """The volume in mm^3."""
 
-    @abstractmethod
-    def placed(self, axes: Axes, shift_mm: Vector) -> Shape:
+    def placed(self, axes: Axes, shift_mm: Vector) -> Self:
         """The shape turned about the origin, so that x, y, z become these axes, and then moved."""
+        shape: Any = self
+        changed = {name: moved(axes, shift_mm, getattr(shape, name)) for name in self.places}
+        own = {"axes": turned(axes, shape.axes)} if hasattr(shape, "axes") else {}
+        made: Self = replace(shape, **changed, **own)
+        return made
 
     @abstractmethod
     def grown(self, by_mm: float) -> Shape:
@@ -108,10 +116,30 @@ class Shape(ABC):
         """The radius of a ball about `center_mm` that contains the shape."""
 
 
+class Centred(Shape):
+    """A shape about a point of its own."""
+
+    __slots__ = ()
+
+    places: ClassVar[tuple[str, ...]] = ("middle_mm",)
+    middle_mm: Vector
+    """The point."""
+
+    @property
+    def center_mm(self) -> Vector:
+        """The point."""
+        return self.middle_mm
+
+
 def vector_of(numbers: Iterable[float]) -> Vector:
     """Three numbers, such as those of an array, as a vector."""
     x, y, z = map(float, numbers)
     return (x, y, z)
+
+
+def between(start_mm: Vector, end_mm: Vector, share: float) -> Vector:
+    """The point at a share of the way."""
+    return vector_of(a + share * (b - a) for a, b in zip(start_mm, end_mm, strict=True))
 
 
 def along(axes: Axes, own: Vector) -> Vector:
@@ -163,8 +191,7 @@ def turning(axis: Vector, angle_rad: float) -> Axes:
 def own_point(point_mm: Vector, center_mm: Vector, axes: Axes) -> Vector:
     """A point seen from a centre along own axes."""
     seen = tuple(p - c for p, c in zip(point_mm, center_mm, strict=True))
-    x, y, z = (sum(s * a for s, a in zip(seen, axis, strict=True)) for axis in axes)
-    return (x, y, z)
+    return vector_of(sum(s * a for s, a in zip(seen, axis, strict=True)) for axis in axes)
 
 
 def own_points(points: Points, center_mm: Vector, axes: Axes) -> Points:

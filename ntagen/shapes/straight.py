@@ -10,21 +10,21 @@ from ntagen.shapes.shape import (
     UPRIGHT,
     Axes,
     Bounds,
+    Centred,
     Points,
     Shape,
     Vector,
     around,
-    moved,
+    between,
     own_point,
     own_points,
-    turned,
     vector_of,
 )
 from ntagen.values import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Box(Shape):
+class Box(Centred):
     """A cuboid.
 
     Attributes:
@@ -40,11 +40,6 @@ class Box(Shape):
     size_mm: Vector
     axes: Axes = UPRIGHT
     rounding_mm: float = 0.0
-
-    @property
-    def center_mm(self) -> Vector:
-        """The centre."""
-        return self.middle_mm
 
     @property
     def depth_mm(self) -> float:
@@ -79,11 +74,6 @@ class Box(Shape):
         surface, edges = 2.0 * (a * b + b * c + c * a), math.pi * (a + b + c)
         return a * b * c + r * (surface + r * (edges + r * 4.0 / 3.0 * math.pi))
 
-    def placed(self, axes: Axes, shift_mm: Vector) -> Box:
-        """The box at another place."""
-        middle_mm = moved(axes, shift_mm, self.middle_mm)
-        return replace(self, middle_mm=middle_mm, axes=turned(axes, self.axes))
-
     def grown(self, by_mm: float) -> Box:
         """The box with a greater rounding; a smaller one loses its rounding first."""
         rounding_mm = self.rounding_mm + by_mm
@@ -115,6 +105,7 @@ class Cylinder(Shape):
     """
 
     is_convex = True
+    places = ("start_mm", "end_mm")
 
     start_mm: Vector
     end_mm: Vector
@@ -176,14 +167,6 @@ class Cylinder(Shape):
         edges = math.pi * (height + math.pi * radius)
         return math.pi * radius**2 * height + r * (surface + r * (edges + r * 4 / 3 * math.pi))
 
-    def placed(self, axes: Axes, shift_mm: Vector) -> Cylinder:
-        """The cylinder at another place."""
-        return replace(
-            self,
-            start_mm=moved(axes, shift_mm, self.start_mm),
-            end_mm=moved(axes, shift_mm, self.end_mm),
-        )
-
     def grown(self, by_mm: float) -> Cylinder:
         """The cylinder with a greater rounding; a smaller one loses its rounding first."""
         rounding_mm = self.rounding_mm + by_mm
@@ -192,8 +175,8 @@ class Cylinder(Shape):
         # A cylinder that is too short to lose so much keeps no length, and has no depth.
         share = min(0.5, -rounding_mm / self.length_mm)
         return Cylinder(
-            _between(self.start_mm, self.end_mm, share),
-            _between(self.end_mm, self.start_mm, share),
+            between(self.start_mm, self.end_mm, share),
+            between(self.end_mm, self.start_mm, share),
             self.radius_mm + rounding_mm,
         )
 
@@ -222,8 +205,3 @@ def _one_beyond(*excess: float) -> float:
     """The same for one point."""
     outside = math.hypot(*(max(one, 0.0) for one in excess))
     return outside + min(max(excess), 0.0)
-
-
-def _between(start_mm: Vector, end_mm: Vector, share: float) -> Vector:
-    """The point at a share of the way."""
-    return vector_of(a + share * (b - a) for a, b in zip(start_mm, end_mm, strict=True))
