@@ -136,12 +136,8 @@ def grid_over(axes: Axes, bounds: Bounds, wish: Wish, finest_mm: float = LEAST_S
             f"write for example `grid {math.ceil(12.0 * coarse) / 10.0:g} mm`, "
             "or a shorter `length` of the needle",
         )
-    return Grid(
-        axes,
-        (low[0], low[1], low[2]),
-        (extent[0], extent[1], extent[2]),
-        (counts[0], counts[1], counts[2]),
-    )
+    x, y, z = counts
+    return Grid(axes, vector_of(low), vector_of(extent), (x, y, z))
 
 
 def _dot(one: Vector, two: Vector) -> float:

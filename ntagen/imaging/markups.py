@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from ntagen.files import json_of
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.space import Space, rigid
 from ntagen.shapes import Box, Capsule, Shape, Sphere, Vector
@@ -60,8 +60,7 @@ def read_marks(path: str, radius_mm: float | None, point: str | None = None) -> 
     except (
         *(ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError),
     ) as error:
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` is no file of markups: {type(error).__name__} {error}"[:160],
             "save the markups once more, as .mrk.json",
         ) from None
@@ -121,8 +120,7 @@ def _marks(
             yield Mark(label, Sphere(place, radius_mm), space)
         return
     if kind not in ("Line", "Curve", "ClosedCurve"):
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` has markups of the kind {kind}, which have no shape here",
             "use points, lines, curves or boxes (ROI)",
         )
@@ -137,9 +135,7 @@ def _box(path: str, entry: Mapping[str, Any], unit_mm: float) -> Box:
     """A box of any turn."""
     size = _vector(path, entry["size"], unit_mm)
     if min(size) <= 0.0:
-        raise ImageError(
-            "image-malformed", f"a box of `{path}` has the size {size}", "draw it once more"
-        )
+        raise malformed(f"a box of `{path}` has the size {size}", "draw it once more")
     turn = [float(number) for number in entry.get("orientation", (1, 0, 0, 0, 1, 0, 0, 0, 1))]
     center = _vector(path, entry["center"], unit_mm)
     rows = [[*turn[3 * i : 3 * i + 3], center[i]] for i in range(3)]
@@ -150,7 +146,5 @@ def _box(path: str, entry: Mapping[str, Any], unit_mm: float) -> Box:
 def _vector(path: str, numbers: Any, unit_mm: float) -> Vector:  # noqa: ANN401  any JSON
     x, y, z = (float(number) * unit_mm for number in numbers)
     if not all(map(math.isfinite, (x, y, z))):
-        raise ImageError(
-            "image-malformed", f"`{path}` has a point that is not finite", "save it once more"
-        )
+        raise malformed(f"`{path}` has a point that is not finite")
     return (x, y, z)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from ntagen.files import open_file
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.obj import read_obj
 from ntagen.imaging.ply import read_ply
 from ntagen.imaging.reading import bytes_of
@@ -67,8 +67,7 @@ def read_mesh(path: str) -> Mesh:
     """
     kind = path.rpartition(".")[2].lower()
     if kind not in _READERS:
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` is no mesh that can be read",
             "name a file that ends with .stl, .obj or .ply",
         )
@@ -98,18 +97,14 @@ def checked(
     import numpy as np
 
     if not len(triangles):
-        raise ImageError(
-            "image-malformed", f"`{path}` has no triangles", "export the surface, not its points"
-        )
+        raise malformed(f"`{path}` has no triangles", "export the surface, not its points")
     if not np.isfinite(vertices).all():
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` has points that are not finite numbers (NaN or infinite)",
             "export it once more",
         )
     if np.abs(vertices).max() > _FARTHEST:
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` has a point {np.abs(vertices).max():.3g} units away from its origin",
             "export it once more",
         )

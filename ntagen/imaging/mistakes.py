@@ -39,3 +39,8 @@ class ImageError(InputError):
         self.defect = defect
         self.message = message
         self.hint = hint
+
+
+def malformed(message: str, hint: str = "save it once more") -> ImageError:
+    """The error of a file that is not what its name says."""
+    return ImageError("image-malformed", message, hint)

@@ -12,7 +12,7 @@ import math
 import zlib
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.volumes import Encoding, Packed, Volume, refuse_many, unpacking
 
@@ -66,9 +66,7 @@ def read_nifti(path: str, matrix: Matrix | None) -> Volume:
     refuse_many(path, sizes)
     if len(sizes) < 3 or math.prod(sizes[3:]) != 1:
         shown = len([size for size in sizes if size > 1])
-        raise ImageError(
-            "image-malformed", f"`{path}` has {shown} dimensions, not 3", "save one volume"
-        )
+        raise malformed(f"`{path}` has {shown} dimensions, not 3", "save one volume")
     offset = float(header["vox_offset"])
     if not _HEADER_BYTES[_version(data, encoding)] <= offset < 2**31 or offset % 1.0:
         raise _wrong(path, "vox_offset", offset, "where no voxels can begin")
@@ -195,12 +193,8 @@ def _affine(
 
 
 def _wrong(path: str, field: str, value: float, why: str) -> ImageError:
-    return ImageError(
-        "image-malformed", f"`{field}` in `{path}` is {value:g}, {why}", "save it once more"
-    )
+    return malformed(f"`{field}` in `{path}` is {value:g}, {why}")
 
 
 def _no_nifti(path: str, why: str) -> ImageError:
-    return ImageError(
-        "image-malformed", f"`{path}` is no NIfTI file: {why[:120]}", "save it once more"
-    )
+    return malformed(f"`{path}` is no NIfTI file: {why[:120]}")

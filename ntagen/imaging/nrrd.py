@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.space import Space
 from ntagen.imaging.volumes import Encoding, Packed, Segment, Volume, refuse_many
@@ -80,6 +80,9 @@ _FIELDS: Final = frozenset(
         "measurement frame",
     }
 )
+_VECTOR: Final = r"\([^()]*\)|\S+"
+"""Some writers put spaces behind the commas of a vector."""
+
 _Value = TypeVar("_Value")
 
 
@@ -102,10 +105,15 @@ class Header:
     def wrong(self, field: str, why: str, hint: str = "save it once more") -> ImageError:
         """The error of a field."""
         shown = f"{field}: {self.fields[field]}" if field in self.fields else field
-        return ImageError("image-malformed", f"`{shown[:80]}` in `{self.path}`: {why}", hint)
+        return malformed(f"`{shown[:80]}` in `{self.path}`: {why}", hint)
 
-    def values(self, field: str, read: Callable[[str], _Value]) -> list[_Value]:
+    def values(self, field: str, read: Callable[[str], _Value], word: str = r"\S+") -> list[_Value]:
         """The values of a field that has one for each axis, say; none if there is no such field.
+
+        Args:
+            field: Its name.
+            read: Reads a value.
+            word: The pattern of a value.
 
         Raises:
             ImageError: They cannot be read.
@@ -114,7 +122,7 @@ class Header:
         try:
             if "_" in text:  # Python takes it for a part of a number.
                 raise ValueError(text)
-            return [read(word) for word in text.split()]
+            return [read(found) for found in re.findall(word, text)]
         except (ValueError, OverflowError):
             raise self.wrong(field, "this is no list of such values") from None
 
@@ -179,10 +187,8 @@ def _header(path: str, data: bytes) -> Header:
     """
     magic = re.match(rb"NRRD000[1-5]\r?\n", data)
     if magic is None:
-        raise ImageError(
-            "image-malformed",
-            f"`{path}` is no NRRD file: it does not begin with `NRRD0001` to `NRRD0005`",
-            "save it once more",
+        raise malformed(
+            f"`{path}` is no NRRD file: it does not begin with `NRRD0001` to `NRRD0005`"
         )
     fields: dict[str, str] = {}
     keys: dict[str, str] = {}
@@ -192,9 +198,7 @@ def _header(path: str, data: bytes) -> Header:
         if end < 0:
             end = len(data)
         if end >= _HEADER_BYTES:
-            raise ImageError(
-                "image-malformed", f"the header of `{path}` has no end", "save it once more"
-            )
+            raise malformed(f"the header of `{path}` has no end")
         line = data[at:end].decode("utf-8", "replace").rstrip()
         at = end + 1
         if not line:
@@ -203,24 +207,17 @@ def _header(path: str, data: bytes) -> Header:
             continue
         name, colon, value = line.partition(":")
         if not colon:
-            raise ImageError(
-                "image-malformed",
-                f"`{line[:60]}` in the header of `{path}` is neither a field nor a key",
-                "save it once more",
-            )
+            raise malformed(f"`{line[:60]}` in the header of `{path}` is neither a field nor a key")
         is_key = value.startswith("=")
         found, name = (keys, name.strip()) if is_key else (fields, name.strip().lower())
         name = name if is_key else _BOTH_WAYS.get(name, name)
         if not is_key and name not in _FIELDS:
-            raise ImageError(
-                "image-malformed",
+            raise malformed(
                 f"`{line[:60]}` in the header of `{path}` is no field of NRRD",
                 "remove this line, or write `:=` if it is a key",
             )
         if name in found:
-            raise ImageError(
-                "image-malformed", f"`{name[:60]}` stands twice in `{path}`", "remove one of them"
-            )
+            raise malformed(f"`{name[:60]}` stands twice in `{path}`", "remove one of them")
         found[name] = _unescaped(value[1:].strip()) if is_key else value.strip()
     return Header(path, fields, keys, at)
 
@@ -273,15 +270,8 @@ def _directions(
     Raises:
         ImageError: They are missing, or of another dimension.
     """
-    # Some writers put spaces behind the commas of a vector.
-    closed = {
-        field: re.sub(r"\s*,\s*|(?<=\()\s+|\s+(?=\))", lambda m: m[0].strip(), text)
-        for field, text in header.fields.items()
-        if field in ("space directions", "space origin")
-    }
-    tight = Header(header.path, {**header.fields, **closed}, header.keys, header.end)
-    directions = tight.values("space directions", _vector)
-    origins = tight.values("space origin", _vector)
+    directions = header.values("space directions", _vector, _VECTOR)
+    origins = header.values("space origin", _vector, _VECTOR)
     if not directions or not origins:
         raise ImageError(
             "matrix-degenerate",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ntagen.imaging.surface_files import Surface, lines_of, malformed
+from ntagen.imaging.surface_files import Surface, lines_of, wrong_surface
 
 if TYPE_CHECKING:
     import numpy as np
@@ -48,7 +48,7 @@ def read_obj(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.in
             surface.add_face(_corners(surface, words[1:], number), f"in line {number:,}")
         else:
             shown = line.decode("utf-8", "replace")[:60]
-            raise malformed(
+            raise wrong_surface(
                 path, f"has no line of a mesh of triangles in line {number:,}: `{shown}`"
             )
     return surface.arrays()
@@ -62,7 +62,7 @@ def _add_point(surface: Surface, words: list[bytes], line: int) -> None:
         except ValueError:
             is_one = False
         if not is_one:
-            raise malformed(surface.path, f"has a point with a weight in line {line:,}")
+            raise wrong_surface(surface.path, f"has a point with a weight in line {line:,}")
     surface.add_point(words if len(words) not in (4, 6, 7) else words[:3], line)
 
 
@@ -76,7 +76,7 @@ def _corners(surface: Surface, words: list[bytes], line: int) -> list[int]:
             number = 0
         if not 0 < abs(number) <= max(surface.count, number):
             shown = word.decode("utf-8", "replace")[:40]
-            raise malformed(
+            raise wrong_surface(
                 surface.path,
                 f"has a face with the point `{shown}` in line {line:,}, and {surface.count:,} "
                 "points before it",

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from ntagen.imaging.mistakes import ImageError
-from ntagen.imaging.surface_files import Surface, lines_of, malformed, refuse_many
+from ntagen.imaging.surface_files import Surface, lines_of, refuse_many, wrong_surface
 
 if TYPE_CHECKING:
     import numpy as np
@@ -68,13 +68,13 @@ def read_ply(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.in
     order, elements, start = _header(data, path)
     for element in elements:
         if element.name == "tristrips":
-            raise malformed(path, "has strips of triangles (`tristrips`)", "export triangles")
+            raise wrong_surface(path, "has strips of triangles (`tristrips`)", "export triangles")
         is_face = element.name == "face"
         refuse_many(path, element.count if is_face else 0, element.count)
         least = element.least_bytes if order else 2 * len(element.properties)
         if element.count * max(1, least) > len(data) - start + 1:
             why = f"says that it has {element.count:,} of `{element.name}`, and is too short for it"
-            raise malformed(path, why, "was the file cut off? export it once more")
+            raise wrong_surface(path, why, "was the file cut off? export it once more")
     surface = Surface(path)
     body = _Binary(data, path, order, start) if order else _Text(data, path, start)
     for element in elements:
@@ -100,9 +100,9 @@ def _place(element: _Element, names: Sequence[str], path: str, *, is_list: bool)
     found = [i for i, one in enumerate(element.properties) if one.name in names]
     if len(found) != 1 or (element.properties[found[0]].length is not None) != is_list:
         kind = "list" if is_list else "number"
-        raise malformed(path, f"needs one {kind} `{names[0]}` for each `{element.name}`")
+        raise wrong_surface(path, f"needs one {kind} `{names[0]}` for each `{element.name}`")
     if is_list and element.properties[found[0]].code in "fd":
-        raise malformed(path, f"counts the points in `{names[0]}` with fractions")
+        raise wrong_surface(path, f"counts the points in `{names[0]}` with fractions")
     return found[0]
 
 
@@ -144,19 +144,19 @@ class _Text:
                 raise ValueError(at)
         except (ValueError, IndexError):
             why = f"has no `{element.name}` in line {self._number:,} behind the header"
-            raise malformed(self._path, why) from None
+            raise wrong_surface(self._path, why) from None
         return row
 
     def points(self, element: _Element, surface: Surface) -> None:
         """Adds the points of all elements."""
         places = [_place(element, (name,), self._path, is_list=False) for name in "xyz"]
         if any(one.length is not None for one in element.properties):
-            raise malformed(self._path, "has lists at its points", "export the surface alone")
+            raise wrong_surface(self._path, "has lists at its points", "export the surface alone")
         for _ in range(element.count):
             words = self._words()
             if len(words) != len(element.properties):
                 why = f"has no `vertex` in line {self._number:,} behind the header"
-                raise malformed(self._path, why)
+                raise wrong_surface(self._path, why)
             surface.add_point([words[place] for place in places], self._number)
 
     def skip(self, element: _Element) -> None:
@@ -171,7 +171,9 @@ class _Text:
             ImageError: Something does.
         """
         if self._words():
-            raise malformed(self._path, f"has more lines than its header says ({self._number:,})")
+            raise wrong_surface(
+                self._path, f"has more lines than its header says ({self._number:,})"
+            )
 
 
 class _Binary:
@@ -181,7 +183,9 @@ class _Binary:
         self._data, self._path, self._order, self._at = data, path, order, start
 
     def _cut(self) -> ImageError:
-        return malformed(self._path, "is too short", "was the file cut off? export it once more")
+        return wrong_surface(
+            self._path, "is too short", "was the file cut off? export it once more"
+        )
 
     def _take(self, code: str, count: int) -> tuple[float, ...]:
         size = count * struct.calcsize("<" + code)
@@ -201,7 +205,7 @@ class _Binary:
         for one in element.properties:
             count = 1 if one.length is None else int(self._take(one.length, 1)[0])
             if count < 0:
-                raise malformed(self._path, f"has a list of {count} values")
+                raise wrong_surface(self._path, f"has a list of {count} values")
             row.append(self._take(one.code, count))
         return row
 
@@ -215,7 +219,7 @@ class _Binary:
 
         places = [_place(element, (name,), self._path, is_list=False) for name in "xyz"]
         if any(one.length is not None for one in element.properties):
-            raise malformed(self._path, "has lists at its points", "export the surface alone")
+            raise wrong_surface(self._path, "has lists at its points", "export the surface alone")
         codes = [self._order + one.code for one in element.properties]
         kind = np.dtype([(f"p{i}", code) for i, code in enumerate(codes)])
         if element.count * kind.itemsize > len(self._data) - self._at:
@@ -243,7 +247,7 @@ class _Binary:
         if self._at > len(self._data):
             raise self._cut()
         if behind := len(self._data) - self._at:
-            raise malformed(self._path, f"has {behind:,} bytes behind its last element")
+            raise wrong_surface(self._path, f"has {behind:,} bytes behind its last element")
 
 
 def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
@@ -260,7 +264,7 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
         words = line.decode("ascii", "replace").split()
         if at == len(line):
             if words != ["ply"]:
-                raise malformed(path, "is no PLY file: it does not begin with `ply`")
+                raise wrong_surface(path, "is no PLY file: it does not begin with `ply`")
             continue
         match words:
             case ["comment" | "obj_info", *_] | []:
@@ -269,7 +273,7 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
                 order = _FORMATS[kind]
             case ["element", name, count] if re.fullmatch("[0-9]{1,18}", count):
                 if any(one.name == name for one in elements):
-                    raise malformed(path, f"has the element `{name[:40]}` twice")
+                    raise wrong_surface(path, f"has the element `{name[:40]}` twice")
                 elements.append(_Element(name, int(count), []))
             case ["property", "list", length, code, name] if (
                 elements and code in _TYPES and _TYPES.get(length, "f") not in "fd"
@@ -281,5 +285,5 @@ def _header(data: bytes, path: str) -> tuple[str, list[_Element], int]:
                 return order, elements, at
             case _:
                 shown = " ".join(words)[:60]
-                raise malformed(path, f"has a header that cannot be read, at `{shown}`")
-    raise malformed(path, "has a header without an end")
+                raise wrong_surface(path, f"has a header that cannot be read, at `{shown}`")
+    raise wrong_surface(path, "has a header without an end")

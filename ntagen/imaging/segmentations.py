@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.nifti import Matrix, read_nifti
 from ntagen.imaging.nrrd import data_file_of, read_nrrd
 from ntagen.imaging.space import Rigid, Space, rigid
 from ntagen.imaging.volumes import Volume, voxels_of
-from ntagen.shapes import Vector
+from ntagen.shapes import Vector, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -73,8 +73,7 @@ def read_mask(path: str, part: Part) -> Mask:
     """
     name = path.lower()
     if not name.endswith((*_NRRD, *_NIFTI)):
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"`{path}` is no segmentation that can be read",
             "name a file that ends with .nrrd, .seg.nrrd, .nhdr, .nii or .nii.gz",
         )
@@ -142,11 +141,11 @@ def _mask(volume: Volume, part: Part) -> Mask:
     axes = np.array(frame.axes)
     ends = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * (last - first)
     off = ends @ rows - (ends * spacing) @ axes
-    x, y, z = map(float, np.array(frame.shift_mm) - (middle * spacing) @ axes)
+    shift = np.array(frame.shift_mm) - (middle * spacing) @ axes
     return Mask(
         voxels=cut,
-        spacing=(float(spacing[0]), float(spacing[1]), float(spacing[2])),
-        frame=Rigid(frame.axes, (x, y, z)),
+        spacing=vector_of(spacing),
+        frame=Rigid(frame.axes, vector_of(shift)),
         doubt=float(np.linalg.norm(off, axis=1).max()),
         space=volume.space,
         said=volume.said,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Literal
 
 from ntagen.imaging.mistakes import ImageError
-from ntagen.shapes import UPRIGHT, Axes, Vector, vector_of
+from ntagen.shapes import UPRIGHT, Axes, Vector, axes_of, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -48,20 +48,15 @@ class Rigid:
         """The motion `first`, and then this one."""
         import numpy as np
 
-        a, b, c = (tuple(map(float, row)) for row in np.array(first.axes) @ np.array(self.axes))
-        return Rigid(
-            ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])),
-            self.point(first.shift_mm),
-        )
+        axes = np.array(first.axes) @ np.array(self.axes)
+        return Rigid(axes_of(axes), self.point(first.shift_mm))
 
     def inverse(self) -> Rigid:
         """The motion back."""
         import numpy as np
 
         matrix = np.array(self.axes)
-        a, b, c = (tuple(map(float, row)) for row in matrix.T)
-        x, y, z = map(float, -(np.array(self.shift_mm) @ matrix.T))
-        return Rigid(((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])), (x, y, z))
+        return Rigid(axes_of(matrix.T), vector_of(-(np.array(self.shift_mm) @ matrix.T)))
 
 
 HALF_TURN: Final = Rigid(((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)))
@@ -115,9 +110,4 @@ def rigid(rows: Sequence[Sequence[float]], what: str) -> Rigid:
     if np.linalg.det(matrix) < 0.0:
         raise ImageError("matrix-degenerate", f"{what} mirrors: its determinant is -1", hint)
     left, _, right = np.linalg.svd(matrix)
-    turn = left @ right
-    a, b, c = (tuple(map(float, column)) for column in turn.T)
-    return Rigid(
-        ((a[0], a[1], a[2]), (b[0], b[1], b[2]), (c[0], c[1], c[2])),
-        (shift[0], shift[1], shift[2]),
-    )
+    return Rigid(axes_of((left @ right).T), vector_of(shift))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from ntagen.imaging.surface_files import Surface, lines_of, malformed, refuse_many
+from ntagen.imaging.surface_files import Surface, lines_of, refuse_many, wrong_surface
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,15 +38,15 @@ def read_stl(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.in
     if is_text(data[:4096]) and behind:
         return _text(data, path)
     if len(data) < _HEAD_BYTES:
-        raise malformed(path, f"is no STL file: it has {len(data)} bytes and no word `solid`")
+        raise wrong_surface(path, f"is no STL file: it has {len(data)} bytes and no word `solid`")
     refuse_many(path, count)
     if behind < 0:
         whole = (len(data) - _HEAD_BYTES) // _TRIANGLE_BYTES
         why = f"says that it has {count:,} triangles, and has bytes for {whole:,}"
-        raise malformed(path, why, "was the file cut off? export it once more")
+        raise wrong_surface(path, why, "was the file cut off? export it once more")
     if behind > 0:
         why = f"has {behind:,} bytes behind the last of its {count:,} triangles"
-        raise malformed(path, why, "was it written over a longer file? export it once more")
+        raise wrong_surface(path, why, "was it written over a longer file? export it once more")
     kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
     triangles = np.frombuffer(data, dtype=kind, count=count, offset=_HEAD_BYTES)
     with np.errstate(invalid="ignore"):  # A NaN that signals is one as well.
@@ -77,7 +77,7 @@ def _text(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.int64
         expected, then = _LINES.get(words[0], (None, place))
         if expected != place:
             shown = line.decode("utf-8", "replace").strip()[:60]
-            raise malformed(path, f"is no STL file: `{shown}` cannot stand in line {number:,}")
+            raise wrong_surface(path, f"is no STL file: `{shown}` cannot stand in line {number:,}")
         place = then
         if words[0] == b"vertex":
             surface.add_point(words[1:], number)
@@ -86,9 +86,9 @@ def _text(data: bytes, path: str) -> tuple[NDArray[np.float64], NDArray[np.int64
         elif words[0] == b"endloop":
             if surface.count - start != 3:
                 why = f"has a facet with {surface.count - start} corners in line {number:,}"
-                raise malformed(path, why)
+                raise wrong_surface(path, why)
             surface.add_face((start, start + 1, start + 2), "")
     if place != "outside":
         hint = "was the file cut off? export it once more"
-        raise malformed(path, f"ends in a facet, in line {number:,}", hint)
+        raise wrong_surface(path, f"ends in a facet, in line {number:,}", hint)
     return surface.arrays()

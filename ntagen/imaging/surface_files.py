@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,9 +21,9 @@ _MOST_LINES: Final = 20 * MOST_TRIANGLES
 _LINE_BYTES: Final = 2**20
 
 
-def malformed(path: str, why: str, hint: str = "export it once more") -> ImageError:
+def wrong_surface(path: str, why: str, hint: str = "export it once more") -> ImageError:
     """The error of a file that is not what its name says."""
-    return ImageError("image-malformed", f"`{path}` {why}", hint)
+    return malformed(f"`{path}` {why}", hint)
 
 
 def refuse_many(path: str, triangles: int, points: int = 0) -> None:
@@ -94,7 +94,7 @@ class Surface:
             x, y, z = map(float, words)
         except ValueError:
             shown = b" ".join(words).decode("utf-8", "replace")[:60]
-            raise malformed(self.path, f"has no point in line {line:,}: `{shown}`") from None
+            raise wrong_surface(self.path, f"has no point in line {line:,}: `{shown}`") from None
         self.points.extend((x, y, z))
         if self.count > MOST_POINTS:
             refuse_many(self.path, 0, self.count)
@@ -107,10 +107,12 @@ class Surface:
                 many triangles.
         """
         if len(numbers) < 3:
-            raise malformed(self.path, f"has a face with {len(numbers)} corners {where}")
+            raise wrong_surface(self.path, f"has a face with {len(numbers)} corners {where}")
         strangers = [number for number in numbers if not 0 <= number < MOST_POINTS]
         if strangers:
-            raise malformed(self.path, f"has a face with point {str(strangers[0])[:40]} {where}")
+            raise wrong_surface(
+                self.path, f"has a face with point {str(strangers[0])[:40]} {where}"
+            )
         for one, two in itertools.pairwise(numbers[1:]):
             self.corners.extend((numbers[0], one, two))
         if len(self.corners) > 3 * MOST_TRIANGLES:
@@ -138,6 +140,6 @@ def refuse_strangers(path: str, triangles: NDArray[np.int64], count: int) -> Non
     wrong = (triangles < 0) | (triangles >= count)
     if wrong.any():
         number = int(triangles[wrong][0])
-        raise malformed(
+        raise wrong_surface(
             path, f"has a face with point {number:,} (counted from 0), and {count:,} points"
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.reading import bytes_of
 from ntagen.imaging.space import Rigid, Space, rigid
 
@@ -66,8 +66,7 @@ def _after(word: str, text: str) -> list[float]:
 
 
 def _malformed(path: str, why: str) -> ImageError:
-    return ImageError(
-        "image-malformed",
+    return malformed(
         f"`{path}` has no transform that can be read: {why}",
         "save a linear transform as text (.tfm), or as four rows of four numbers",
     )

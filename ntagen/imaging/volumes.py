@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Final, Literal, cast
 
-from ntagen.imaging.mistakes import ImageError
+from ntagen.imaging.mistakes import ImageError, malformed
 from ntagen.imaging.space import Space
 
 if TYPE_CHECKING:
@@ -113,10 +113,8 @@ def refuse_many(path: str, sizes: tuple[int, ...]) -> None:
         ImageError: The sizes are such.
     """
     if min(sizes, default=0) < 1:
-        raise ImageError(
-            "image-malformed",
-            f"`{path}` has the sizes {', '.join(map(str, sizes))}: each must be 1 or more",
-            "save it once more",
+        raise malformed(
+            f"`{path}` has the sizes {', '.join(map(str, sizes))}: each must be 1 or more"
         )
     if max(sizes) > MOST_ALONG:
         raise ImageError(
@@ -199,9 +197,7 @@ def _numbers(volume: Volume) -> Iterator[NDArray[np.generic]]:
 def _wrong_length(volume: Volume, than: Literal["more", "fewer"]) -> ImageError:
     sizes = " x ".join(map(str, volume.sizes))
     hint = "was the file cut off? save it once more" if than == "fewer" else "save it once more"
-    return ImageError(
-        "image-malformed", f"`{volume.path}` has {than} voxels than its sizes say ({sizes})", hint
-    )
+    return malformed(f"`{volume.path}` has {than} voxels than its sizes say ({sizes})", hint)
 
 
 def _binary(volume: Volume) -> Iterator[NDArray[np.generic]]:
@@ -227,8 +223,7 @@ def _unpacked(volume: Volume) -> Iterator[bytes]:
         while piece := file.read(_PIECE_BYTES):
             yield piece
     except (OSError, EOFError, zlib.error, ValueError) as error:
-        raise ImageError(
-            "image-malformed",
+        raise malformed(
             f"the voxels of `{volume.path}` cannot be unpacked: {str(error)[:100]}",
             "was the file cut off? save it once more",
         ) from None
@@ -263,8 +258,7 @@ def _text(volume: Volume) -> Iterator[NDArray[np.float64]]:
                 raise ValueError(rest[:10])
             yield np.array(list(map(float, words)))
         except ValueError:
-            raise ImageError(
-                "image-malformed",
+            raise malformed(
                 f"the voxels of `{volume.path}` are no numbers in text",
                 "save it once more, with `encoding: gzip`",
             ) from None

@@ -10,6 +10,7 @@ which is as exact for any cost.
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING, Final
 
@@ -17,7 +18,7 @@ from ntagen.imaging.grid import Wish, grid_over
 from ntagen.imaging.segmentations import Mask
 from ntagen.imaging.space import Rigid
 from ntagen.imaging.surfaces import made_field
-from ntagen.shapes import Field, Vector, vector_of
+from ntagen.shapes import Field, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -47,8 +48,7 @@ def field_of_mask(mask: Mask, motion: Rigid, unit_mm: float, wish: Wish) -> Fiel
     import numpy as np
 
     spacing = np.array(mask.spacing) * unit_mm
-    corner = mask.frame.shift_mm
-    shift: Vector = (corner[0] * unit_mm, corner[1] * unit_mm, corner[2] * unit_mm)
+    shift = vector_of(unit_mm * number for number in mask.frame.shift_mm)
     frame = motion.after(Rigid(mask.frame.axes, shift))
     axes = np.array(frame.axes)
     first = axes @ np.array(frame.shift_mm)
@@ -62,9 +62,7 @@ def field_of_mask(mask: Mask, motion: Rigid, unit_mm: float, wish: Wish) -> Fiel
     depth = np.sqrt(_squares(mask.voxels, False, places, spacing))
     # Beyond the layer there is more of the same.
     signed = np.where(away > 0.0, away, -depth)
-    corners = [
-        (x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])
-    ]
+    corners = list(itertools.product(*zip(low, high, strict=True)))
     doubt_mm = _ROUNDING_MM + mask.doubt * unit_mm
     volume_mm3 = float(mask.voxels.sum()) * math.prod(map(float, spacing))
     return made_field(grid, signed, doubt_mm, bounds, np.array(corners) @ axes, volume_mm3, wish)

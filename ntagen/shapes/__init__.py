@@ -3,7 +3,17 @@
 from ntagen.shapes.ellipsoid import Ellipsoid
 from ntagen.shapes.field import SAMPLES_PER_MM, Field
 from ntagen.shapes.round import Capsule, HalfSpace, Sphere
-from ntagen.shapes.shape import UPRIGHT, Axes, Bounds, Points, Shape, Vector, turning, vector_of
+from ntagen.shapes.shape import (
+    UPRIGHT,
+    Axes,
+    Bounds,
+    Points,
+    Shape,
+    Vector,
+    axes_of,
+    turning,
+    vector_of,
+)
 from ntagen.shapes.skin import skin
 from ntagen.shapes.straight import Box, Cylinder
 from ntagen.shapes.surface import (
@@ -31,6 +41,7 @@ __all__ = [
     "Shape",
     "Sphere",
     "Vector",
+    "axes_of",
     "directions",
     "is_in",
     "outline_mm",

@@ -137,6 +137,12 @@ def vector_of(numbers: Iterable[float]) -> Vector:
     return (x, y, z)
 
 
+def axes_of(rows: Iterable[Iterable[float]]) -> Axes:
+    """Three vectors, such as the rows of an array."""
+    x, y, z = map(vector_of, rows)
+    return (x, y, z)
+
+
 def between(start_mm: Vector, end_mm: Vector, share: float) -> Vector:
     """The point at a share of the way."""
     return vector_of(a + share * (b - a) for a, b in zip(start_mm, end_mm, strict=True))

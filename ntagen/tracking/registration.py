@@ -33,7 +33,7 @@ import numpy.typing as npt
 
 from ntagen.errors import InputError
 from ntagen.scene import Vector
-from ntagen.shapes import vector_of
+from ntagen.shapes import axes_of, vector_of
 from ntagen.tracking.frames import Transform
 
 _Array = npt.NDArray[np.float64]
@@ -151,7 +151,7 @@ def register(pairs: Pairs) -> Fit:
     center, axes, spread = _shape(moved)
     left_out = [_left_out(i, source, target) for i in range(count)]
     return Fit(
-        transform=Transform(pairs.source, pairs.target, _rows(rotation), vector_of(translation)),
+        transform=Transform(pairs.source, pairs.target, axes_of(rotation), vector_of(translation)),
         names=pairs.names,
         residuals_mm=tuple(float(one) for one in residuals),
         left_out_mm=tuple(one[0] if one else None for one in left_out),
@@ -160,7 +160,7 @@ def register(pairs: Pairs) -> Fit:
         suspect=_suspect(pairs.names, left_out, fre_mm),
         is_flat=is_flat,
         center_mm=vector_of(center),
-        axes=_rows(axes),
+        axes=axes_of(axes),
         spread_mm=vector_of(spread),
     )
 
@@ -346,7 +346,3 @@ def _require_fit(pairs: Pairs, residuals: _Array, source: _Array, target: _Array
 
 def _rms(values: _Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def _rows(matrix: _Array) -> tuple[Vector, Vector, Vector]:
-    return (vector_of(matrix[0]), vector_of(matrix[1]), vector_of(matrix[2]))
