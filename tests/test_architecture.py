@@ -123,6 +123,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "plan",
         "drive",
         "lab",
+        "plot",
         "system",
         "version",
     },

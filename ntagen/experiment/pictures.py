@@ -10,8 +10,8 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.scene import Region, Scene
-from ntagen.shapes import Field, directions, outline_mm, skin
+from ntagen.plot.picture import COLOURS, depth_axis, outline_of
+from ntagen.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +23,7 @@ _LINE: Final = "#1f5fbf"
 _BAND: Final = "#9db9e6"
 _FELT: Final = "#7a3e9d"
 _GRID: Final = "#e6e8ec"
+_SHELL: Final = {"facecolor": "none", "alpha": 0.5, "linestyle": "--"}
 _WIDTH_IN: Final = 9.0
 _BINS: Final = 30
 
@@ -111,16 +112,19 @@ def sensitivity(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> Figure
 
 
 def felt(document: Mapping[str, Any], row: str, scene: Scene) -> Figure:
-    """Where the force rose, in two projections; regions that are not convex are drawn as convex."""
+    """Where the force rose, in two projections."""
     figure = _figure(4.6)
     panels = figure.subplots(1, 2)
     places = [one["position_mm"] for run in _runs(document, row) for one in run["felt"]]
-    depth = max(range(3), key=lambda i: abs(scene.axis[i]))
+    depth = depth_axis(scene)
     for axes, across in zip(panels, [i for i in range(3) if i != depth], strict=True):
-        for kind, colour in (("detection", "#e8890c"), ("target", _REACHED), ("critical", _HIT)):
+        for kind in ("detection", "target", "critical"):
             for region in scene.regions:
                 if region.kind == kind:
-                    axes.add_patch(_outline(region, across, depth, colour))
+                    body = {"facecolor": COLOURS[kind], "alpha": 0.25}
+                    style = _SHELL if kind == "detection" else body
+                    style = {**style, "edgecolor": COLOURS[kind]}
+                    axes.add_patch(outline_of(region, (across, depth), style))
         x, y = [p[across] for p in places], [p[depth] for p in places]
         axes.plot(x, y, "x", color=_FELT, markersize=5, label=f"felt ({len(places)})", zorder=4)
         entry = scene.needle.tip.position_mm
@@ -232,23 +236,3 @@ def _draw_band(
     label: str,
 ) -> None:
     axes.fill_between(x, low, high, color=_BAND, alpha=0.6, linewidth=0, label=label)
-
-
-def _outline(region: Region, across: int, depth: int, colour: str) -> Any:  # noqa: ANN401
-    """The shadow of a region."""
-    from matplotlib.patches import Polygon
-    from scipy.spatial import ConvexHull  # type: ignore[import-untyped]
-
-    shape = region.shape
-    around_it = directions().reshape(-1, 3)
-    points = skin(shape)[0] if isinstance(shape, Field) else outline_mm(shape, around_it)
-    flat = [(float(point[across]), float(point[depth])) for point in points]
-    around = [flat[index] for index in ConvexHull(flat).vertices]
-    is_shell = region.kind == "detection"
-    return Polygon(
-        around,
-        edgecolor=colour,
-        facecolor="none" if is_shell else colour,
-        alpha=0.5 if is_shell else 0.25,
-        linestyle="--" if is_shell else "-",
-    )

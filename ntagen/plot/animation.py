@@ -127,8 +127,7 @@ def _frames(picture: Picture, times_s: Sequence[float]) -> Iterator[Any]:
         axes = figure.add_subplot(1, 2, place + 1)
         draw_projection(axes, fixed, (axis, depth), bounds, still)
         views.append(_View(axes, (axis, depth), picture, changing))
-    handles, labels = views[0].axes.get_legend_handles_labels()
-    add_legend(figure, dict(zip(labels, handles, strict=True)), _LEGEND_COLUMNS)
+    add_legend(figure, [views[0].axes], _LEGEND_COLUMNS)
     heading = figure.suptitle(heading_of(picture), fontsize=8.5, y=0.985)
     fit_planes(figure, [one.axes for one in views], [*cells(figure, heading, (1.0, 1.0))])
     corner = views[0].axes

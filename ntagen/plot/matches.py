@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ntagen.needle.path import sample_poses
-from ntagen.needle.vectors import cross, dot, scale, subtract
+from ntagen.needle.vectors import cross, scale
 from ntagen.plan.actions import Plan, Push
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER
+from ntagen.plot.picture import add_legend
 from ntagen.scene import Pose, Vector
 from ntagen.shapes import vector_of
 from ntagen.traces.matching import Match
@@ -56,18 +57,7 @@ def draw_matches(rows: Sequence[MatchRow], title: str) -> Figure:
     grid = figure.subplots(len(rows), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.1))
     for axes, row in zip(grid, rows, strict=True):
         _draw_row(axes, row)
-    unique: dict[str, Any] = {}
-    for axes in grid:
-        handles, labels = axes[0].get_legend_handles_labels()
-        unique |= dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(),
-        unique.keys(),
-        loc="outside lower center",
-        ncols=len(unique),
-        frameon=False,
-        fontsize=9,
-    )
+    add_legend(figure, grid[:, 0], place="outside lower center")
     figure.suptitle(title, fontsize=11)
     return figure
 
@@ -128,5 +118,4 @@ def _predicted(prediction: Prediction) -> list[Vector]:
 def _local(start: Pose, points: Sequence[Vector]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Points along the heading, towards the centre of the first arc, and across both."""
     axes = (start.heading, scale(-1.0, start.bevel), cross(start.heading, start.bevel))
-    moved = [subtract(point, start.position_mm) for point in points]
-    return np.array([[dot(point, axis) for axis in axes] for point in moved]).reshape(-1, 3)
+    return np.asarray((np.reshape(points, (-1, 3)) - start.position_mm) @ np.array(axes).T)

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen.plot.arrange import cells, fit_planes, fit_space
 from ntagen.plot.colours import EXPECTED, MEASURED, NEEDLE, OTHER, TRUE
@@ -133,8 +133,7 @@ def draw(picture: Picture) -> Figure:
     ]
     space = figure.add_subplot(1, 3, 3, projection="3d")
     lengths = _set_scales(space, picture, depth, bounds)
-    handles, labels = flat[0].get_legend_handles_labels()
-    add_legend(figure, dict(zip(labels, handles, strict=True)))
+    add_legend(figure, flat[:1])
     heading = figure.suptitle(heading_of(picture), fontsize=10.5, y=0.985)
     *left, right = cells(figure, heading, _WIDTHS)
     fit_planes(figure, flat, left)
@@ -147,12 +146,21 @@ def draw(picture: Picture) -> Figure:
     return figure
 
 
-def add_legend(figure: Figure, entries: Mapping[str, Any], columns: int = _LEGEND_COLUMNS) -> None:
-    """Adds the legend below the views: what stands for each text."""
+def add_legend(
+    figure: Figure,
+    views: Iterable[Any],
+    columns: int = _LEGEND_COLUMNS,
+    place: Literal["lower center", "outside lower center"] = "lower center",
+) -> None:
+    """Adds the legend of some views below all of them; equal texts stand there once."""
+    entries: dict[str, Any] = {}
+    for axes in views:
+        handles, labels = axes.get_legend_handles_labels()
+        entries |= dict(zip(labels, handles, strict=True))
     figure.legend(
         entries.values(),
         entries.keys(),
-        loc="lower center",
+        loc=place,
         ncols=min(len(entries), columns),
         frameon=False,
         fontsize=9,
@@ -267,7 +275,7 @@ def _ghosts(region: Region) -> list[Region]:
 
 def _ghost_style(region: Region) -> dict[str, Any]:
     """A thin outline without a face."""
-    colour = (*_rgb(COLOURS[region.kind]), 0.6)
+    colour = (COLOURS[region.kind], 0.6)
     label = f"{region.kind}, end of its way"
     return {
         **{"edgecolor": colour, "facecolor": "none", "linewidth": 0.7},
@@ -346,7 +354,7 @@ def face_of(region: Region, picture: Picture) -> dict[str, Any]:
     if region.kind in OUTLINES:
         style |= {"facecolor": "none", "linestyle": OUTLINES[region.kind], "zorder": 3}
     else:
-        style |= {"facecolor": (*_rgb(colour), 0.22)}
+        style |= {"facecolor": (colour, 0.22)}
     if region.kind == "unexplored":
         style |= {"hatch": "...."}
     if region.name in picture.learned:
@@ -356,11 +364,6 @@ def face_of(region: Region, picture: Picture) -> dict[str, Any]:
         label += " (not known)"
         style |= {"linestyle": ":"}
     return style | {"label": label}
-
-
-def _rgb(colour: str) -> tuple[float, float, float]:
-    red, green, blue = (int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    return (red, green, blue)
 
 
 def _curves(picture: Picture) -> list[tuple[dict[str, Any], Sequence[Curve]]]:
@@ -404,7 +407,7 @@ def _band(picture: Picture, shown: tuple[int, int]) -> Any:  # noqa: ANN401
             farthest = np.argmax(points @ circle.T, axis=0)
             rims.append(points[[*farthest, farthest[0]]])
     path = Path.make_compound_path(*(Path(rim) for rim in rims))
-    style = {"facecolor": (*_rgb(EXPECTED), 0.8), "edgecolor": "none", "zorder": 6.5}
+    style = {"facecolor": (EXPECTED, 0.8), "edgecolor": "none", "zorder": 6.5}
     return PathPatch(path, label=picture.tube_label, **style)
 
 
