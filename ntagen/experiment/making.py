@@ -21,7 +21,7 @@ from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.experiment.description import Row, digest_of
-from ntagen.experiment.record import Observer, Profile, Run, Synthesised
+from ntagen.experiment.record import Observer, Run, Synthesised
 from ntagen.experiment.store import Results, finished_in, new_log
 from ntagen.nsl import Task, load_task
 
@@ -200,7 +200,6 @@ def _run(
         ),
         profile=observer.profile,
         felt=observer.felt,
-        seconds=0.0,
         log=log,
     )
 
@@ -208,24 +207,4 @@ def _run(
 def _broken(row: Row, seed: int, error: Exception, log: str) -> Run:
     """The run of a driver that broke: it reached nothing, and nobody knows the rest."""
     said = " ".join(str(error).split())
-    return Run(
-        row=row.id,
-        seed=seed,
-        outcome=FAILED,
-        reason=f"{type(error).__name__}: {said}",
-        is_reached=False,
-        is_hit=False,
-        clearance_mm=None,
-        target_mm=None,
-        depth_mm=0.0,
-        adjustments=0,
-        cut_mm=0.0,
-        confidence=None,
-        error_mm=None,
-        needle_s=0.0,
-        syntheses=(),
-        profile=Profile(),
-        felt=(),
-        seconds=0.0,
-        log=log,
-    )
+    return Run(row.id, seed, FAILED, f"{type(error).__name__}: {said}", log=log)

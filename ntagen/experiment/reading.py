@@ -7,6 +7,7 @@ for each combination. The names of those rows end with the values that differ.
 from __future__ import annotations
 
 import itertools
+import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -123,9 +124,7 @@ class _Reader:
         axes = self._axes(number, table)
         if axes is None or seeds is None:
             return
-        count = 1
-        for values in axes.values():
-            count *= len(values)
+        count = math.prod(map(len, axes.values()))
         if count > _MAX_ROWS:
             self._note(number, "row", f"its lists make {count:,} rows", "make them shorter")
             return
@@ -254,7 +253,9 @@ class _Reader:
             cause = f"the list has {len(found)} seeds, and {self.runs} are wanted"
             self._note(number, "seeds", cause, "make --runs smaller, or the list longer")
             return None
-        return tuple(found[: self.runs]) if isinstance(value, list) else _from(found, self.runs)
+        if isinstance(value, list):
+            return tuple(found[: self.runs])
+        return tuple(range(found[0], found[0] + self.runs))
 
     def _task(self, number: int, path: Path) -> Task | None:
         """The task of a scene; each file is read once."""
@@ -379,10 +380,6 @@ def _listed(value: object) -> list[int] | range | None:
     if isinstance(value, int) and not isinstance(value, bool):
         return range(1, value + 1)
     return None
-
-
-def _from(found: Sequence[int], runs: int) -> tuple[int, ...]:
-    return tuple(range(found[0], found[0] + runs))
 
 
 def _slug(text: str) -> str:

@@ -97,21 +97,21 @@ class Run:
     seed: int
     outcome: str
     reason: str
-    is_reached: bool
-    is_hit: bool
-    clearance_mm: float | None
-    target_mm: float | None
-    depth_mm: float
-    adjustments: int
-    cut_mm: float
-    confidence: float | None
-    error_mm: float | None
-    needle_s: float
-    syntheses: tuple[Synthesised, ...]
-    profile: Profile
-    felt: tuple[Felt, ...]
-    seconds: float
-    log: str
+    is_reached: bool = False
+    is_hit: bool = False
+    clearance_mm: float | None = None
+    target_mm: float | None = None
+    depth_mm: float = 0.0
+    adjustments: int = 0
+    cut_mm: float = 0.0
+    confidence: float | None = None
+    error_mm: float | None = None
+    needle_s: float = 0.0
+    syntheses: tuple[Synthesised, ...] = ()
+    profile: Profile = Profile()
+    felt: tuple[Felt, ...] = ()
+    seconds: float = 0.0
+    log: str = ""
 
     @property
     def key(self) -> tuple[str, int]:

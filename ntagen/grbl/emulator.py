@@ -184,6 +184,11 @@ class Emulator:
 
     def next_event_s(self) -> float:
         """When it does something by itself, at the earliest; infinite if never."""
+        sent_s = self._output[0][0] + self.faults.delay_s if self._output else math.inf
+        return min(sent_s, self._next_action_s())
+
+    def _next_action_s(self) -> float:
+        """When it acts the next time; that output has arrived is no action."""
         times = [self._events[0][0]] if self._events else []
         if self._machine.planner.is_moving and self.faults.pace > 0.0:
             rest_s = self._machine.planner.end_s - self._machine.planner.now_s
@@ -192,8 +197,6 @@ class Emulator:
             times.append(max(self._line_due_s, self._now_s))
         if self._machine.dwell_end_s > self._now_s:
             times.append(self._machine.dwell_end_s)
-        if self._output:
-            times.append(self._output[0][0] + self.faults.delay_s)
         return min(times, default=math.inf)
 
     def advance(self, time_s: float) -> None:
@@ -209,14 +212,6 @@ class Emulator:
         while self._output and self._output[0][0] + self.faults.delay_s <= self._now_s:
             sent += self._output.popleft()[1]
         return b"" if self.faults.is_silent else bytes(sent)
-
-    def _next_action_s(self) -> float:
-        """When it acts the next time; that output has arrived is no action."""
-        kept, self._output = self._output, deque()
-        try:
-            return self.next_event_s()
-        finally:
-            self._output = kept
 
     def _move(self, time_s: float) -> None:
         """Moves the axes until a time, piece by piece."""

@@ -69,7 +69,6 @@ class Block:
         motion: ``G0`` or ``G1`` if the axes shall move.
         dwell_s: The time to wait, if the line asks for it.
         waits: Whether the line is done only when all motion is over.
-        ends: Whether the program ends here.
     """
 
     modal: Modal
@@ -77,7 +76,6 @@ class Block:
     motion: str | None = None
     dwell_s: float | None = None
     waits: bool = False
-    ends: bool = False
 
 
 @dataclass(slots=True)
@@ -120,8 +118,7 @@ def read(text: str, modal: Modal, axes: str) -> Block:
             if name in words.groups
         },
     )
-    ends = words.groups.get("program") in ("M2", "M30")
-    if ends:
+    if words.groups.get("program") in ("M2", "M30"):
         after = Modal(feed=feed, units=after.units, tool=after.tool)
     return Block(
         modal=after,
@@ -129,7 +126,6 @@ def read(text: str, modal: Modal, axes: str) -> Block:
         motion=motion if moves else None,
         dwell_s=dwell_s,
         waits=dwell_s is not None or bool(words.groups.keys() & {"program", "spindle", "coolant"}),
-        ends=ends,
     )
 
 

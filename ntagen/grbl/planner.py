@@ -179,15 +179,11 @@ class Planner:
             self._is_held = False
             self._plan()
 
-    def flush(self) -> None:
-        """Stops at once, and forgets all blocks."""
+    def move_to(self, position: Position) -> None:
+        """Stops at a position at once, and forgets all blocks: something else moved the axes."""
         self._blocks.clear()
         self._phases.clear()
         self._is_held = False
-
-    def move_to(self, position: Position) -> None:
-        """Says that the axes stand at a position: they were moved by something else."""
-        self.flush()
         self._position = position
 
     def advance(self, time_s: float) -> None:

@@ -116,18 +116,17 @@ def refuse_many(path: str, sizes: tuple[int, ...]) -> None:
         raise malformed(
             f"`{path}` has the sizes {', '.join(map(str, sizes))}: each must be 1 or more"
         )
-    if max(sizes) > MOST_ALONG:
-        raise ImageError(
-            "image-too-large",
-            f"`{path}` has {max(sizes):,} voxels along an axis, more than {MOST_ALONG:,}",
-            "cut away what the needle cannot reach, or make it coarser",
-        )
-    if math.prod(sizes) > MOST_VOXELS:
-        raise ImageError(
-            "image-too-large",
-            f"`{path}` has {math.prod(sizes):,} voxels, more than {MOST_VOXELS:,}",
-            "cut away what the needle cannot reach, or make it coarser",
-        )
+    along, whole = max(sizes), math.prod(sizes)
+    for count, what, most in (
+        (along, "voxels along an axis", MOST_ALONG),
+        (whole, "voxels", MOST_VOXELS),
+    ):
+        if count > most:
+            raise ImageError(
+                "image-too-large",
+                f"`{path}` has {count:,} {what}, more than {most:,}",
+                "cut away what the needle cannot reach, or make it coarser",
+            )
 
 
 def voxels_of(

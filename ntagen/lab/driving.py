@@ -27,7 +27,7 @@ from ntagen.grbl.port import Port, SerialPort
 from ntagen.lab.lab import Lab, Truth
 from ntagen.needle.measurement import Measurement
 from ntagen.plan.synthesise import Synthesis, Synthesiser
-from ntagen.scene import Pose, Scene
+from ntagen.scene import Scene
 from ntagen.tracking.frames import IDENTITY
 from ntagen.tracking.opening import opened_live
 from ntagen.tracking.spec import parse_tracker
@@ -104,7 +104,7 @@ def drive_in(
             _Looking(sensor, clock),
             timeless,
             settings,
-            Journals(journal, Witness(_Known(lab), journal)),
+            Journals(journal, Witness(lab, journal)),
             known=known,
         )
         return InLab(driven, lab.truth())
@@ -230,17 +230,3 @@ class _Looking:
 
     def _on_clock(self, found: Measurement) -> Measurement:
         return replace(found, time_s=self._clock.at_s(found.time_s))
-
-
-class _Known:
-    """What the lab knows of its needle."""
-
-    def __init__(self, lab: Lab) -> None:
-        self._lab = lab
-
-    @property
-    def true_tip(self) -> Pose:
-        return self._lab.truth().tip
-
-    def true_clearance_mm(self) -> float:
-        return self._lab.truth().clearance_mm

@@ -156,6 +156,15 @@ class Lab:
                 has_moved=self._moved_s is not None,
             )
 
+    @property
+    def true_tip(self) -> Pose:
+        """The true pose of the tip."""
+        return self.truth().tip
+
+    def true_clearance_mm(self) -> float:
+        """The smallest distance of all that was cut to any actual critical region."""
+        return self.truth().clearance_mm
+
     def _look(self) -> Frame:
         """What tracker and force sensor show now, also in the middle of a motion."""
         with self.lock:

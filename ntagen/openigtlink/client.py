@@ -22,10 +22,9 @@ import time
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Final, Self
 
 from ntagen.errors import DeviceError
-from ntagen.openigtlink.closing import Closing
 from ntagen.openigtlink.messages import (
     Position,
     QuaternionTrackingData,
@@ -50,7 +49,7 @@ _RATED: Final = 64
 _JOIN_S: Final = 5.0
 
 
-class Client(Closing):
+class Client:
     """A connection to an OpenIGTLink server; use it as a context manager.
 
     Args:
@@ -85,6 +84,12 @@ class Client(Closing):
         self._connect()
         self._thread = threading.Thread(target=self._work, name="igtl-client", daemon=True)
         self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def now_s(self) -> float:
         """The clock of all times of receipt: monotonic, of this machine."""

@@ -328,9 +328,7 @@ class Status:
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
         """See `Content.from_bytes`."""
-        if len(data) < _STATUS.size:
-            raise MalformedError(f"STATUS has {len(data)} bytes, fewer than {_STATUS.size}")
-        code, subcode, name = _STATUS.unpack_from(data)
+        code, subcode, name = _begun(cls.TYPE, _STATUS, data)
         return cls(code, subcode, until_zero(name), until_zero(data[_STATUS.size :]))
 
 
@@ -363,9 +361,7 @@ class Sensor:
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
         """See `Content.from_bytes`."""
-        if len(data) < _SENSOR.size:
-            raise MalformedError(f"SENSOR has {len(data)} bytes, fewer than {_SENSOR.size}")
-        count, _, unit = _SENSOR.unpack_from(data)
+        count, _, unit = _begun(cls.TYPE, _SENSOR, data)
         _require_size(cls.TYPE, data, _SENSOR.size + 8 * count)
         return cls(struct.unpack_from(f">{count}d", data, _SENSOR.size), unit)
 
@@ -386,9 +382,7 @@ class Text:
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
         """See `Content.from_bytes`."""
-        if len(data) < _TEXT.size:
-            raise MalformedError(f"STRING has {len(data)} bytes, fewer than {_TEXT.size}")
-        _, length = _TEXT.unpack_from(data)
+        _, length = _begun(cls.TYPE, _TEXT, data)
         _require_size(cls.TYPE, data, _TEXT.size + length)
         return cls(data[_TEXT.size :].decode(errors="replace"))
 
@@ -454,6 +448,17 @@ def _tools(name: str, form: struct.Struct, data: bytes) -> Iterator[tuple[Any, .
 
 def _freedom(kind: int) -> Freedom | int:
     return Freedom(kind) if kind in Freedom.__members__.values() else kind
+
+
+def _begun(name: str, form: struct.Struct, data: bytes) -> tuple[Any, ...]:
+    """The fields at the beginning of a content.
+
+    Raises:
+        MalformedError: It is shorter than they are.
+    """
+    if len(data) < form.size:
+        raise MalformedError(f"{name} has {len(data)} bytes, fewer than {form.size}")
+    return form.unpack_from(data)
 
 
 def _require_size(name: str, data: bytes, size: int) -> None:

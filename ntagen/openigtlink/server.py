@@ -11,10 +11,9 @@ import selectors
 import socket
 import threading
 from collections import deque
-from typing import Final
+from typing import Final, Self
 
 from ntagen.errors import DeviceError
-from ntagen.openigtlink.closing import Closing
 from ntagen.openigtlink.packets import Decoder, Packet, ProtocolError
 
 _PIECE_BYTES: Final = 2**16
@@ -23,7 +22,7 @@ _SEND_S: Final = 1.0
 """A client that takes no bytes for so long is dropped."""
 
 
-class Server(Closing):
+class Server:
     """A server for any number of clients; use it as a context manager.
 
     Args:
@@ -50,6 +49,12 @@ class Server(Closing):
         self._closing, self._wake = socket.socketpair()
         self._thread = threading.Thread(target=self._serve, name="igtl-server", daemon=True)
         self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def send(self, *packets: Packet) -> None:
         """Sends messages to all clients, in order; a client that does not take them is dropped."""

@@ -16,10 +16,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.files import write_files
+from ntagen.needle.vectors import cross
 from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
 from ntagen.plot.picture import COLOURS, GAP_MM, OUTLINES, Curve, Picture, bounds_mm, depth_axis
 from ntagen.scene import Region, Vector
-from ntagen.shapes import triangles
+from ntagen.shapes import triangles, vector_of
 
 _DATA: Final = "/*DATA*/"
 _HEIGHT_PX: Final = 620
@@ -104,12 +105,7 @@ def _axes(picture: Picture) -> tuple[list[float], list[float], list[float]]:
     down = [sign if axis == depth else 0.0 for axis in range(3)]
     right = [1.0 if axis == across else 0.0 for axis in range(3)]
     # Right-handed: right x down points away.
-    turned = [
-        right[1] * down[2] - right[2] * down[1],
-        right[2] * down[0] - right[0] * down[2],
-        right[0] * down[1] - right[1] * down[0],
-    ]
-    return down, right, turned
+    return down, right, list(cross(vector_of(right), vector_of(down)))
 
 
 def _region(region: Region, picture: Picture) -> dict[str, Any]:
@@ -127,7 +123,7 @@ def _region(region: Region, picture: Picture) -> dict[str, Any]:
         "colour": COLOURS[region.kind],
         "alpha": 0.07 if region.kind in OUTLINES else 0.2,
         "from": picture.appears_s.get(region.name),
-        "points": [_point((float(x), float(y), float(z))) for x, y, z in points],
+        "points": [_point(vector_of(point)) for point in points],
         "faces": faces,
         "motion": _motion(region),
     }

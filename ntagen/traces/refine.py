@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 import scipy.optimize  # type: ignore[import-untyped]
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from ntagen.traces.chain import LEAST_CURVATURE_PER_MM, Array, Feet, Rolls, chain_points, feet_of
 from ntagen.tracking.registration import best_motion, best_rotation
@@ -234,24 +235,17 @@ def _skew(vector: Array) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def _series(angle: float) -> tuple[float, float, float]:
-    """``sin a / a``, ``(1 - cos a) / a^2`` and ``(a - sin a) / a^3``, also for small angles."""
-    if angle < 1e-4:
-        return 1.0, 0.5, 1.0 / 6.0
-    sine, cosine = math.sin(angle), math.cos(angle)
-    return sine / angle, (1.0 - cosine) / angle**2, (angle - sine) / angle**3
-
-
 def _turn(vector: Array) -> Array:
-    """The rotation about a vector by its length (Rodrigues' formula)."""
-    first, second, _ = _series(float(np.linalg.norm(vector)))
-    skew = _skew(vector)
-    return np.eye(3) + first * skew + second * skew @ skew
+    """The rotation about a vector by its length."""
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
 
 
 def _left_jacobian(vector: Array) -> Array:
     """How a rotation turns further when its vector changes."""
-    _, second, third = _series(float(np.linalg.norm(vector)))
+    angle = float(np.linalg.norm(vector))
+    second, third = 0.5, 1.0 / 6.0
+    if angle >= 1e-4:
+        second, third = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
     skew = _skew(vector)
     return np.eye(3) + second * skew + third * skew @ skew
 
@@ -302,8 +296,8 @@ def oriented_on_grid(
 
 def frame_at(base: Array, place: Place) -> Array:
     """The frame at a place of the grid: tilted about y, then about z, then rolled about x."""
-    tilt_y, tilt_z, roll = (math.radians(GRID_DEG * number) for number in place)
-    return np.asarray(base @ _about(1, tilt_y) @ _about(2, tilt_z) @ _about(0, roll))
+    angles_deg = GRID_DEG * np.array(place)
+    return np.asarray(base @ Rotation.from_euler("YZX", angles_deg, degrees=True).as_matrix())
 
 
 def _nearest(base: Array, frame: Array) -> Place:
@@ -316,13 +310,3 @@ def _nearest(base: Array, frame: Array) -> Place:
     roll = math.atan2(-turned[1, 2], turned[1, 1])
     y, z, x = (round(math.degrees(angle) / GRID_DEG) for angle in (tilt_y, tilt_z, roll))
     return (y, z, x)
-
-
-def _about(axis: int, angle_rad: float) -> Array:
-    """The rotation about a coordinate axis."""
-    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
-    rotation = np.eye(3)
-    one, other = (axis + 1) % 3, (axis + 2) % 3
-    rotation[one, one] = rotation[other, other] = cosine
-    rotation[one, other], rotation[other, one] = -sine, sine
-    return rotation

@@ -109,7 +109,7 @@ def best_sequences(space: Space, roll_count: int, wanted: int) -> list[Steps]:
     if math.comb(len(space.places), roll_count) * len(space.angles_rad) ** roll_count <= (
         MOST_EXHAUSTIVE
     ):
-        return _best(space, set(_all(space, alone, roll_count)), wanted)
+        return _best(space, set(_all(space, roll_count)), wanted)
     beam: list[Steps] = [()]
     for _ in range(roll_count):
         longer = {added for steps in beam for one in alone if (added := _added(space, steps, one))}
@@ -132,15 +132,12 @@ def misfits(space: Space, sequences: list[Steps]) -> Array:
     return np.concatenate(found) if found else np.zeros(0)
 
 
-def _all(space: Space, alone: list[tuple[int, int]], count: int) -> Iterator[Steps]:
-    if count == 0:
-        yield ()
-        return
-    for steps in _all(space, alone, count - 1):
-        for one in alone:
-            longer = (*steps, one)
-            if (not steps or one[0] > steps[-1][0]) and space.allows(longer[-2:]):
-                yield longer
+def _all(space: Space, count: int) -> Iterator[Steps]:
+    for places in itertools.combinations(space.places, count):
+        for angles in itertools.product(range(len(space.angles_rad)), repeat=count):
+            steps = tuple(zip(places, angles, strict=True))
+            if space.allows(steps):
+                yield steps
 
 
 def _added(space: Space, steps: Steps, one: tuple[int, int]) -> Steps | None:

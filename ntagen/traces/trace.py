@@ -70,13 +70,9 @@ class Samples:
     word: str = "line"
     warnings: tuple[str, ...] = ()
 
-    def upto(self, count: int) -> Samples:
-        """The first samples."""
-        return replace(self, points_mm=self.points_mm[:count], lines=self.lines[:count])
-
-    def beyond(self, count: int) -> Samples:
-        """All but the first samples."""
-        return replace(self, points_mm=self.points_mm[count:], lines=self.lines[count:])
+    def part(self, begin: int, end: int | None = None) -> Samples:
+        """The samples from one on, up to another, which is left out."""
+        return replace(self, points_mm=self.points_mm[begin:end], lines=self.lines[begin:end])
 
     def place(self, index: int) -> str:
         """Where a sample stands, for messages."""
@@ -153,7 +149,7 @@ def first_part(trace: Trace, length_mm: float) -> tuple[Trace, float]:
             f"{length_mm:g} mm are asked for"
         )
     last = int(kept[np.argmax(depths_mm >= length_mm)])
-    seen = trace.samples.upto(last + 1 + _AHEAD)
+    seen = trace.samples.part(0, last + 1 + _AHEAD)
     end_mm = float(depths_mm[kept < len(seen.points_mm)][-1])
     return _prepared(seen, last), end_mm
 
@@ -195,7 +191,7 @@ def _without_beginning(samples: Samples, from_mm: float) -> Samples:
             f"{samples.name}: the trace has {depths_mm[-1]:.1f} mm, and it should begin at a depth "
             f"of {from_mm:g} mm\nhint: give a smaller --from"
         )
-    return samples.beyond(int(kept[np.argmax(depths_mm >= from_mm)]))
+    return samples.part(int(kept[np.argmax(depths_mm >= from_mm)]))
 
 
 def _shortened(trace: Trace, until_mm: float) -> Trace:

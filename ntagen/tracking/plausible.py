@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 from ntagen.drive.device import LiveSensor, Sensor, require_finite
 from ntagen.errors import DeviceError
@@ -42,7 +42,10 @@ STALE_S: Final = 0.5
 """A measurement that is older says nothing about where the needle is; ours."""
 
 
-class Plausible:
+Checked = TypeVar("Checked", bound=Sensor)
+
+
+class Plausible(Generic[Checked]):
     """A sensor whose measurements must be plausible.
 
     Args:
@@ -54,7 +57,7 @@ class Plausible:
 
     def __init__(
         self,
-        sensor: Sensor,
+        sensor: Checked,
         entry: Pose,
         now_s: Callable[[], float] | None = None,
         *,
@@ -100,31 +103,13 @@ class Plausible:
         return found
 
 
-class LivePlausible(Plausible):
-    """The same for a sensor that is looked at while the needle moves.
-
-    Args:
-        sensor: The sensor.
-        entry: The pose at which the needle is at the start.
-        now_s: See `Plausible`.
-        force_varies: See `Plausible`.
-    """
-
-    def __init__(
-        self,
-        sensor: LiveSensor,
-        entry: Pose,
-        now_s: Callable[[], float] | None = None,
-        *,
-        force_varies: bool = False,
-    ) -> None:
-        super().__init__(sensor, entry, now_s, force_varies=force_varies)
-        self._live = sensor
+class LivePlausible(Plausible[LiveSensor]):
+    """The same for a sensor that is looked at while the needle moves."""
 
     @property
     def measures_force(self) -> bool:
         """See `LiveSensor.measures_force`."""
-        return self._live.measures_force
+        return self._sensor.measures_force
 
     def newest(self) -> Measurement:
         """The newest measurement, at once.
@@ -132,7 +117,7 @@ class LivePlausible(Plausible):
         Raises:
             DeviceError: There is none, or it cannot be true.
         """
-        return self._require(self._live.newest())
+        return self._require(self._sensor.newest())
 
 
 def require_fresh(found: Measurement, now_s: float) -> None:

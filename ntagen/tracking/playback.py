@@ -11,6 +11,7 @@ from __future__ import annotations
 import bisect
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -95,9 +96,7 @@ class Playback:
                 f"the recording {self._name} has a gap: no sample for {age_s:.2f} s, and "
                 f"{HOLD_S:g} s is allowed"
             )
-        return Measurement(
-            now_s - age_s, sample.position_mm, sample.force_n, sample.heading, sample.bevel
-        )
+        return replace(sample, time_s=now_s - age_s)
 
 
 def samples_of_log(path: Path) -> list[Measurement]:

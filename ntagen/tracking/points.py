@@ -17,6 +17,7 @@ from typing import Any, Final
 from ntagen.errors import InputError
 from ntagen.files import json_of
 from ntagen.scene import Vector
+from ntagen.shapes import vector_of
 from ntagen.tracking.frames import LPS, RAS, flipped, frame_named
 from ntagen.tracking.registration import Pairs
 from ntagen.tracking.tables import csv_rows, read_table, require_near, shown, text_of
@@ -167,7 +168,7 @@ def _fcsv(path: Path, text: str, frames: Iterator[str]) -> Points:
         cells = dict(zip(names, row.cells, strict=False))
         numbers = [_number(cells.get(axis, ""), row.place, axis) for axis in "xyz"]
         name = cells.get("label") or cells.get("id") or ""
-        _add(positions, name, _scaled(numbers, 1.0), row.place)
+        _add(positions, name, vector_of(numbers), row.place)
     return Points(_frame(path, told, frames), positions)
 
 
@@ -199,8 +200,8 @@ def _markups(path: Path, text: str, frames: Iterator[str]) -> Points:
             )
         if len(values) != 3:
             raise InputError(f"{place}, {shown(label)}, has {len(values)} coordinates")
-        numbers = [_number(value, place, "a coordinate") for value in values]
-        _add(positions, str(label or ""), _scaled(numbers, factor), place)
+        numbers = [_number(value, place, "a coordinate") * factor for value in values]
+        _add(positions, str(label or ""), vector_of(numbers), place)
     return Points(_frame(path, told, frames), positions)
 
 
@@ -232,7 +233,7 @@ def _csv(path: Path, frames: Iterator[str]) -> list[Points]:
                 if not math.isfinite(number):
                     raise _no_number(row.place, head[column], row.cells[column])
                 numbers.append(number)
-            _add(found[prefix], name, _scaled(numbers, 1.0), row.place)
+            _add(found[prefix], name, vector_of(numbers), row.place)
     return [Points(_frame(path, prefix or None, frames), found[prefix]) for prefix in sets]
 
 
@@ -266,11 +267,6 @@ def _number(value: Any, place: str, what: str) -> float:  # noqa: ANN401  from J
 
 def _no_number(place: str, what: str, value: object) -> InputError:
     return InputError(f"{place}: {what} is '{shown(value)}', which is not a number")
-
-
-def _scaled(numbers: Sequence[float], factor: float) -> Vector:
-    x, y, z = numbers
-    return (x * factor, y * factor, z * factor)
 
 
 def _add(positions: dict[str, Vector], name: str, position_mm: Vector, place: str) -> None:
