@@ -169,7 +169,7 @@ class DaskRuns:
     @property
     def has_workers(self) -> bool:
         """Whether the cluster has workers now; without any, answers wait for them."""
-        return self._workers.are_there
+        return bool(self._workers.client.nthreads())
 
     def check(self, model: Model, query: str | Query, /, **keywords: Any) -> Answer:  # noqa: ANN401
         """Answers a query; the keywords are the fields of `ntagen.checker.Options`.

@@ -59,11 +59,6 @@ class Workers:
         threads: dict[str, int] = self.client.nthreads()
         return max(1, sum(threads.values()))
 
-    @property
-    def are_there(self) -> bool:
-        """Whether there are any now."""
-        return bool(self.client.nthreads())
-
     def close(self) -> None:
         """Leaves the scheduler, which then gives up what is still to be done."""
         with contextlib.suppress(Exception):

@@ -80,7 +80,7 @@ class LocalCrew:
 
     def _count_start(self, worker: _Worker) -> None:
         """Gives up if workers die before they have begun, again and again."""
-        self._failed_starts = 0 if worker.has_begun else self._failed_starts + 1
+        self._failed_starts = 0 if worker.pid is not None else self._failed_starts + 1
         if self._failed_starts > _MOST_FAILED_STARTS:
             raise InputError(
                 "workers end before they begin; what they say stands above\n"
@@ -117,13 +117,8 @@ class _Worker:
             return failed
 
     @property
-    def has_begun(self) -> bool:
-        """Whether its process came so far as to do something."""
-        return self.pid is not None
-
-    @property
     def pid(self) -> int | None:
-        """The number of its process, as soon as that runs."""
+        """The number of its process, as soon as that came so far as to do something."""
         if self._pid is None or not self._pid.done() or self._pid.exception() is not None:
             return None
         return self._pid.result()

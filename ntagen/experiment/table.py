@@ -21,6 +21,9 @@ from ntagen.experiment.sweeps import sweeps_of
 
 FORMAT_VERSION: Final = 1
 
+CONFIDENCE: Final = 0.95
+"""The probability with which the interval of a rate has the true rate in it, at least."""
+
 TIMES: Final = ("synthesis_s", "loop_s", "overall_s", "run_s")
 """The entries of a row that are, or contain, seconds of a computer."""
 
@@ -45,7 +48,7 @@ def document_of(
         "format": FORMAT_VERSION,
         "ntagen": identity(),
         "name": experiment.name,
-        "confidence": 0.95,
+        "confidence": CONFIDENCE,
         "rows": [
             row_of(row, [runs[row.id, s] for s in sorted(row.seeds) if (row.id, s) in runs])
             for row in experiment.rows
@@ -134,9 +137,6 @@ def _spread(spread: Spread | None) -> dict[str, float] | None:
     return None if spread is None else dataclasses.asdict(spread)
 
 
-CONFIDENCE: Final = 0.95
-
-
 @dataclass(frozen=True, slots=True)
 class Rate:
     """How often something happened.
@@ -168,13 +168,12 @@ class Spread:
     max: float
 
 
-def rate_of(count: int, of: int, confidence: float = CONFIDENCE) -> Rate:
+def rate_of(count: int, of: int) -> Rate:
     """A rate with its interval of Clopper and Pearson (1934), which is never too narrow.
 
     Args:
         count: How many times it happened.
         of: In how many runs; with none, the rate can be anything.
-        confidence: The probability with which such an interval has the true rate in it, at least.
 
     Raises:
         ValueError: A number is negative, or the first is the greater one.
@@ -184,7 +183,7 @@ def rate_of(count: int, of: int, confidence: float = CONFIDENCE) -> Rate:
     # Importing the statistics of SciPy takes 0.5 s; these two functions are all of it.
     from scipy.special import betaincinv  # type: ignore[import-untyped]
 
-    rest = 0.5 * (1.0 - confidence)
+    rest = 0.5 * (1.0 - CONFIDENCE)
     low = float(betaincinv(count, of - count + 1, rest)) if count else 0.0
     high = float(betaincinv(count + 1, of - count, 1.0 - rest)) if count < of else 1.0
     return Rate(count, of, low, high)

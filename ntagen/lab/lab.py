@@ -63,8 +63,6 @@ class Lab:
         placed: The needle in it.
         axes: The axes of the controller; ours by default.
         speed: How many seconds pass in the lab in one second outside: for axes, needle and tracker.
-        rate_hz: Samples of the tracker in a second of the lab's time.
-        listen_port: The port of the tracker's server; 0 for any that is free.
 
     Attributes:
         emulator: The controller. Use it under `lock`: its thread runs it, too.
@@ -83,8 +81,6 @@ class Lab:
         *,
         axes: Axes | None = None,
         speed: float = 1.0,
-        rate_hz: float = RATE_HZ,
-        listen_port: int = 0,
     ) -> None:
         self._scene = scene
         self._placed = placed
@@ -94,11 +90,11 @@ class Lab:
         self._moved_s: float | None = None
         self.emulator = simulated_controller(self, axes)
         self._stack = contextlib.ExitStack()
-        self.server = Server(HOST, listen_port)
+        self.server = Server(HOST)
         self._stack.callback(self.server.close)
         self._terminal = PseudoTerminal(self.emulator, speed)
         latency_s = placed.latency_s / speed
-        self._publisher = Publisher(self.server, self._look, 1.0 / (rate_hz * speed), latency_s)
+        self._publisher = Publisher(self.server, self._look, 1.0 / (RATE_HZ * speed), latency_s)
         self.faults: TrackerFaults = self._publisher.faults
 
     def __enter__(self) -> Self:

@@ -119,15 +119,10 @@ class Client:
         return self._newest(self._poses, device, least_s, "position", waits)
 
     def sensor(
-        self,
-        device: str | None = None,
-        *,
-        after_s: float | None = None,
-        any_age: bool = False,
-        waits: bool = True,
+        self, device: str | None = None, *, any_age: bool = False, waits: bool = True
     ) -> Sample[Sensor]:
         """The newest reading of a sensor, as `pose`."""
-        least_s = -math.inf if any_age else after_s
+        least_s = -math.inf if any_age else None
         return self._newest(self._sensors, device, least_s, "sensor reading", waits)
 
     def status(self, device: str) -> Sample[Status] | None:

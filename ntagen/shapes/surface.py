@@ -12,22 +12,24 @@ from ntagen.shapes.shape import Points, Shape, Vector
 from ntagen.shapes.skin import skin
 
 _HALVINGS: Final = 50
+_MOST_MM: Final = 100.0
+"""A ray that does not leave its shape, as in a half-space, ends here."""
+
 _ROWS, _COLUMNS = 13, 24
 
 
-def surface_mm(shape: Shape, directions: Points, most_mm: float = 100.0) -> Points:
+def surface_mm(shape: Shape, directions: Points) -> Points:
     """Where rays from the middle of a shape leave it.
 
     Args:
         shape: A convex shape; its middle lies inside, or on its surface.
         directions: Unit vectors, with the shape (n, 3).
-        most_mm: A ray that does not leave the shape, as in a half-space, ends here.
     """
     import numpy as np
 
     middle = np.array(shape.center_mm)
     low = np.zeros(len(directions))
-    high = np.full(len(directions), min(most_mm, shape.reach_mm()))
+    high = np.full(len(directions), min(_MOST_MM, shape.reach_mm()))
     for _ in range(_HALVINGS):
         half = 0.5 * (low + high)
         is_inside = shape.distance_mm(middle + half[:, None] * directions) <= 0.0

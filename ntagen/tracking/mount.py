@@ -17,6 +17,7 @@ from ntagen.needle.vectors import add, combine, cross, dot, norm, scale, unit
 from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, Transform, turned
 from ntagen.openigtlink.samples import Pose
 from ntagen.scene import Vector
+from ntagen.shapes import UPRIGHT
 
 AXES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -82,7 +83,7 @@ def _known(pose: Pose, device: str) -> tuple[Freedom, Columns]:
     """How much is known of a pose, and its matrix."""
     match pose:
         case Position(position_mm, quaternion):
-            freedom, columns = Freedom.POSITION, _unturned(position_mm)
+            freedom, columns = Freedom.POSITION, (*UPRIGHT, position_mm)
             if quaternion is not None:
                 _require_finite(quaternion, device)
                 freedom, columns = Freedom.POSE, _from_quaternion(quaternion, position_mm, device)
@@ -100,10 +101,6 @@ def _known(pose: Pose, device: str) -> tuple[Freedom, Columns]:
     for column in checked:
         _require_finite(column, device)
     return freedom, columns
-
-
-def _unturned(position_mm: Vector) -> Columns:
-    return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), position_mm)
 
 
 def _from_quaternion(
