@@ -60,15 +60,10 @@ def sweep_of_task(
             "`ntagen experiment`"
         )
     row: dict[str, object] = {"scenario": str(task), "known": known, "needle": needle}
-    row["seeds"] = runs
-    drive: dict[str, object] = {}
-    for words, value in {**settings, over.words: listed_values(over, values)}.items():
-        key = words.replace(" ", "_")
-        if key in ERRORS:
-            row[key] = value
-        else:
-            drive[words] = value
-    row["drive"] = drive
+    given = {**settings, over.words: listed_values(over, values)}
+    errors = {key: given[one.words] for key, one in ERRORS.items() if one.words in given}
+    drive = {words: one for words, one in given.items() if words.replace(" ", "_") not in errors}
+    row |= {**errors, "seeds": runs, "drive": drive}
     experiment = experiment_of({"name": f"{task.stem} over {over.words}", "row": [row]})
     for one in experiment.rows:
         _require_effect(one, over)

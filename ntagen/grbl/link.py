@@ -17,7 +17,7 @@ Rules that are kept here and nowhere else:
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 from ntagen.errors import DeviceError
@@ -211,13 +211,12 @@ class Link:
             end_s = self.now_s() + timeout_s
             while self.now_s() < end_s:
                 self._write(STATUS)
-                pause_s = min(self.now_s() + 0.25, end_s)
-                while (left_s := pause_s - self.now_s()) > 0.0:
-                    for reply in self._starting(left_s):
-                        if isinstance(reply, Status):
-                            status = self._settled(reply)
-                            self._form = status.form
-                            return status
+                status = next(self._reports_until(min(self.now_s() + 0.25, end_s)), None)
+                if status is not None:
+                    # The last report counts, once the controller is silent.
+                    *_, status = status, *self._reports_until(self.now_s() + 0.1)
+                    self._form = status.form
+                    return status
         if self._buffer and self._noise is None:
             # A wrong baud rate gives bytes without an end of a line.
             self._noise = nonsense(bytes(self._buffer))
@@ -245,24 +244,15 @@ class Link:
 
     # What comes in.
 
-    def _settled(self, first: Status) -> Status:
-        """The last report once a controller that has just started is silent."""
-        status = first
-        quiet_s = self.now_s() + 0.1
-        while (left_s := quiet_s - self.now_s()) > 0.0:
-            for reply in self._starting(left_s):
-                if isinstance(reply, Status):
-                    status = reply
-        return status
-
-    def _starting(self, timeout_s: float) -> list[Reply]:
-        """Reads once from a controller that may be starting.
+    def _reports_until(self, end_s: float) -> Iterator[Status]:
+        """The status reports of a controller that may be starting.
 
         Noise is no fault yet: a line may have begun before the port was opened.
         """
-        replies, noise = self._pump(timeout_s)
-        self._noise = noise or self._noise
-        return replies
+        while (left_s := end_s - self.now_s()) > 0.0:
+            replies, noise = self._pump(left_s)
+            self._noise = noise or self._noise
+            yield from (reply for reply in replies if isinstance(reply, Status))
 
     def _ask(self, watch: Watch | None, *, forgiving: bool = False) -> Status:
         # A report that was late must not be taken for the answer.

@@ -68,7 +68,7 @@ def read_nifti(path: str, matrix: Matrix | None) -> Volume:
         shown = len([size for size in sizes if size > 1])
         raise malformed(f"`{path}` has {shown} dimensions, not 3", "save one volume")
     offset = float(header["vox_offset"])
-    if not _HEADER_BYTES[_version(data, encoding)] <= offset < 2**31 or offset % 1.0:
+    if not int(header["sizeof_hdr"]) <= offset < 2**31 or offset % 1.0:
         raise _wrong(path, "vox_offset", offset, "where no voxels can begin")
     unit = int(header["xyzt_units"]) & 7
     if unit not in _UNITS_MM:
@@ -93,15 +93,6 @@ def read_nifti(path: str, matrix: Matrix | None) -> Volume:
     )
 
 
-def _start(data: bytes, encoding: Encoding) -> bytes:
-    """The first bytes, unpacked."""
-    return unpacking(data, encoding).read(_HEADER_BYTES[2])
-
-
-def _version(data: bytes, encoding: Encoding) -> int:
-    return 2 if _start(data, encoding)[:4] in (b"\x1c\x02\0\0", b"\0\0\x02\x1c") else 1
-
-
 def _header(path: str, nibabel: Any, data: bytes, encoding: Encoding) -> Any:  # noqa: ANN401
     """The header as nibabel reads it; nothing in it is checked.
 
@@ -109,8 +100,8 @@ def _header(path: str, nibabel: Any, data: bytes, encoding: Encoding) -> Any:  #
         ImageError: This is none.
     """
     try:
-        start = _start(data, encoding)
-        version = _version(data, encoding)
+        start = unpacking(data, encoding).read(_HEADER_BYTES[2])
+        version = 2 if start[:4] in (b"\x1c\x02\0\0", b"\0\0\x02\x1c") else 1
         kind = nibabel.Nifti1Header if version == 1 else nibabel.Nifti2Header
         header = kind(start[: _HEADER_BYTES[version]], check=False)
         magic = start[344:348] if version == 1 else start[4:12]

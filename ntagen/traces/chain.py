@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 Array = NDArray[np.float64]
 
@@ -57,7 +58,9 @@ def _arcs(curvature_per_mm: float, rolls: Rolls) -> list[tuple[Array, Array, Arr
         length_mm = depth_mm - begin_mm
         x, y = _on_arc(curvature_per_mm, length_mm)
         origin = origin + x[:, None] * frame[:, :, 0] + y[:, None] * frame[:, :, 1]
-        frame = frame @ _turns(curvature_per_mm * length_mm) @ _roll_turns(angle_rad)
+        # The push turns the heading away from the bevel; then the frame rolls about the heading.
+        angles_rad = np.column_stack([-curvature_per_mm * length_mm, angle_rad])
+        frame = frame @ Rotation.from_euler("ZX", angles_rad).as_matrix()
         begin_mm = depth_mm
         arcs.append((begin_mm, frame, origin))
     return arcs
@@ -68,26 +71,6 @@ def _on_arc(curvature_per_mm: float, along_mm: Array) -> tuple[Array, Array]:
     half_rad = 0.5 * curvature_per_mm * along_mm
     chord_mm = along_mm * np.sinc(half_rad / math.pi)
     return chord_mm * np.cos(half_rad), -chord_mm * np.sin(half_rad)
-
-
-def _turns(angles_rad: Array) -> Array:
-    """By a push on an angle: the frame after it, in the frame before it."""
-    turns = np.zeros((len(angles_rad), 3, 3))
-    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angles_rad)
-    turns[:, 0, 1] = np.sin(angles_rad)
-    turns[:, 1, 0] = -turns[:, 0, 1]
-    turns[:, 2, 2] = 1.0
-    return turns
-
-
-def _roll_turns(angles_rad: Array) -> Array:
-    """By a roll: the frame after it, in the frame before it."""
-    turns = np.zeros((len(angles_rad), 3, 3))
-    turns[:, 0, 0] = 1.0
-    turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles_rad)
-    turns[:, 2, 1] = np.sin(angles_rad)
-    turns[:, 1, 2] = -turns[:, 2, 1]
-    return turns
 
 
 @dataclass(frozen=True, slots=True)
