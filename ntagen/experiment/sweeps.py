@@ -84,16 +84,8 @@ def conclusions_of(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> lis
         if rows[row]["reach_rate"] is not None
     ]
     whole = [(value, row) for value, row in found if row["reach_rate"] == 1.0]
-    fewer = [
-        f"{value} ({row['reached']} of {row['runs']}; {_interval(row, 'reach')})"
-        for value, row in found
-        if row["reach_rate"] < 1.0
-    ]
-    hits = [
-        f"{value} ({row['hits']} of {row['runs']}; {_interval(row, 'hit')})"
-        for value, row in found
-        if row["hits"]
-    ]
+    fewer = [_counted(*one, "reach", "reached") for one in found if one[1]["reach_rate"] < 1.0]
+    hits = [_counted(*one, "hit", "hits") for one in found if one[1]["hits"]]
     lines = []
     if whole:
         least = min(row["reach_low"] for _, row in whole)
@@ -114,8 +106,10 @@ def conclusions_of(document: Mapping[str, Any], sweep: Mapping[str, Any]) -> lis
     return lines
 
 
-def _interval(row: Mapping[str, Any], name: str) -> str:
-    return f"95 %: {row[f'{name}_low']:.1%} to {row[f'{name}_high']:.1%}"
+def _counted(value: str, row: Mapping[str, Any], name: str, count: str) -> str:
+    """How often something happened at a value, with the interval of its rate."""
+    interval = f"95 %: {row[f'{name}_low']:.1%} to {row[f'{name}_high']:.1%}"
+    return f"{value} ({row[count]} of {row['runs']}; {interval})"
 
 
 def _listed(parts: Iterable[str]) -> str:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from ntagen.errors import DeviceError, Halted
-from ntagen.grbl.axes import Axes, Motor, motor
+from ntagen.grbl.axes import Axes, Motor, motors
 from ntagen.grbl.identity import Identity, identify, position_of, require_ready
 from ntagen.grbl.link import Link, RefusedError, Watch
 from ntagen.grbl.port import Port
@@ -117,14 +117,7 @@ class GrblActuator:
         self._link = Link(port)
         self._axes = axes
         self.identity: Identity = identify(self._link)
-        self._insert = motor(
-            self._link,
-            self.identity,
-            axes.insert,
-            "mm",
-            max(axes.push_mm_per_s, axes.pull_mm_per_s),
-        )
-        self._roll = motor(self._link, self.identity, axes.roll, "deg", axes.roll_deg_per_s)
+        self._insert, self._roll = motors(self._link, self.identity, axes)
         # Where the axes must stand: rounded steps must not add up over many motions.
         self._expected = position_of(self.identity.status)
         self._stops = 0

@@ -122,6 +122,17 @@ class Motor:
         return s / v + v / a if s * a >= v * v else 2.0 * math.sqrt(s / a)
 
 
+def motors(link: Link, identity: Identity, axes: Axes) -> tuple[Motor, Motor]:
+    """Finds the axes that insert and turn the needle, as `motor`.
+
+    Raises:
+        DeviceError: One is not there, its steps are others, or it is too slow.
+    """
+    speed_mm_per_s = max(axes.push_mm_per_s, axes.pull_mm_per_s)
+    insert = motor(link, identity, axes.insert, "mm", speed_mm_per_s)
+    return insert, motor(link, identity, axes.roll, "deg", axes.roll_deg_per_s)
+
+
 def motor(link: Link, identity: Identity, axis: Axis, unit: str, speed: float) -> Motor:
     """Finds an axis at the controller, and compares the settings with what is expected.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-from ntagen.grbl.axes import Axes, motor
+from ntagen.grbl.axes import Axes, motors
 from ntagen.grbl.identity import Identity, identify, position_of
 from ntagen.grbl.link import Link
 from ntagen.grbl.port import Port
@@ -70,8 +70,7 @@ def inspect(port: Port, axes: Axes | None = None) -> Findings:
     link = Link(port)
     identity = identify(link)
     if axes is not None:
-        motor(link, identity, axes.insert, "mm", max(axes.push_mm_per_s, axes.pull_mm_per_s))
-        motor(link, identity, axes.roll, "deg", axes.roll_deg_per_s)
+        motors(link, identity, axes)
     link.pause(_WATCH_S)
     status = link.status()
     stands = status.stands and position_of(status) == position_of(identity.status)

@@ -8,6 +8,7 @@ voxels are, so nothing ends up on the other side.
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import re
@@ -192,15 +193,12 @@ def _header(path: str, data: bytes) -> Header:
         )
     fields: dict[str, str] = {}
     keys: dict[str, str] = {}
-    at = magic.end()
-    while at < len(data):
-        end = data.find(b"\n", at, _HEADER_BYTES)
-        if end < 0:
-            end = len(data)
-        if end >= _HEADER_BYTES:
+    file = io.BytesIO(data)
+    file.seek(magic.end())
+    while text := file.readline(_HEADER_BYTES):
+        if file.tell() > _HEADER_BYTES:
             raise malformed(f"the header of `{path}` has no end")
-        line = data[at:end].decode("utf-8", "replace").rstrip()
-        at = end + 1
+        line = text.decode("utf-8", "replace").rstrip()
         if not line:
             break
         if line.startswith("#"):
@@ -219,7 +217,7 @@ def _header(path: str, data: bytes) -> Header:
         if name in found:
             raise malformed(f"`{name[:60]}` stands twice in `{path}`", "remove one of them")
         found[name] = _unescaped(value[1:].strip()) if is_key else value.strip()
-    return Header(path, fields, keys, at)
+    return Header(path, fields, keys, file.tell())
 
 
 def _unescaped(text: str) -> str:

@@ -27,7 +27,6 @@ from typing import Final, Self
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.messages import (
     Position,
-    QuaternionTrackingData,
     Sensor,
     StartTracking,
     Status,
@@ -318,7 +317,7 @@ class Client:
         match packet.content:
             case Transform() | Position() as content:
                 self._keep_pose(sample(packet.device, content))
-            case TrackingData(tools) | QuaternionTrackingData(tools):
+            case TrackingData(tools):
                 for tool in tools:
                     self._keep_pose(sample(tool.name, tool))
             case Sensor() as content:

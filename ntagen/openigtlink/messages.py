@@ -179,12 +179,10 @@ class TrackingData:
 
 
 @dataclass(frozen=True, slots=True)
-class QuaternionTrackingData:
+class QuaternionTrackingData(TrackingData):
     """QTDATA: the same with positions and quaternions instead of matrices. It is only read."""
 
     TYPE: ClassVar[str] = "QTDATA"
-
-    tools: tuple[Tool, ...]
 
     def to_bytes(self) -> bytes:
         """See `Content.to_bytes`."""
