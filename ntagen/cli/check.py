@@ -35,8 +35,8 @@ from ntagen.cli.models.outputs import Outputs
 from ntagen.cli.models.plan_lists import LINES, ListLimits
 from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
 from ntagen.cli.models.questions import Questions
-from ntagen.cli.models.run_progress import progress_of, say_interrupted
 from ntagen.cli.notes import given_options, say
+from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.rules import overflow_rule
 from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached

@@ -9,12 +9,8 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.guard import Guard
-from ntagen.cli.quantities import COUNT, SIZE, TIME
+from ntagen.cli.quantities import count, duration, size
 from ntagen.cli.rules import Decorator
-
-
-def _whole(_ctx: click.Context, _param: click.Parameter, value: float | None) -> int | None:
-    return None if value is None else int(value)
 
 
 def limits(default: str = "no limit") -> dict[str, Decorator]:
@@ -27,7 +23,7 @@ def limits(default: str = "no limit") -> dict[str, Decorator]:
         "states": click.option(
             "--states",
             metavar="N",
-            type=COUNT,
+            type=count,
             help="Stop a search after this many stored states, for example 10k or 2M.  "
             f"[default: {default}]",
         ),
@@ -35,8 +31,7 @@ def limits(default: str = "no limit") -> dict[str, Decorator]:
             "--memory",
             "memory_bytes",
             metavar="SIZE",
-            type=SIZE,
-            callback=_whole,
+            type=size,
             help="Stop what takes this much memory, for example 4GiB: a search by its states, all "
             f"else by what the process takes.  [default: {default}]",
         ),
@@ -44,7 +39,7 @@ def limits(default: str = "no limit") -> dict[str, Decorator]:
             "--timeout",
             "timeout_s",
             metavar="TIME",
-            type=TIME,
+            type=duration,
             help="Stop after this time, with reading, writing and drawing, for example 60s or "
             f"2min; a number without a unit is in seconds.  [default: {default}]",
         ),

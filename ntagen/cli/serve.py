@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.quantities import duration, size
 from ntagen.cli.terminal import echo
 from ntagen.files import read_file
 
@@ -31,7 +31,7 @@ from ntagen.files import read_file
     "--timeout",
     "timeout_s",
     metavar="TIME",
-    type=TIME,
+    type=duration,
     default="60s",
     show_default=True,
     help="Stop what is asked for after this time, with reading and drawing.",
@@ -40,7 +40,7 @@ from ntagen.files import read_file
     "--memory",
     "memory_bytes",
     metavar="SIZE",
-    type=SIZE,
+    type=size,
     default="1GiB",
     show_default=True,
     help="Stop what takes this much memory.",
@@ -49,7 +49,7 @@ from ntagen.files import read_file
     "--upload",
     "upload_bytes",
     metavar="SIZE",
-    type=SIZE,
+    type=size,
     default="32MiB",
     show_default=True,
     help="Refuse files that are larger.",
@@ -58,8 +58,8 @@ def command(
     file: Path | None,
     port: int,
     timeout_s: float,
-    memory_bytes: float,
-    upload_bytes: float,
+    memory_bytes: int,
+    upload_bytes: int,
 ) -> None:
     """Show models, environments and runs in the browser: verdicts, traces and pictures.
 
@@ -78,8 +78,8 @@ def command(
 
     limits = Limits(
         timeout_s=timeout_s,
-        memory_bytes=int(memory_bytes),
-        upload_bytes=int(upload_bytes),
+        memory_bytes=memory_bytes,
+        upload_bytes=upload_bytes,
         jobs=max(2, os.cpu_count() or 1),
     )
     data = None if file is None else read_file(file, limits.upload_bytes)

@@ -13,7 +13,6 @@ from ntagen.cli.guard import current, doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
 from ntagen.cli.models.plot_runs import NAMES, plot_runs
 from ntagen.cli.models.queries import Asked, queries_of
-from ntagen.cli.models.run_progress import STATISTICAL
 from ntagen.cli.notes import say_idle
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError, LimitError, ModelError
@@ -108,7 +107,7 @@ def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
     if wish.kind is None and wish.asked is None and len(model.queries) != 1:
         return None
     query = _query(model, wish)
-    if query.form is not None and query.form.kind in STATISTICAL:
+    if query.form is not None and query.form.is_statistical:
         return query
     if wish.kind == "runs":
         raise InputError(

@@ -10,7 +10,7 @@ import click
 from ntagen.cli.guard import current
 from ntagen.cli.models.options import RUNS
 from ntagen.cli.models.queries import Asked
-from ntagen.cli.models.run_progress import progress_of, say_interrupted
+from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.settings import Setting
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError, LimitError, ModelError

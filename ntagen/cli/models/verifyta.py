@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.models.run_progress import progress_of, say_interrupted
+from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart, write_files

@@ -31,17 +31,13 @@ _MOST_MM: Final = 10.0
 _STEPPERS_ONLY: Final = {"motion": "--move", "yes": "--yes"}
 
 
-class _Motion(click.ParamType[tuple[str, float]]):
+_LENGTH: Final = click.FloatRange(min=0.0, max=_MOST_MM, min_open=True)
+
+
+def _motion(value: object) -> tuple[str, float]:
     """An axis, X if none is named, and how far it is moved, in mm."""
-
-    name = "motion"
-    _length: Final = click.FloatRange(min=0.0, max=_MOST_MM, min_open=True)
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, float]:
-        axis, _, length = str(value).rpartition(":")
-        return axis or "X", float(self._length(length, param, ctx))
+    axis, _, length = str(value).rpartition(":")
+    return axis or "X", float(_LENGTH(length))
 
 
 @click.group("device")
@@ -71,7 +67,7 @@ command.add_command(test)
     "--move",
     "motion",
     metavar="[AXIS:]MM",
-    type=_Motion(),
+    type=_motion,
     help=f"Also move an axis (X by itself) by this length, at most {_MOST_MM:g} mm, and back, "
     "after you agree.",
 )

@@ -13,7 +13,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import include_option, show_warnings
 from ntagen.cli.needle.match_tables import show
-from ntagen.cli.quantities import LENGTH
+from ntagen.cli.quantities import length
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
@@ -29,18 +29,12 @@ if TYPE_CHECKING:
 _STARTS: Final = ("free", "fit", "model")
 
 
-class _Start(click.ParamType[tuple[Any, float]]):
+def _start(value: object) -> tuple[Any, float]:
     """What is known of the start, and the length of the first part that says it, in mm."""
-
-    name = "start"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[Any, float]:
-        start, _, length = str(value).partition(":")
-        if start not in _STARTS:
-            self.fail(f"{start!r} is not one of {', '.join(_STARTS)}", param, ctx)
-        return start, LENGTH.convert(length or "20mm", param, ctx)
+    start, _, part = str(value).partition(":")
+    if start not in _STARTS:
+        raise click.BadParameter(f"{start!r} is not one of {', '.join(_STARTS)}")
+    return start, length(part or "20mm")
 
 
 @click.command(
@@ -56,7 +50,7 @@ class _Start(click.ParamType[tuple[Any, float]]):
 @click.option(
     "--start",
     metavar="free|fit|model[:LENGTH]",
-    type=_Start(),
+    type=_start,
     default="free",
     show_default=True,
     help="What is known of the start: nothing (free); its pose by a circle fit of the first part "
@@ -82,7 +76,7 @@ class _Start(click.ParamType[tuple[Any, float]]):
     "--from",
     "from_mm",
     metavar="LENGTH",
-    type=LENGTH,
+    type=length,
     default="0mm",
     help="Match the trace from this depth on, for example after what was no insertion yet. All "
     "other depths are counted from there.",
@@ -91,7 +85,7 @@ class _Start(click.ParamType[tuple[Any, float]]):
     "--until",
     "until_mm",
     metavar="LENGTH",
-    type=LENGTH,
+    type=length,
     help="Match the trace up to this depth only, for example before a pull.",
 )
 @click.option("--predict", is_flag=True, help="Predict the rest from the first 20, 30 and 40 mm.")

@@ -13,7 +13,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import include_option
 from ntagen.cli.needle.odds import Wanted, odds_lines, odds_options, rate, with_odds
-from ntagen.cli.quantities import TIME
+from ntagen.cli.quantities import duration
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
 
@@ -51,7 +51,7 @@ STOPPED: Final = 3
     metavar="TIME",
     default="2s",
     show_default=True,
-    type=TIME,
+    type=duration,
     help="The search ends after about this time. It ends sooner if no plan can be better.",
 )
 @click.option(
