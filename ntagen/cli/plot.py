@@ -11,8 +11,7 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
-from ntagen.cli.limits import limits
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.models.plot_models import (
     KINDS,
     MODELS,
@@ -26,6 +25,7 @@ from ntagen.cli.models.plot_models import (
 from ntagen.cli.models.plot_runs import NAMES
 from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
 from ntagen.cli.notes import say_idle
+from ntagen.cli.options import include_option, limits
 from ntagen.cli.settings import Setting, settings_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
@@ -237,14 +237,11 @@ def _of_scene(
 ) -> Picture:
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
-    from ntagen.nsl import load_task
     from ntagen.plot.face import picture_with_plans
     from ntagen.plot.run import picture_of_plans
 
     with doing("loading the task"):
-        task = load_task(source, include=include)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
+        task = load_task(source, include)
     configuration = configure(task.given, task.scene)
     settings = configuration.settings
     timeout_s = current().left_s()

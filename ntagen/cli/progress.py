@@ -99,7 +99,13 @@ def progress_of(query: str, form: QueryForm | None, quiet: bool) -> Iterator[dic
     start = time.monotonic()
     try:
         with status("making random runs …", quiet=quiet) as show:
-            yield {"run_progress": lambda *told: show(so_far(*told, time.monotonic() - start))}
+
+            def report_runs(
+                runs: int, estimate: float | None, lower: float | None, upper: float | None
+            ) -> None:
+                show(so_far(runs, estimate, lower, upper, time.monotonic() - start))
+
+            yield {"run_progress": report_runs}
     except Interrupted:
         raise
     except KeyboardInterrupt:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ntagen.cli.rules import Decorator
+from ntagen.cli.options import Decorator
 from ntagen.cli.terminal import echo
 from ntagen.values import dataclass
 

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import re
 import sys
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Collection, Iterable, Sequence
+from typing import Final, NamedTuple
 
 import click
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 _UNSAFE: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
@@ -53,13 +51,45 @@ def safe(text: str) -> str:
     return _UNSAFE.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
-def table_console() -> Console:
-    """Where tables are printed, of texts that were made safe before."""
-    from rich.console import Console
+def print_table(
+    headings: Sequence[str], rows: Iterable[Sequence[str]], numbers: Collection[str]
+) -> None:
+    """Prints a table; columns of numbers are at the right, and are not folded.
 
+    Args:
+        headings: The headings of the columns.
+        rows: The rows; one may be shorter.
+        numbers: Which columns have numbers.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+    for name in headings:
+        if name in numbers:
+            table.add_column(name, justify="right", no_wrap=True)
+        else:
+            table.add_column(name, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(safe(cell)) for cell in row))
     # A pipe or file has no width, and text that is folded over two lines is hard to search.
     width = None if sys.stdout.isatty() else _UNBOUNDED_WIDTH
-    return Console(highlight=False, markup=False, width=width)
+    console = Console(highlight=False, markup=False, width=width)
+    console.print(table)
+
+
+def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> list[str]:
+    """Rows as lines with columns of equal widths; those with these numbers end at the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            f"{cell:>{width}}" if number in right else f"{cell:<{width}}"
+            for number, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
 
 
 def echo(*parts: str | Styled, err: bool = False, nl: bool = True) -> None:

@@ -9,10 +9,8 @@ from typing import Final
 
 import click
 
-from ntagen.cli.limits import LIMITS
-from ntagen.cli.option_groups import gathered
+from ntagen.cli.options import LIMITS, Decorator, forced_rule, gathered
 from ntagen.cli.quantities import number, pair
-from ntagen.cli.rules import Decorator, forced_rule
 from ntagen.cli.settings import Setting
 
 _MOST_THREADS: Final = 2048

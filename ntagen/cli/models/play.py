@@ -12,11 +12,17 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
-from ntagen.cli.loading import constant_option, include_option, load_model, pointing_to_explanations
+from ntagen.cli.loading import load_model, pointing_to_explanations
 from ntagen.cli.models.session import Session
 from ntagen.cli.notes import say_idle
+from ntagen.cli.options import (
+    constant_option,
+    forced_rule,
+    include_option,
+    overflow_rule,
+    priority_rule,
+)
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart

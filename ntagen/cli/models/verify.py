@@ -9,10 +9,16 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.guard import doing
-from ntagen.cli.limits import bounded
-from ntagen.cli.loading import constant_option, include_option, load_model, pointing_to_explanations
+from ntagen.cli.loading import load_model, pointing_to_explanations
 from ntagen.cli.notes import say_idle
-from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
+from ntagen.cli.options import (
+    bounded,
+    constant_option,
+    forced_rule,
+    include_option,
+    overflow_rule,
+    priority_rule,
+)
 from ntagen.cli.terminal import echo
 from ntagen.files import EVIDENCE_BYTES, read_file
 

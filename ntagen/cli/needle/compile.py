@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import show_warnings
+from ntagen.cli.options import include_option
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
@@ -40,8 +41,7 @@ def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:
     from ntagen.render import render, render_queries
 
     scene, warnings = load_with_warnings(environment, include=include)
-    for warning in warnings:
-        echo(warning.render(), err=True)
+    show_warnings([warning.render() for warning in warnings])
     name = environment.stem or environment.name
     model = folder / f"{name}.xml"
     queries = folder / f"{name}.q"

@@ -12,7 +12,7 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.needle.lab import command as simulate
-from ntagen.cli.needle.plugins import check_plugin, installed, is_plugin
+from ntagen.cli.needle.plugins import check_plugin, for_steppers, installed, is_plugin
 from ntagen.cli.needle.plugins import command as test
 from ntagen.cli.needle.tracker import look_at
 from ntagen.cli.notes import say_idle
@@ -138,12 +138,8 @@ def check(
 
 def _described(path: Path) -> tuple[str, Axes]:
     """The device that a task describes, and its axes."""
-    from ntagen.drive.configure import configure
-    from ntagen.nsl import load_task
-
-    task = load_task(path)
+    task, settings = for_steppers(path)
     device = described(task, path)
-    settings = configure(task.given, task.scene, needle="grbl").settings
     return f"grbl:{device.port}", axes_for(device, task.scene.needle, settings)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.answering_tissue import (
     Wanted,
     course_of,
@@ -31,14 +32,14 @@ from ntagen.cli.needle.steering import (
     show_settings,
 )
 from ntagen.cli.needle.tracker import (
-    Sense,
     Tracking,
     opened,
-    opened_live,
-    tracker_options,
+    registration_option,
+    tracker_option,
     tracking_of,
 )
 from ntagen.cli.notes import say_idle
+from ntagen.cli.options import include_option
 from ntagen.cli.signals import TERMINATED
 from ntagen.cli.terminal import echo
 from ntagen.drive.states import State
@@ -91,7 +92,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     is_flag=True,
     help="Ask before each plan that is followed, and before the needle is pulled back for one.",
 )
-@tracker_options
+@tracker_option
+@registration_option
 @course_options
 @known_option
 @click.option(
@@ -166,7 +168,6 @@ def command(
     from ntagen.drive.configure import configure
     from ntagen.drive.knowledge import told
     from ntagen.drive.needles import LAB
-    from ntagen.nsl import load_task
 
     if needle == LAB:
         raise InputError(
@@ -175,9 +176,7 @@ def command(
         )
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
-    task = load_task(environment, include=include)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
+    task = load_task(environment, include)
     task = _breathing(task, breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
@@ -188,19 +187,10 @@ def command(
         return 0
     tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
     terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
-    entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
-    # A tracker or a port that cannot be reached must not cost an earlier log.
-    with signalled_operator() as operator, contextlib.ExitStack() as stack:
+    with signalled_operator() as operator:
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
         run = _Run(environment, task, configuration, known, tracking, wanted, course)
-        if is_real:
-            setup = stack.enter_context(_real_needle(run, needle))
-            log = stack.enter_context(_log(log_path, run))
-            result = _drive_real(run, setup, log, terminal, operator)
-        else:
-            sense = stack.enter_context(opened(tracking, entry, watches_force=watches_force))
-            log = stack.enter_context(_log(log_path, run))
-            result = _drive(run, sense, log, terminal, operator)
+        result = _drive(run, needle, log_path, terminal, operator)
     if as_json:
         guarantee = guarantee_of(result, task.scene, course)
         ended = summary(result, configuration, known, log_path)
@@ -267,8 +257,11 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
     from ntagen.drive.needles import REAL
     from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
     from ntagen.grbl.port import SerialPort
+    from ntagen.tracking.opening import opened_live
 
-    settings, scene = run.configuration.settings, run.scene
+    settings, scene, tracking = run.configuration.settings, run.scene, run.tracking
+    if tracking.tracker is None:
+        raise AssertionError("a real needle has a tracker (`tracking_of`)")
     name, _, argument = needle.partition(":")
     if name == REAL:
         device = described(run.task, run.environment)
@@ -280,7 +273,9 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
     with (
         opening as actuator,
         opened_live(
-            run.tracking,
+            tracking.text,
+            tracking.tracker,
+            tracking.transform,
             scene.needle.tip,
             actuator.now_s,
             watches_force=settings.force_sensing,
@@ -290,49 +285,42 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
         yield actuator, sensor
 
 
-def _drive_real(
-    run: _Run,
-    setup: tuple[WatchedActuator, LiveSensor],
-    log: list[Journal],
-    terminal: _Terminal,
-    operator: SignalledOperator,
-) -> Driven:
-    from ntagen.drive.real import drive
-
-    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
-        return drive(
-            run.scene,
-            *setup,
-            synthesise,
-            run.configuration.settings,
-            journal,
-            known=run.known,
-            listen=operator.listen,
-            agree=agree,
-            course=run.course,
-        )
-
-
 def _drive(
     run: _Run,
-    sense: Sense | None,
-    log: list[Journal],
+    needle: str,
+    log_path: Path | None,
     terminal: _Terminal,
     operator: SignalledOperator,
 ) -> Driven:
+    """Drives a real or a simulated needle."""
+    from ntagen.drive.real import drive
     from ntagen.drive.simulate import simulate
 
-    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
-        return simulate(
-            run.scene,
+    configuration, settings, scene = run.configuration, run.configuration.settings, run.scene
+    steer: Callable[..., Driven]
+    with contextlib.ExitStack() as stack:
+        if configuration.needle.is_real:
+            steer = functools.partial(drive, scene, *stack.enter_context(_real_needle(run, needle)))
+        else:
+            watches_force = settings.force_sensing
+            sensing = opened(run.tracking, scene.needle.tip, watches_force=watches_force)
+            steer = functools.partial(
+                simulate,
+                scene,
+                errors=configuration.errors,
+                make=maker(run.wanted, scene, configuration, run.course),
+                seed=configuration.seed,
+                sense=stack.enter_context(sensing),
+            )
+        # A tracker or a port that cannot be reached must not cost an earlier log.
+        log = stack.enter_context(_log(log_path, run))
+        means = stack.enter_context(_around(run, log, terminal, operator))
+        synthesise, journal, agree = means
+        return steer(
             synthesise,
-            run.configuration.settings,
+            settings,
             journal,
             known=run.known,
-            errors=run.configuration.errors,
-            make=maker(run.wanted, run.scene, run.configuration, run.course),
-            seed=run.configuration.seed,
-            sense=sense,
             listen=operator.listen,
             agree=agree,
             course=run.course,

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option, show_warnings
+from ntagen.cli.loading import load_task, show_warnings
 from ntagen.cli.needle.match_tables import show
+from ntagen.cli.options import include_option
 from ntagen.cli.quantities import length
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -139,14 +140,12 @@ def command(
       ntagen match examples/traces/bench.nsl examples/traces/two_rolls.csv -o match.png
       ntagen match bench.nsl trial*.csv --radius fit --predict --columns AuroraTip
     """  # noqa: D301  click wants the control character
-    from ntagen.nsl import load_task
     from ntagen.traces.matching import Options
     from ntagen.traces.reading import Columns
 
     if output is not None:
         _require_picture(output, environment, traces)
-    task = load_task(environment, include=include)
-    show_warnings([warning.render() for warning in task.warnings])
+    task = load_task(environment, include)
     options = Options(start=start[0], radius=radius, rolls=rolls, first_mm=start[1])
     part_mm = (math.inf if until_mm is None else until_mm, from_mm)
     found = []

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.notes import say_idle
-from ntagen.cli.option_groups import gathered
+from ntagen.cli.options import gathered
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.odds import Wanted, odds_lines, odds_options, rate, with_odds
+from ntagen.cli.options import include_option
 from ntagen.cli.quantities import duration
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
@@ -116,17 +117,14 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
-    from ntagen.nsl import load_task
     from ntagen.plan.anytime import best_plans
     from ntagen.plan.rank import split_ranking
 
     if output is not None:
         require_apart({"-o": output}, {"source": source})
     by_odds, criteria = (False, None) if ranking is None else split_ranking(ranking)
-    task = load_task(source, include=include)
+    task = load_task(source, include)
     wanted = wanted.checked(task.scene, count, by_odds=by_odds)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
     settings = settings if criteria is None else replace(settings, ranking=criteria)
     engine = replace(engine_for(settings), ranking=settings.ranking)

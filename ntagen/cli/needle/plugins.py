@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from ntagen.drive.device import LiveSensor, WatchedActuator
     from ntagen.drive.plugin import Speeds
+    from ntagen.drive.settings import Settings
+    from ntagen.nsl import Task
     from ntagen.testing import Check
 
 _MOST_MM: Final = 10.0
@@ -182,16 +184,22 @@ def _agree(device: str, length_mm: float, angle_deg: float, *, yes: bool) -> Non
         raise InputError("nothing was moved\nhint: agree, or give --yes")
 
 
+def for_steppers(path: Path) -> tuple[Task, Settings]:
+    """A task, and its settings for a needle that steppers move."""
+    from ntagen.drive.configure import configure
+    from ntagen.nsl import load_task
+
+    task = load_task(path)
+    return task, configure(task.given, task.scene, needle="grbl").settings
+
+
 def _speeds(task: Path | None) -> Speeds:
     """The speeds of a task, or those that are usual."""
-    from ntagen.drive.configure import configure
     from ntagen.drive.plugin import Speeds
-    from ntagen.nsl import load_task
 
     if task is None:
         return Speeds()
-    found = load_task(task)
-    settings = configure(found.given, found.scene, needle="grbl").settings
+    found, settings = for_steppers(task)
     return speeds_for(found.scene.needle, settings)
 
 
@@ -238,16 +246,12 @@ def _emulated(speeds: Speeds) -> Iterator[tuple[str, Any]]:
 
 def _axes(text: str, task: Path | None) -> Any:  # noqa: ANN401  of a type that is imported late
     """The axes that a task describes for a controller."""
-    from ntagen.drive.configure import configure
-    from ntagen.nsl import load_task
-
     if task is None:
         raise InputError(
             f"nothing says which axis of {text} does what\nhint: give --task TASK.nsl, whose "
             "`device` describes them"
         )
-    found = load_task(task)
-    settings = configure(found.given, found.scene, needle="grbl").settings
+    found, settings = for_steppers(task)
     return axes_for(described(found, task), found.scene.needle, settings)
 
 

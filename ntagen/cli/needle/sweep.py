@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.campaigns import EPILOG, FORMER, How, campaign_options, ended, made
 from ntagen.cli.needle.steering import known_option, settings_options
-from ntagen.cli.terminal import echo
 from ntagen.parameters import SEED
 
 if TYPE_CHECKING:
@@ -104,12 +104,10 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.experiment.one_sweep import quantity_of, sweep_of_task
     from ntagen.experiment.pictures import sensitivity
-    from ntagen.nsl import load_task
     from ntagen.plot.save import save
 
     parameter = quantity_of(over)
-    for warning in load_task(environment).warnings:
-        echo(warning.render(), err=True)
+    load_task(environment)
     experiment = sweep_of_task(
         environment,
         parameter,

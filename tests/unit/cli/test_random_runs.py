@@ -14,7 +14,7 @@ import pytest
 
 from ntagen import checker
 from ntagen.cli import main
-from ntagen.cli.models.run_rows import bars
+from ntagen.cli.models.answer_rows import bars
 from ntagen.cli.progress import so_far
 
 MODEL = """
