@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ntagen.checker.runs import Edge, Run, Step, edge_of, runs_of
+from ntagen.checker.runs import Edge, Run, Step, edges_of, runs_of
 
 _WIDTH = 96
 """Lists of names are folded at about this many characters."""
@@ -89,7 +89,7 @@ def _symbolic(trace: Mapping[str, Any], most: int | None) -> list[str]:
     steps = [
         _Told(
             None,
-            tuple(map(edge_of, edges)),
+            edges_of(edges),
             _changes(states[index]["variables"], states[index + 1]["variables"]),
         )
         for index, edges in enumerate(trace["transitions"])
@@ -107,7 +107,7 @@ def _symbolic(trace: Mapping[str, Any], most: int | None) -> list[str]:
 def _failing(edges: list[dict[str, Any]], state: Mapping[str, Any]) -> Iterator[str]:
     """The step in which the model fails, and the state before it."""
     yield f"{_label('')}fails in the next step:"
-    yield _INDENT + _move(tuple(map(edge_of, edges)))
+    yield _INDENT + _move(edges_of(edges))
     values = [f"{name} = {value}" for name, value in state["variables"].items() if value]
     yield from _folded([*values, *state["zone"]])
 
