@@ -379,7 +379,7 @@ class _Run:
             InputError: The query is wrong.
             LimitReached: A limit came first.
         """
-        from ntagen.verifyta.statistical import of_model
+        from ntagen.verifyta.options import of_model
 
         if isinstance(known, InputError):
             raise known

@@ -10,9 +10,10 @@ refused. There is no fourth kind: an unknown option is an error.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Sequence
-from typing import Final, Literal
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, Final, Literal
 
 from ntagen.errors import InputError
 from ntagen.values import dataclass
@@ -262,19 +263,30 @@ def _take(option: Option, value: str | None, rest: list[str], given: dict[str, s
             raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
         value = rest.pop(0)
     value = value or ""
+    _require(option, value)
+    given[option.name] = value
+
+
+def _require(option: Option, value: str) -> None:
+    """Refuses a value that an option cannot have.
+
+    Raises:
+        InputError: It is one.
+    """
+    wanted = ""
     if option.choices and value not in option.choices:
-        raise InputError(f"{option.name} is {value!r}, but must be {_choices(option)}")
-    if option.value == "N" and not value.lstrip("-").isdigit():
-        raise InputError(f"{option.name} is {value!r}, but must be an integer")
-    if option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
-        raise InputError(f"{option.name} is {value!r}, but must be a positive integer")
-    if option.value in _RANGES:
+        wanted = f"{', '.join(option.choices[:-1])} or {option.choices[-1]}".removeprefix(" or ")
+    elif option.value == "N" and not value.lstrip("-").isdigit():
+        wanted = "an integer"
+    elif option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
+        wanted = "a positive integer"
+    elif option.value in _RANGES:
         low, high, words = _RANGES[option.value]
-        if not low < _number(value) < high:
-            raise InputError(f"{option.name} is {value!r}, but must be a number {words}")
+        wanted = "" if low < _number(value) < high else f"a number {words}"
+    if wanted:
+        raise InputError(f"{option.name} is {value!r}, but must be {wanted}")
     if option.value and not value:
         raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
-    given[option.name] = value
 
 
 def _number(value: str) -> float:
@@ -284,5 +296,44 @@ def _number(value: str) -> float:
         return math.nan
 
 
-def _choices(option: Option) -> str:
-    return f"{', '.join(option.choices[:-1])} or {option.choices[-1]}".removeprefix(" or ")
+_FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
+    "--seed": ("seed", int),
+    "--runs": ("runs", int),
+    "--alpha": ("alpha", float),
+    "--beta": ("beta", float),
+    "--epsilon": ("epsilon", float),
+    "--delta": ("delta", float),
+    "--discretization": ("discretisation", float),
+}
+"""For each option of random runs, the field of `ntagen.checker.Options`, and its type."""
+
+
+def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:
+    """The fields of `ntagen.checker.Options` that a model file says for a query.
+
+    Args:
+        options: The options of the file; what is not for random runs, or has a value without
+            meaning, is left out.
+        given: The fields that the command line says itself.
+    """
+    usable = {}
+    for name in options.keys() & _FIELDS.keys():
+        field, read = _FIELDS[name]
+        with contextlib.suppress(InputError):
+            _require(_BY_LONG[name], options[name].strip())
+            if field not in given and (number := read(options[name])) >= 0:
+                usable[field] = number
+    return usable
+
+
+def statistical(given: Mapping[str, str]) -> dict[str, Any]:
+    """The fields of `ntagen.checker.Options` that these options say.
+
+    Args:
+        given: The values of options by their long names; others than those for random runs count
+            for nothing.
+    """
+    fields = {field: read(given[name]) for name, (field, read) in _FIELDS.items() if name in given}
+    if "--u0" in given or "--u1" in given:
+        fields["odds_ratios"] = float(given.get("--u0", "0.9")), float(given.get("--u1", "1.1"))
+    return fields

@@ -13,7 +13,7 @@ from ntagen.cli.models.queries import Asked
 from ntagen.cli.notes import say
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError
-from ntagen.verifyta.statistical import of_model
+from ntagen.verifyta.options import of_model
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options

@@ -150,8 +150,8 @@ def _progress(line: CommandLine, after: str) -> None:
 def _answer(line: CommandLine, model: Model, query: Query, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
+    from ntagen.verifyta.options import of_model, statistical
     from ntagen.verifyta.output import estimate, histogram, summary, values, verdict
-    from ntagen.verifyta.statistical import of_model, statistical
 
     text = query.text
     form = form_of(text)
