@@ -379,15 +379,16 @@ class _Run:
             InputError: The query is wrong.
             LimitReached: A limit came first.
         """
-        from ntagen.verifyta.options import of_model
-
         if isinstance(known, InputError):
             raise known
         if known is not None:
             return known
         fields: dict[str, Any] = {"timeout_s": left_s, "folder": query.folder}
         fields["strategy"] = is_used or self.outputs.strategy is not None
-        fields |= of_model(query.options, self.given)
+        if query.options:
+            from ntagen.verifyta.options import of_model
+
+            fields |= of_model(query.options, self.given)
         fields |= self.questions.options(query, self.options)
         wanted = replace(self.options, **fields)
         model = self.questions.model

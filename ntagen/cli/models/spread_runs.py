@@ -13,7 +13,6 @@ from ntagen.cli.models.queries import Asked
 from ntagen.cli.notes import say
 from ntagen.cli.progress import shown_progress
 from ntagen.errors import InputError
-from ntagen.verifyta.options import of_model
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options
@@ -34,6 +33,8 @@ def joint_answers(
         given: The options and settings on the command line, which win over those of the file.
         quiet: Whether no progress is shown.
     """
+    from ntagen.verifyta.options import of_model
+
     places = [place for place, query in enumerate(queries) if _is_joint(query)]
     if not places:
         return {}
