@@ -25,7 +25,14 @@ from ntagen.cli.models.plan_lists import LINES, ListLimits
 from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
 from ntagen.cli.models.spread_runs import Spreading, joint_answers
 from ntagen.cli.notes import given_options, say
-from ntagen.cli.options import constant_option, external_option, include_option, overflow_rule
+from ntagen.cli.options import (
+    constant_option,
+    external_option,
+    include_option,
+    overflow_rule,
+    path_argument,
+    path_option,
+)
 from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached
@@ -73,8 +80,8 @@ class _CheckCommand(Renamed):
     "trace fails its check), 130 interrupted (the counters so far are printed; random runs until "
     "then are an answer, with 3), 141 nobody reads the output any more, 143 ended by SIGTERM.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
+@path_argument("model_path", metavar="MODEL")
+@path_argument("second_path", metavar="[FILE.q]", required=False)
 @click.option(
     "--query",
     "asked",
@@ -83,11 +90,10 @@ class _CheckCommand(Renamed):
     help="A query, or the name of a query of the model. You can give this option several times.  "
     "[default: all queries of the model]",
 )
-@click.option(
+@path_option(
     "--queries",
     "query_file",
     metavar="FILE.q",
-    type=click.Path(path_type=Path),
     help="A file of queries; they are answered instead of the model's own. You can also write the "
     "file after MODEL, without --queries.",
 )
@@ -119,10 +125,9 @@ class _CheckCommand(Renamed):
     help="Write the trace that shows why: a witness or a counterexample. - is standard output. "
     "With several queries, FILE has the trace of the last query that has one.",
 )
-@click.option(
+@path_option(
     "--certificate",
     metavar="FILE",
-    type=click.Path(path_type=Path),
     help="Write the set of all reached states, for `ntagen verify`. Only an E<> that is not "
     "satisfied and an A[] that is satisfied have one. With several of them, FILE has that of the "
     "last.",

@@ -15,6 +15,25 @@ from ntagen.cli.quantities import count, duration, size
 Decorator: TypeAlias = Callable[[Callable[..., int | None]], Callable[..., int | None]]
 
 
+path_option = functools.partial(click.option, type=click.Path(path_type=Path))
+"""An option that is the path of a file or folder; the arguments are those of `click.option`."""
+
+path_argument = functools.partial(click.argument, type=click.Path(path_type=Path))
+"""An argument that is the path of a file or folder; it takes those of `click.argument`."""
+
+
+def output_option(metavar: str, about: str, name: str = "output", **more: Any) -> Decorator:  # noqa: ANN401
+    """The option ``-o``: a file or folder that is written.
+
+    Args:
+        metavar: How the value is shown.
+        about: Its text in ``--help``.
+        name: The name of the value.
+        more: What else `click.option` takes.
+    """
+    return path_option("-o", "--output", name, metavar=metavar, help=about, **more)
+
+
 def gathered(keyword: str, options: dict[str, Decorator], make: Callable[..., object]) -> Decorator:
     """Adds options to a command, in order.
 
@@ -67,11 +86,10 @@ def priority_rule(about: str) -> Decorator:
 
 def include_option() -> Decorator:
     """The option ``--include``."""
-    return click.option(
+    return path_option(
         "--include",
         metavar="DIR",
         multiple=True,
-        type=click.Path(path_type=Path),
         help="Allow an environment to include files below this folder too, not only below its own. "
         "You can give this option several times.",
     )
@@ -79,11 +97,10 @@ def include_option() -> Decorator:
 
 def external_option() -> Decorator:
     """The option ``--allow-external``."""
-    return click.option(
+    return path_option(
         "--allow-external",
         metavar="PATH",
         multiple=True,
-        type=click.Path(path_type=Path),
         help="Allow a UPPAAL model to import this library, or those of this folder, in statistical "
         "queries. Their code runs with your rights, so allow only what you trust. You can give "
         "this option several times.",

@@ -25,7 +25,7 @@ from ntagen.cli.models.plot_models import (
 from ntagen.cli.models.plot_runs import NAMES
 from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
 from ntagen.cli.notes import say_idle
-from ntagen.cli.options import include_option, limits
+from ntagen.cli.options import include_option, limits, output_option, path_argument, path_option
 from ntagen.cli.settings import Setting, settings_option
 from ntagen.cli.terminal import echo
 from ntagen.files import open_file, require_apart
@@ -71,13 +71,10 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
     "3 the engine reached a limit; what random runs say until then is drawn.",
 )
-@click.argument("source", metavar="ENV.nsl|RUN.mcap|MODEL", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.png|pdf|svg|html|gif|dot",
-    type=click.Path(path_type=Path),
-    help="The picture to write; .html and .gif are for scenes and runs, .dot is for state spaces.  "
+@path_argument("source", metavar="ENV.nsl|RUN.mcap|MODEL")
+@output_option(
+    "FILE.png|pdf|svg|html|gif|dot",
+    "The picture to write; .html and .gif are for scenes and runs, .dot is for state spaces.  "
     "[default: the source's name with .png, of a model with .svg, in the current folder]",
 )
 @click.option(
@@ -89,11 +86,10 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     type=click.IntRange(min=0),
     help="Draw at most this many plans. 0 draws the scene alone, without a search for plans.",
 )
-@click.option(
+@path_option(
     "--strategy",
     "tree_path",
     metavar="FILE.json",
-    type=click.Path(path_type=Path),
     help="In a tissue that answers, draw the strategy in this file, which ntagen check --plans "
     "wrote for this task, and do not look for one.",
 )

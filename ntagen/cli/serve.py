@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.options import path_argument
 from ntagen.cli.quantities import duration, size
 from ntagen.cli.terminal import echo
 from ntagen.files import read_file
@@ -19,7 +20,7 @@ from ntagen.files import read_file
     former={"--open": "open the address that is printed"},
     epilog="Exit codes: 2 the port or a file is wrong, 130 ended by Ctrl-C.",
 )
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@path_argument("file", required=False)
 @click.option(
     "--port",
     metavar="PORT",

@@ -14,7 +14,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
-from ntagen.cli.options import bounded, include_option
+from ntagen.cli.options import bounded, include_option, path_argument
 from ntagen.cli.terminal import echo, print_table
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ ROWS_SHOWN: Final = 40
     former={"--svg": "`ntagen plot MODEL --as templates` draws them"},
     epilog="Exit codes: 0 done, 2 the input is wrong, 3 stopped by a limit.",
 )
-@click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
+@path_argument("path", metavar="MODEL")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
 @include_option()
 @bounded

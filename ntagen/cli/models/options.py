@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 from typing import Final
 
 import click
 
-from ntagen.cli.options import LIMITS, Decorator, forced_rule, gathered
+from ntagen.cli.options import LIMITS, Decorator, forced_rule, gathered, path_option
 from ntagen.cli.quantities import number, pair
 from ntagen.cli.settings import Setting
 
@@ -273,11 +272,10 @@ OPTIONS: Final[dict[str, Decorator]] = {
         "which is slower. Answers do not depend on it.  [default: jit]",
     ),
     **LIMITS,
-    "allow_write": click.option(
+    "allow_write": path_option(
         "--allow-write",
         metavar="DIR",
         multiple=True,
-        type=click.Path(path_type=Path),
         help="Allow saveStrategy in queries to write below this folder too, not only below the "
         "current one. You can give this option several times. saveStrategy replaces no files but "
         "strategies.",

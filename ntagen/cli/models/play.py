@@ -20,6 +20,8 @@ from ntagen.cli.options import (
     forced_rule,
     include_option,
     overflow_rule,
+    path_argument,
+    path_option,
     priority_rule,
 )
 from ntagen.cli.progress import shown_progress
@@ -43,12 +45,11 @@ DEFEATED: Final = 1
     epilog="Exit codes: 0 done, 1 the strategy lost or has no next move, 2 the input is "
     "rejected, 3 stopped by a limit, 4 run-time error in the model.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.option(
+@path_argument("model_path", metavar="MODEL")
+@path_option(
     "--strategy",
     "strategy_path",
     metavar="FILE.json",
-    type=click.Path(path_type=Path),
     help="The strategy to play against, as `ntagen check --strategy` writes it.",
 )
 @click.option(
@@ -71,10 +72,9 @@ DEFEATED: Final = 1
     default=0,
     help="For --auto: the same seed gives the same play.  [default: 0]",
 )
-@click.option(
+@path_option(
     "--log",
     metavar="FILE",
-    type=click.Path(path_type=Path),
     help="When the play ends, write it as a trace; `ntagen verify MODEL FILE` checks it.",
 )
 @forced_rule()

@@ -17,6 +17,7 @@ from ntagen.cli.options import (
     forced_rule,
     include_option,
     overflow_rule,
+    path_argument,
     priority_rule,
 )
 from ntagen.cli.terminal import echo
@@ -37,8 +38,8 @@ _WITHOUT_RULES: Final = re.compile(rb'\s*\{\s*"format"\s*:\s*"ntagen-(trace|cert
     epilog="Exit codes: 0 the evidence holds, 1 it does not, 2 the input is rejected, 3 the check "
     "does not cover the model or the query, or a limit came first.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@path_argument("model_path", metavar="MODEL")
+@path_argument("file", metavar="FILE")
 @forced_rule(
     "For strategies: when the environment must move at a moment at which time cannot pass. Give "
     "the rule that the strategy was made with.  [default: tiga]"

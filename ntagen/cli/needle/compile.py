@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ntagen.cli.loading import show_warnings
-from ntagen.cli.options import include_option
+from ntagen.cli.options import include_option, output_option, path_argument
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
@@ -16,15 +16,12 @@ from ntagen.files import write_files
     "compile",
     epilog="Exit codes: 0 written, 2 the environment or the folder is wrong.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
+@path_argument("environment", metavar="ENV.nsl")
+@output_option(
+    "DIR",
+    "The folder to write to; it is made if it does not exist.  [default: the current folder]",
     "folder",
-    metavar="DIR",
     default=".",
-    type=click.Path(path_type=Path),
-    help="The folder to write to; it is made if it does not exist.  [default: the current folder]",
 )
 @include_option()
 def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:

@@ -39,7 +39,7 @@ from ntagen.cli.needle.tracker import (
     tracking_of,
 )
 from ntagen.cli.notes import say_idle
-from ntagen.cli.options import include_option
+from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
 from ntagen.cli.terminal import echo
 from ntagen.drive.states import State
@@ -75,7 +75,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     },
     epilog=_EPILOG,
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("environment", metavar="ENV.nsl")
 @click.option(
     "--needle",
     default="virtual",
@@ -104,11 +104,10 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="The phase of the breath at the start, if regions move: from 0 to 360 degrees; by default "
     "0. A simulation moves its regions by the same clock.",
 )
-@click.option(
+@path_option(
     "--log",
     "log_path",
     metavar="RUN.mcap",
-    type=click.Path(path_type=Path),
     help="The file to write the log of the run to; an existing file is replaced.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")

@@ -16,7 +16,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import load_task
 from ntagen.cli.needle.steering import say_idle_errors, settings_options
-from ntagen.cli.options import include_option
+from ntagen.cli.options import include_option, path_argument
 from ntagen.cli.signals import handled
 from ntagen.cli.terminal import echo
 from ntagen.drive.steppers import axes_for, described
@@ -47,7 +47,7 @@ _LOOK_S: Final = 0.1
     },
     epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("environment", metavar="ENV.nsl")
 @click.option(
     "--needle",
     type=click.Choice(["phantom", "virtual"]),

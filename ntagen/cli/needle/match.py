@@ -13,7 +13,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import load_task, show_warnings
 from ntagen.cli.needle.match_tables import show
-from ntagen.cli.options import include_option
+from ntagen.cli.options import include_option, output_option, path_argument
 from ntagen.cli.quantities import length
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -44,10 +44,8 @@ def _start(value: object) -> tuple[Any, float]:
     former={"--first": "write --start fit:{} or --start model:{}"},
     epilog="Exit codes: 0 done, 2 the environment or a trace is wrong, 70 internal error.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
-@click.argument(
-    "traces", metavar="TRACE…", type=click.Path(path_type=Path), nargs=-1, required=True
-)
+@path_argument("environment", metavar="ENV.nsl")
+@path_argument("traces", metavar="TRACE…", nargs=-1, required=True)
 @click.option(
     "--start",
     metavar="free|fit|model[:LENGTH]",
@@ -103,12 +101,9 @@ def _start(value: object) -> tuple[Any, float]:
     show_default=True,
     help="The unit of positions whose columns do not name one.",
 )
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.png|pdf|svg",
-    type=click.Path(path_type=Path),
-    help="Draw the traces, the paths and their deviations.",
+@output_option(
+    "FILE.png|pdf|svg",
+    "Draw the traces, the paths and their deviations.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a trace on a line.")
 @include_option()

@@ -13,7 +13,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import load_task
 from ntagen.cli.needle.odds import Wanted, odds_lines, odds_options, rate, with_odds
-from ntagen.cli.options import include_option
+from ntagen.cli.options import include_option, output_option, path_argument
 from ntagen.cli.quantities import duration
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
@@ -35,7 +35,7 @@ STOPPED: Final = 3
     epilog="Exit codes: 0 a plan was found, 1 it is proved that there is none, 2 the input is "
     "rejected, 3 the budget ended before either, 4 run-time error in the model.",
 )
-@click.argument("source", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("source", metavar="ENV.nsl")
 @click.option(
     "--best",
     "count",
@@ -66,12 +66,9 @@ STOPPED: Final = 3
     "reserve,length,rolls) are ranked by how likely they reach the target.",
 )
 @odds_options
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.json",
-    type=click.Path(path_type=Path),
-    help="Write the best plans with their certificates.",
+@output_option(
+    "FILE.json",
+    "Write the best plans with their certificates.",
 )
 @click.option(
     "--json",

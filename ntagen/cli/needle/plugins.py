@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.notes import say_idle
+from ntagen.cli.options import path_option
 from ntagen.cli.terminal import echo
 from ntagen.drive.steppers import axes_for, described, speeds_for
 from ntagen.errors import DeviceError, InputError
@@ -86,10 +87,9 @@ def check_plugin(text: str, *, as_json: bool) -> int:
     "test", epilog="Exit codes: 0 all checks hold, 2 the command line is wrong, 5 a check does not."
 )
 @click.argument("device", metavar="PLUGIN[:ARGUMENT]|grbl:PORT|grbl+sim|openigtlink:…")
-@click.option(
+@path_option(
     "--task",
     metavar="TASK.nsl",
-    type=click.Path(path_type=Path),
     help="The task whose speeds, and whose axes for grbl:PORT, are used.",
 )
 @click.option(
