@@ -65,13 +65,7 @@ def _exact(run: Run, most: int | None) -> list[str]:
     lines = [*_start(first.locations, first.variables), *_steps(steps, most)]
     if run.delay:
         lines.append(f"{_label('')}until {now + run.delay} nothing moves")
-    ends = {
-        "after": [],
-        "loop": [f"{_label('')}as after step {run.loop} from here on, for ever"],
-        "waits": [f"{_label('')}time passes for ever"],
-        "stuck": [f"{_label('')}nothing is possible any more"],
-    }
-    return lines + ends[run.end]
+    return lines + _ending(run.end, run.loop)
 
 
 def _is_set(clock: str, value: Fraction, before: Fraction, step: Step) -> bool:
@@ -96,12 +90,17 @@ def _symbolic(trace: Mapping[str, Any], most: int | None) -> list[str]:
     ]
     lines = [*_start(states[0]["locations"], states[0]["variables"]), *_steps(steps, most)]
     ending = trace.get("ending", {})
-    ends = {
-        "loop": f"{_label('')}as after step {ending.get('loop')} from here on, for ever",
-        "waits": f"{_label('')}time passes for ever",
-        "stuck": f"{_label('')}nothing is possible any more",
+    return lines + _ending(ending.get("kind", "after"), ending.get("loop"))
+
+
+def _ending(kind: str, loop: int | None) -> list[str]:
+    """How a trace goes on for ever, or why it does not; nothing if it just ends."""
+    said = {
+        "loop": f"as after step {loop} from here on, for ever",
+        "waits": "time passes for ever",
+        "stuck": "nothing is possible any more",
     }
-    return [*lines, ends[ending["kind"]]] if ending else lines
+    return [] if kind == "after" else [_label("") + said[kind]]
 
 
 def _failing(edges: list[dict[str, Any]], state: Mapping[str, Any]) -> Iterator[str]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
+from itertools import product
 from typing import Final
 
 from ntagen.checker.decisions import StrategyState
@@ -175,13 +176,10 @@ def _halves(
     for name in names - {""}:
         _tighten(bounds, ("", name), (Fraction(0), False))
     # Closed by the algorithm of Floyd and Warshall, all rows but those of the axes can go.
-    for over in names:
-        for left in names:
-            for right in names:
-                first, second = bounds.get((left, over)), bounds.get((over, right))
-                if first is not None and second is not None:
-                    through = (first[0] + second[0], first[1] or second[1])
-                    _tighten(bounds, (left, right), through)
+    for over, left, right in product(names, repeat=3):
+        first, second = bounds.get((left, over)), bounds.get((over, right))
+        if first is not None and second is not None:
+            _tighten(bounds, (left, right), (first[0] + second[0], first[1] or second[1]))
     along = {"": (0, 0), drawn[0]: (1, 0)} | ({} if drawn[1] is None else {drawn[1]: (0, 1)})
     halves = []
     for (left, right), (value, strict) in bounds.items():

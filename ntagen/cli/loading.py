@@ -100,13 +100,8 @@ def pointing_to_explanations(wanted: bool) -> Iterator[None]:
     except InputError as error:
         if not wanted:
             raise
-        raise InputError(with_pointer(str(error))) from error
-
-
-def with_pointer(rejection: str) -> str:
-    """A rejection with the command that explains its first diagnostic, if it has one."""
-    pointer = pointer_to_page(rejection)
-    return f"{rejection}\n{pointer}" if pointer else rejection
+        pointer = pointer_to_page(str(error))
+        raise InputError(f"{error}\n{pointer}" if pointer else str(error)) from error
 
 
 def pointer_to_page(rejection: str) -> str:

@@ -31,7 +31,7 @@ class Option:
         value: What its value is called; empty if it has none.
         effect: Whether ntagen honours it.
         help: What it does; for an option that is refused, why.
-        choices: The values that it may have; empty for any.
+        more: Values that it may have besides those in the name of the value.
     """
 
     letter: str
@@ -39,12 +39,17 @@ class Option:
     value: str
     effect: Effect
     help: str
-    choices: tuple[str, ...] = ()
+    more: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """Its long name, or else its short one."""
         return self.long or self.letter
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The values that it may have; empty for any."""
+        return (*(self.value.split("|") if "|" in self.value else ()), *self.more)
 
 
 _LEARNING: Final = "it is for learning, which ntagen does not do"
@@ -64,7 +69,6 @@ OPTIONS: Final = (
         "honoured",
         "Make a trace: 0 some, 1 shortest, 2 fastest. Without -f and -X it is written to standard "
         "error; strategies of control queries are written to standard output.",
-        ("0", "1", "2"),
     ),
     Option("-f", "", "PREFIX", "honoured", "Write the trace of query n to PREFIX-n (.xtr)."),
     Option("-X", "", "PREFIX", "honoured", "Write the trace of query n to PREFIXn.xml."),
@@ -77,7 +81,7 @@ OPTIONS: Final = (
         "honoured",
         "Search breadth first (0), depth first (1) or in random depth-first order (2). 3 and 4 are "
         "taken as 0.",
-        ("0", "1", "2", "3", "4"),
+        ("3", "4"),
     ),
     Option("-r", "--seed", "N", "honoured", "The seed of the random order and of random runs."),
     Option("-s", "--silence-progress", "", "honoured", "Do not mark lines as progress."),
@@ -91,11 +95,9 @@ OPTIONS: Final = (
         "honoured",
         "Write the strategy of each `strategy NAME = control: …` to DIR/NAME.",
     ),
-    Option(
-        "", "--generate-strategy", "0|1|2", "idle", "Strategies are always made.", ("0", "1", "2")
-    ),
+    Option("", "--generate-strategy", "0|1|2", "idle", "Strategies are always made."),
     Option("-n", "--extrapolation", "0..4", "idle", "Answers are exact.", tuple("01234")),
-    Option("-S", "", "0|1|2", "idle", "How many states are stored.", ("0", "1", "2")),
+    Option("-S", "", "0|1|2", "idle", "How many states are stored."),
     Option("-C", "", "", "idle", "Zones as matrices."),
     Option("-b", "", "", "idle", "The search is breadth first."),
     Option("-H", "--hashtable-size", "N", "idle", "The size of a table."),
@@ -111,7 +113,6 @@ OPTIONS: Final = (
         "0|1",
         "idle",
         "Zones as matrices or by their fewest constraints.",
-        ("0", "1"),
     ),
     Option(
         "-A",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.models.queries import queries_of
 from ntagen.cli.models.session import Session
 from ntagen.cli.notes import say_idle
 from ntagen.cli.options import (
@@ -156,21 +156,17 @@ def command(
 
 def _query(model: Model, asked: str | None) -> str:
     """The query with the name `asked`, `asked` itself as a query, or the model's only game."""
-    games = [query for query in model.queries if re.search(r"\bcontrol\b", query.text)]
-    if asked is None:
-        if len(games) == 1:
-            return games[0].text
-        shown = "".join(f"\n  {query.text}" for query in games)
-        raise InputError(
-            f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
-            "hint: give a control query with --query, or a strategy file with --strategy"
-        )
-    for query in games:
-        name = query.comment.strip().partition("\n")[0].strip()
-        named = re.match(r"strategy\s+(\w+)\s*=", query.text)
-        if asked.strip() in (name, named[1] if named else None):
-            return query.text
-    return asked
+    if asked is not None:
+        return queries_of(model, (asked,), None)[0].text
+    queries = queries_of(model, (), None) if model.queries else []
+    games = [query for query in queries if query.form and query.form.is_game]
+    if len(games) == 1:
+        return games[0].text
+    shown = "".join(f"\n  {query.text}" for query in games)
+    raise InputError(
+        f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
+        "hint: give a control query with --query, or a strategy file with --strategy"
+    )
 
 
 def _reader() -> Callable[[], str | None]:

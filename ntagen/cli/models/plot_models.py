@@ -84,16 +84,14 @@ def plot_model(
     with pointing_to_explanations(True):
         with doing("loading the model"):
             model = load_model(source, include).model
+        path = path or Path(f"{source.stem}.svg")
+        require_apart({"-o": path}, {"source": source})
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
             say_idle(OF_ZONES, "without --as zones")
             say_idle(OF_GRAPHS, "without --as states or discrete")
-            path = path or Path(f"{source.stem}.svg")
-            require_apart({"-o": path}, {"source": source})
             limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
             return path, plot_runs(model, asked, path, wish.settings, limits)
         say_idle(NAMES, "here: no random runs are drawn")
-        path = path or Path(f"{source.stem}.svg")
-        require_apart({"-o": path}, {"source": source})
         _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
         return path, 0
 
@@ -131,11 +129,7 @@ def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
     if is_graph:
         _plot_graph(model, path, wish)
         return
-    if wish.kind == "templates":
-        with doing("drawing the templates"):
-            _templates(model).save(path)
-        return
-    with doing("drawing the picture"):
+    with doing("drawing the templates" if wish.kind == "templates" else "drawing the picture"):
         _drawn(model, wish).save(path)
 
 
@@ -165,13 +159,11 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
         space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
 
 
-def _templates(model: Model) -> Svg:
-    from ntagen.checker.picture.svg import draw_all
-
-    return draw_all(model.templates)
-
-
 def _drawn(model: Model, wish: Wish) -> Svg:
+    if wish.kind == "templates":
+        from ntagen.checker.picture.svg import draw_all
+
+        return draw_all(model.templates)
     query = _query(model, wish)
     if wish.kind == "zones":
         return _zones(model, query, wish)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.progress import progress_of, say_interrupted
+from ntagen.cli.signals import INTERRUPTED
 from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart, write_files
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 """The exit code of every mistake; verdicts have none of their own."""
-
-INTERRUPTED: Final = 130
-"""The exit code if the user has ended random runs, as for every interruption."""
 
 COMPILE_ONLY: Final = "UPPAAL_COMPILE_ONLY"
 """If it is set and not empty, the compiled form of the model is printed and nothing is checked."""
@@ -198,18 +196,21 @@ def _write_trace(
     from ntagen.verifyta.trace_xml import trace_xml_text
     from ntagen.verifyta.xtr import xtr_text
 
-    files = {}
-    if line.has("-f") and (text := xtr_text(model, answer)) is not None:
-        files[Path(f"{line.value('-f')}-{number}")] = text
-    if line.has("-X") and (text := trace_xml_text(model, answer)) is not None:
-        files[Path(f"{line.value('-X')}{number}.xml")] = text
+    wanted = {
+        Path(f"{line.value('-f')}-{number}"): ("-f", xtr_text, " -- Writing witness trace to"),
+        Path(f"{line.value('-X')}{number}.xml"): ("-X", trace_xml_text, "XMLTrace outputted to:"),
+    }
+    files = {
+        file: text
+        for file, (option, written, _) in wanted.items()
+        if line.has(option) and (text := written(model, answer)) is not None
+    }
     read = {"queries" if index else "model": one for index, one in enumerate(inputs)}
     for file in files:
         require_apart({"the trace": file}, read)
     write_files(files)
     for file in files:
-        is_xml = line.has("-X") and file == Path(f"{line.value('-X')}{number}.xml")
-        echo(f"XMLTrace outputted to: {file}" if is_xml else f" -- Writing witness trace to {file}")
+        echo(f"{wanted[file][-1]} {file}")
     if line.has("-f") or line.has("-X"):
         return
     shown = trace_text(

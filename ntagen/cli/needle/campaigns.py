@@ -157,37 +157,28 @@ def _counts(progress: Progress) -> str:
 @contextlib.contextmanager
 def _bar() -> Iterator[Callable[[Progress], None]]:
     """A bar with the rate and the time left."""
+    from rich import progress as columns
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        SpinnerColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
 
     console = Console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        MofNCompleteColumn(),
-        BarColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[counts]}"),
+    shown = (
+        columns.SpinnerColumn(),
+        columns.MofNCompleteColumn(),
+        columns.BarColumn(),
+        columns.TextColumn("{task.fields[rate]}"),
+        columns.TimeRemainingColumn(),
+        columns.TextColumn("{task.fields[counts]}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task: Any = None
+    with columns.Progress(*shown, console=console, transient=True) as bar:
 
-        def show(progress: Any) -> None:  # noqa: ANN401  rich has a class of this name, too
-            nonlocal task
+        def show(progress: Progress) -> None:
             if progress.note:
                 console.print(safe(f"note: {progress.note}"), markup=False, highlight=False)
-            if task is None:
-                task = bar.add_task("runs", total=progress.of, rate="", counts="")
+            if not bar.tasks:
+                bar.add_task("runs", total=progress.of, rate="", counts="")
             speed = bar.tasks[0].speed
             bar.update(
-                task,
+                bar.tasks[0].id,
                 completed=progress.done,
                 rate="" if speed is None else f"{speed:.1f} runs/s",
                 counts=_counts(progress).removeprefix(", "),

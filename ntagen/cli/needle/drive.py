@@ -175,8 +175,7 @@ def command(
         )
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
-    task = load_task(environment, include)
-    task = _breathing(task, breath_phase_deg)
+    task = _breathing(load_task(environment, include), breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
     _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
@@ -313,8 +312,7 @@ def _drive(
             )
         # A tracker or a port that cannot be reached must not cost an earlier log.
         log = stack.enter_context(_log(log_path, run))
-        means = stack.enter_context(_around(run, log, terminal, operator))
-        synthesise, journal, agree = means
+        synthesise, journal, agree = stack.enter_context(_around(run, log, terminal, operator))
         return steer(
             synthesise,
             settings,
@@ -337,21 +335,14 @@ def _around(
     settings = run.configuration.settings
     # The log has the strategies; nobody else asks for them.
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
-    agree = operator.agree if terminal.confirms else _agrees
-    with contextlib.ExitStack() as stack:
-        shown = []
-        if terminal.speaks:
-            moves = not terminal.confirms
-            shown.append(stack.enter_context(lines(settings.ranking, moves=moves)))
+    agree = operator.agree if terminal.confirms else lambda _: None
+    told = lines(settings.ranking, moves=not terminal.confirms)
+    with told if terminal.speaks else contextlib.nullcontext() as shown:
         try:
-            yield synthesise, Journals(*log, *shown), agree
+            yield synthesise, Journals(*log, *([shown] if shown else [])), agree
         except ModelError as error:
             # The model is ours: its exit code would say that no strategy holds.
             raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
-
-
-def _agrees(_: str) -> None:
-    """Agrees to all: nobody is asked."""
 
 
 @contextlib.contextmanager

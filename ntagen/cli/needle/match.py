@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -244,8 +245,5 @@ def _prediction(prediction: Prediction) -> dict[str, Any]:
         "from_mm": prediction.from_mm,
         "rolls": len(prediction.match.rolls),
         "radius_mm": prediction.match.needle.radius_mm,
-        "ahead": [
-            {"ahead_mm": one.ahead_mm, "at_mm": one.at_mm, "max_mm": one.max_mm}
-            for one in prediction.ahead
-        ],
+        "ahead": list(map(asdict, prediction.ahead)),
     }
