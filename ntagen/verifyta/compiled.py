@@ -51,7 +51,8 @@ def _pieces(network: Network) -> Iterator[str]:
             yield f"{index}:location:{flags}:{location.name}\n"
             index += 1
     yield "\ninstructions\n#address: opcode\n\nprocesses\n#index:initial:name\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    numbered = list(enumerate(zip(network.processes, first_locations, strict=True)))
+    for number, (process, first) in numbered:
         yield f"{number}:{first + process.initial}:{process.name}\n"
     texts: list[str] = []
 
@@ -61,12 +62,12 @@ def _pieces(network: Network) -> Iterator[str]:
         return len(texts) - 1
 
     yield "\nlocations\n#index:process:invariant\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    for number, (process, first) in numbered:
         for offset, location in enumerate(process.locations):
             invariant = address(location.invariant, _ALWAYS)
             yield f"{first + offset}:{number}:{invariant}\n"
     yield "\nedges\n#process:source:target:guard:sync:update\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    for number, (process, first) in numbered:
         for edge in process.edges:
             guard = address(edge.guard, _ALWAYS)
             sync = address(edge.sync, _NO_SYNC)

@@ -113,17 +113,13 @@ class Network:
 def network_of(model: Model) -> Network:
     """The network of a model."""
     raw = json.loads(model.network_json())
+    labels = ("guard", "sync", "update")
     processes = []
     for process in raw["processes"]:
         legs = tuple(
             tuple(
                 Edge(
-                    source=edge["source"],
-                    target=target,
-                    select=tuple(edge["select"]),
-                    guard=edge["guard"],
-                    sync=edge["sync"],
-                    update=edge["update"],
+                    edge["source"], target, tuple(edge["select"]), *(edge[name] for name in labels)
                 )
                 for target in edge["targets"]
             )

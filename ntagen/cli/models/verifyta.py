@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from ntagen.cli.guard import taken_bytes
 from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.signals import INTERRUPTED
 from ntagen.cli.terminal import echo, echo_exactly
@@ -226,9 +227,5 @@ def _write_trace(
 
 def _memory_kib() -> tuple[int, int] | None:
     """The virtual and the resident memory of this process in KiB, where the system says it."""
-    try:
-        virtual, resident = Path("/proc/self/statm").read_text("ascii").split()[:2]
-    except (OSError, ValueError):
-        return None
-    page = os.sysconf("SC_PAGE_SIZE")
-    return int(virtual) * page // _KIB, int(resident) * page // _KIB
+    virtual, resident = taken_bytes(0), taken_bytes(1)
+    return None if virtual is None or resident is None else (virtual // _KIB, resident // _KIB)
