@@ -24,7 +24,6 @@ from ntagen.cli.models.outcomes import Outcome, exit_code
 from ntagen.cli.models.plan_lists import LINES, ListLimits
 from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
 from ntagen.cli.models.spread_runs import Spreading, joint_answers
-from ntagen.cli.notes import given_options, say
 from ntagen.cli.options import (
     constant_option,
     external_option,
@@ -36,7 +35,7 @@ from ntagen.cli.options import (
 from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, given_options, say
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 from ntagen.values import dataclass

@@ -9,8 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from ntagen.cli.notes import say_idle
-from ntagen.cli.terminal import echo, echo_message
+from ntagen.cli.terminal import echo, echo_message, say_idle
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:

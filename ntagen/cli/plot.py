@@ -24,10 +24,9 @@ from ntagen.cli.models.plot_models import (
 )
 from ntagen.cli.models.plot_runs import NAMES
 from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import include_option, limits, output_option, path_argument, path_option
 from ntagen.cli.settings import Setting, settings_option
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:

@@ -5,13 +5,15 @@ obeys control characters in them: it moves the cursor, changes its title, or ans
 typed. Characters that change the direction of writing make a line look like another one. So all
 output of the commands goes through `echo`, which shows such characters by their numbers. Colours
 come only from here. `tests/test_architecture.py` enforces that. Files are written unchanged.
+
+Notes about the command line, such as options without effect, go to standard error (`say`).
 """
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import click
@@ -134,3 +136,28 @@ def echo_exactly(text: str, *, nl: bool = True) -> None:
     """Prints a document to standard output: unchanged, unless that is a terminal."""
     # Without `color`, click removes everything that looks like a colour from output to a file.
     click.echo(safe(text) if sys.stdout.isatty() else text, nl=nl, color=True)
+
+
+def given_options() -> list[str]:
+    """The names of the parameters and settings that stand on the command line."""
+    context = click.get_current_context()
+    source = click.core.ParameterSource.COMMANDLINE
+    given = [name for name in context.params if context.get_parameter_source(name) is source]
+    return [*given, *context.params.get("settings", ())]
+
+
+def say_idle(options: Mapping[str, str], why: str) -> None:
+    """Prints a note for each of these options that stands on the command line.
+
+    Args:
+        options: The options, by the name of their parameters.
+        why: The reason, which follows the words "has no effect".
+    """
+    given = given_options()
+    say([f"{option} has no effect {why}" for name, option in options.items() if name in given])
+
+
+def say(notes: Sequence[str]) -> None:
+    """Prints notes about the command line to standard error."""
+    for note in notes:
+        echo(f"note: {note}", err=True)

@@ -14,7 +14,6 @@ from ntagen.cli.guard import doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
 from ntagen.cli.models.queries import queries_of
 from ntagen.cli.models.session import Session
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import (
     constant_option,
     forced_rule,
@@ -25,7 +24,7 @@ from ntagen.cli.options import (
     priority_rule,
 )
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 

@@ -13,8 +13,8 @@ from ntagen.cli.guard import current, doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
 from ntagen.cli.models.plot_runs import NAMES, plot_runs
 from ntagen.cli.models.queries import Asked, queries_of
-from ntagen.cli.notes import say_idle
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.terminal import say_idle
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.files import require_apart
 from ntagen.values import dataclass

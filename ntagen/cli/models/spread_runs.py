@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ntagen.cli.models.queries import Asked
-from ntagen.cli.notes import say
 from ntagen.cli.progress import shown_progress
+from ntagen.cli.terminal import say
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ import click
 
 from ntagen.cli.guard import doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import (
     bounded,
     constant_option,
@@ -20,7 +19,7 @@ from ntagen.cli.options import (
     path_argument,
     priority_rule,
 )
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.files import EVIDENCE_BYTES, read_file
 
 VIOLATED: Final = 1

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import gathered, path_option
+from ntagen.cli.terminal import say_idle
 from ntagen.errors import InputError
 from ntagen.units import deg_from_rad
 from ntagen.values import dataclass

@@ -15,8 +15,7 @@ from ntagen.cli.needle.lab import command as simulate
 from ntagen.cli.needle.plugins import check_plugin, for_steppers, installed, is_plugin
 from ntagen.cli.needle.plugins import command as test
 from ntagen.cli.needle.tracker import look_at
-from ntagen.cli.notes import say_idle
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.steppers import axes_for, described
 from ntagen.errors import DeviceError, InputError
 

@@ -38,10 +38,9 @@ from ntagen.cli.needle.tracker import (
     tracker_option,
     tracking_of,
 )
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.states import State
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.notes import say_idle
 from ntagen.cli.options import path_option
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.steppers import axes_for, described, speeds_for
 from ntagen.errors import DeviceError, InputError
 from ntagen.extensions import DEVICES, TRACKERS, find, names, package

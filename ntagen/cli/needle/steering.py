@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ntagen.cli.notes import say
 from ntagen.cli.options import Decorator, gathered
 from ntagen.cli.settings import help_option, set_option
-from ntagen.cli.terminal import aligned, echo
+from ntagen.cli.terminal import aligned, echo, say
 from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, PARTS, Given, Parameter
 
 if TYPE_CHECKING:
