@@ -70,6 +70,10 @@ class Wish:
 
     memory_bytes: int | None
 
+    def limits(self) -> dict[str, Any]:
+        """What is left for a search, as fields of `ntagen.checker.Options`."""
+        return {"timeout_s": current().left_s(), "memory_bytes": self.memory_bytes}
+
 
 def plot_model(
     source: Path, path: Path | None, wish: Wish, include: Sequence[Path]
@@ -89,8 +93,7 @@ def plot_model(
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
             say_idle(OF_ZONES, "without --as zones")
             say_idle(OF_GRAPHS, "without --as states or discrete")
-            limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
-            return path, plot_runs(model, asked, path, wish.settings, limits)
+            return path, plot_runs(model, asked, path, wish.settings, wish.limits())
         say_idle(NAMES, "here: no random runs are drawn")
         _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
         return path, 0
@@ -144,8 +147,7 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
     searched = max(MOST_SEARCHED, given or 0)
     try:
         with doing("the search for the states"):
-            left_s = current().left_s()
-            space = model.state_space(searched, timeout_s=left_s, memory_bytes=wish.memory_bytes)
+            space = model.state_space(searched, **wish.limits())
     except LimitError as error:
         said = str(error).partition("\n")[0]
         if str(searched) not in said:
@@ -194,12 +196,7 @@ def _query(model: Model, wish: Wish) -> Asked:
 def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
     """The zones of the strategy of a game."""
     with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
-        strategy = model.synthesize(
-            query.text,
-            timeout_s=current().left_s(),
-            memory_bytes=wish.memory_bytes,
-            progress=report,
-        )
+        strategy = model.synthesize(query.text, progress=report, **wish.limits())
     axes = _axes(wish.settings.get("clocks"))
     return strategy.zones(_state(strategy, wish.at), x=axes[0], y=axes[1])
 
@@ -247,13 +244,7 @@ def _number(word: str, value: str) -> int | float:
 def _trace(model: Model, query: Asked, wish: Wish) -> Run:
     """The trace of a query, with exact times."""
     with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
-        answer = model.check(
-            query.text,
-            trace=True,
-            timeout_s=current().left_s(),
-            memory_bytes=wish.memory_bytes,
-            progress=report,
-        )
+        answer = model.check(query.text, trace=True, progress=report, **wish.limits())
     if answer.verdict == "error":
         raise ModelError(answer.message or "the model has a run-time error")
     if answer.verdict == "unknown":
