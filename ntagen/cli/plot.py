@@ -18,12 +18,12 @@ from ntagen.cli.models.plot_models import (
     MOST_DRAWN,
     MOST_SEARCHED,
     OF_GRAPHS,
+    OF_RUNS,
     OF_ZONES,
+    RUN_SETTINGS,
     Wish,
     plot_model,
 )
-from ntagen.cli.models.plot_runs import NAMES
-from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
 from ntagen.cli.options import include_option, limits, output_option, path_argument, path_option
 from ntagen.cli.settings import Setting, settings_option
 from ntagen.cli.terminal import echo, say_idle
@@ -57,7 +57,7 @@ SETTINGS: Final = (
         f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends "
         f"in .dot may have {MOST_SEARCHED:,}]",
     ),
-    *OF_RUNS,
+    *RUN_SETTINGS,
 )
 """What ``--set`` takes."""
 
@@ -175,7 +175,7 @@ def command(
         {"asked": "--query"} | OF_ZONES | OF_GRAPHS,
         "without --as: the scene is drawn, not its model",
     )
-    say_idle(NAMES, "here: no random runs are drawn")
+    say_idle(OF_RUNS, "here: no random runs are drawn")
     ranking = settings.get("ranking")
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
