@@ -150,7 +150,7 @@ class QueryItem(pytest.Item):
         Raises:
             WrongAnswerError: The answer is not as expected, or a limit came first.
         """
-        from ntagen.checker import RejectedError, expected_of, is_as_expected
+        from ntagen.checker import RejectedError, expected_of, is_as_expected, remark_of
 
         expected = expected_of(self._query)
         try:
@@ -166,14 +166,9 @@ class QueryItem(pytest.Item):
         said = answer.verdict if answer.value is None else f"{answer.verdict}, {answer.value}"
         if answer.stop is not None:
             said = f"unknown, because of the {answer.limit_text}"
-        lines = [f"{self._query.text} is {said}; expected: {expected}", *self._remark()]
+        lines = [f"{self._query.text} is {said}; expected: {expected}", *remark_of(self._query)]
         lines += [answer.message] if answer.message else []
         raise WrongAnswerError("\n".join([*lines, *answer.trace_lines(STEPS_SHOWN)]))
-
-    def _remark(self) -> tuple[str, ...]:
-        from ntagen.checker import remark_of
-
-        return remark_of(self._query)
 
     def repr_failure(
         self,

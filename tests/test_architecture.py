@@ -51,8 +51,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
-    "checker.charts": {"errors", "checker.picture"},
-    "checker.winning": {"errors", "checker.picture"},
+    "checker.winning": {"errors", "checker.decisions", "checker.picture"},
     "checker.distribution": {"errors", "frames", "checker.picture"},
     "checker.trajectories": {"errors", "frames", "checker.picture"},
     "checker.queries": {"_checker"},
@@ -60,12 +59,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.states": {"checker.edges", "checker.errors", "_checker"},
     "checker.state_space": {"errors", "files", "checker.edges", "checker.picture"}
     | {"checker.states"},
-    "checker.runs": {"checker.charts", "checker.picture"},
+    "checker.runs": {"errors", "checker.picture"},
     "checker.machine": {"errors"},
     "checker.story": {"checker.runs"},
-    "checker.play": {"errors", "checker.runs", "_checker"},
+    "checker.play": {"errors", "checker.errors", "checker.runs", "_checker"},
+    "checker.decisions": {"checker.runs"},
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
-    | {"checker.picture", "checker.winning"},
+    | {"checker.decisions", "checker.errors", "checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
     | {"checker.options"}
     | {"checker.story", "checker.strategy", "_checker"}

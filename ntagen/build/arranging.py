@@ -6,13 +6,16 @@ out by themselves, below the others; what has a place keeps it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final, TypeVar
 
 from ntagen.build.parts import Edge, Location, Point
 from ntagen.build.template import Template
 from ntagen.checker.picture import diagram
 from ntagen.checker.picture.layout import EDGE_LABELS, LOCATION_LABELS, placed
+
+_Node = TypeVar("_Node", diagram.Location, diagram.BranchPoint)
 
 _BELOW: Final = 102
 """The distance of new parts from the lowest one that has a place."""
@@ -57,28 +60,23 @@ def _with_new_ones_below(drawn: diagram.Diagram) -> diagram.Diagram:
     right = min(x for x, _ in old) - min(x for x, _ in spots.values())
     down = max(y for _, y in old) + _BELOW - min(y for _, y in spots.values())
     spots = {name: (x + right, y + down) for name, (x, y) in spots.items()}
+
+    def moved(nodes: Iterable[_Node]) -> tuple[_Node, ...]:
+        return tuple(replace(one, position=spots.get(one.id, one.position)) for one in nodes)
+
     return replace(
-        drawn,
-        locations=tuple(
-            replace(one, position=spots.get(one.id, one.position)) for one in drawn.locations
-        ),
-        branch_points=tuple(
-            replace(one, position=spots.get(one.id, one.position)) for one in drawn.branch_points
-        ),
+        drawn, locations=moved(drawn.locations), branch_points=moved(drawn.branch_points)
     )
 
 
 def _location(location: Location, ids: dict[int, str], *, initial: bool) -> diagram.Location:
     return diagram.Location(
         ids[id(location)],
-        location.name,
-        "committed" if location.committed else "urgent" if location.urgent else "normal",
-        initial,
-        location.invariant.strip(),
-        location.rate.strip(),
-        _rounded(location.position),
-        _labels(location),
-        location.color,
+        kind="committed" if location.committed else "urgent" if location.urgent else "normal",
+        initial=initial,
+        position=_rounded(location.position),
+        color=location.color,
+        **_labels(location, LOCATION_LABELS),
     )
 
 
@@ -86,27 +84,17 @@ def _edge(edge: Edge, ids: dict[int, str]) -> diagram.Edge:
     return diagram.Edge(
         ids[id(edge.source)],
         ids[id(edge.target)],
-        edge.controllable,
-        edge.select.strip(),
-        edge.guard.strip(),
-        edge.sync.strip(),
-        edge.update.strip(),
-        edge.weight.strip(),
-        tuple((round(x), round(y)) for x, y in edge.nails),
-        _labels(edge),
-        edge.color,
+        controllable=edge.controllable,
+        nails=tuple((round(x), round(y)) for x, y in edge.nails),
+        color=edge.color,
+        **_labels(edge, EDGE_LABELS),
     )
 
 
-def _labels(part: Location | Edge) -> dict[diagram.LabelKind, diagram.Point]:
-    """Where the labels are drawn that pictures show."""
-    kinds = LOCATION_LABELS if isinstance(part, Location) else EDGE_LABELS
-    return {
-        kind: (round(x), round(y))
-        for kind in kinds
-        if kind in part.labels
-        for x, y in [part.labels[kind]]
-    }
+def _labels(part: Location | Edge, kinds: Sequence[diagram.LabelKind]) -> dict[str, Any]:
+    """The labels that pictures show, and where they are drawn."""
+    places = {kind: _rounded(part.labels[kind]) for kind in kinds if kind in part.labels}
+    return {"labels": places, **{kind: getattr(part, kind).strip() for kind in kinds}}
 
 
 def _rounded(position: Point | None) -> diagram.Point | None:

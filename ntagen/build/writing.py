@@ -6,9 +6,9 @@ kept in `extra` comes last in its element: where two elements count once, the fi
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from typing import Final
+from xml.sax.saxutils import escape
 
 from ntagen.build.arranging import arranged
 from ntagen.build.model import Model, Outcome, Query
@@ -31,18 +31,9 @@ _HEADER: Final = (
     "'http://www.it.uu.se/research/group/darts/uppaal/flat-1_6.dtd'>\n"
 )
 
-_ESCAPES: Final = {
-    "&": "&amp;",
-    "<": "&lt;",
-    ">": "&gt;",
-    "\r": "&#13;",
-    '"': "&quot;",
-    "\n": "&#10;",
-    "\t": "&#9;",
-}
-
-_IN_TEXTS: Final = "&<>\r"
-_IN_ATTRIBUTES: Final = '&<>\r\n\t"'
+_IN_TEXTS: Final = {"\r": "&#13;"}
+_IN_ATTRIBUTES: Final = {"\r": "&#13;", '"': "&quot;", "\n": "&#10;", "\t": "&#9;"}
+"""What is escaped besides ``&``, ``<`` and ``>``."""
 
 
 def written(model: Model) -> str:
@@ -134,23 +125,21 @@ def _labels(
         text = getattr(part, kind)
         attributes = {"kind": name, **_at(places.get(kind))}
         if text or kind in part.labels:
-            yield f"\t\t\t<label{_attributes(attributes)}>{_escaped(text)}</label>"
+            yield f"\t\t\t<label{_attributes(attributes)}>{escape(text, _IN_TEXTS)}</label>"
 
 
 def _places(
     part: Location | Edge, drawn: diagram.Location | diagram.Edge
 ) -> dict[LabelKind, Point]:
     """The places of the labels: those of the part, and computed ones."""
-    places = dict(part.labels)
-    for kind, place in drawn.labels.items():
-        places.setdefault(kind, place)
-    return places
+    places: dict[LabelKind, Point] = dict(drawn.labels.items())
+    return places | part.labels
 
 
 def _query(query: Query) -> Iterator[str]:
     yield f"\t\t<query{_attributes(query.attributes)}>"
-    yield f"\t\t\t<formula>{_escaped(query.formula)}</formula>"
-    yield f"\t\t\t<comment>{_escaped(query.comment)}</comment>"
+    for tag in ("formula", "comment"):
+        yield f"\t\t\t<{tag}>{escape(getattr(query, tag), _IN_TEXTS)}</{tag}>"
     for tag in ("expect", "result"):
         outcome: Outcome | None = getattr(query, tag)
         if outcome is not None:
@@ -169,7 +158,7 @@ def _text(
     """An element with a text; nothing if it says nothing."""
     if text or attributes:
         tabs = "\t" * level
-        yield f"{tabs}<{tag}{_attributes(attributes or {})}>{_escaped(text)}</{tag}>"
+        yield f"{tabs}<{tag}{_attributes(attributes or {})}>{escape(text, _IN_TEXTS)}</{tag}>"
 
 
 def _indented(level: int, extra: list[str]) -> Iterator[str]:
@@ -178,7 +167,7 @@ def _indented(level: int, extra: list[str]) -> Iterator[str]:
 
 
 def _attributes(given: Mapping[str, str]) -> str:
-    return "".join(f' {name}="{_escaped(text, _IN_ATTRIBUTES)}"' for name, text in given.items())
+    return "".join(f' {name}="{escape(text, _IN_ATTRIBUTES)}"' for name, text in given.items())
 
 
 def _at(place: Point | None) -> dict[str, str]:
@@ -187,8 +176,3 @@ def _at(place: Point | None) -> dict[str, str]:
 
 def _color(part: Location | BranchPoint | Edge) -> dict[str, str]:
     return {} if part.color is None else {"color": part.color}
-
-
-def _escaped(text: str, signs: str = _IN_TEXTS) -> str:
-    """The text with entities for these signs."""
-    return re.sub(f"[{signs}]", lambda found: _ESCAPES[found[0]], text)

@@ -253,15 +253,7 @@ class Distribution:
         Raises:
             InputError: There are no values, or the buckets cannot be made.
         """
-        from ntagen.checker.picture.chart import (
-            BAND,
-            BLUE,
-            DARK,
-            add_band,
-            add_bars,
-            panels,
-            picture,
-        )
+        from ntagen.checker.picture import chart
 
         automatic = len((self._known["histogram"] or {"counts": []})["counts"])
         if buckets is None and width is None and automatic > _MOST_BARS:
@@ -277,26 +269,26 @@ class Distribution:
             f"mean {self.mean:.6g}"
         )
         labels = (per, "cumulative share")
-        figure, (above, below) = panels(self._query, caption, self.label, labels)
+        figure, (above, below) = chart.panels(self._query, caption, self.label, labels)
         percent = f"{100 * (1 - self._alpha):g} %"
         heights = histogram.frequencies.tolist()
         filled = [bar for bar in zip(edges, edges[1:], heights, strict=False) if bar[2]]
-        tips = add_bars(above, filled, "share of the runs")
+        tips = chart.add_bars(above, filled, "share of the runs")
         if None not in interval:
             ends = [float(one) for one in interval if one is not None]
             label = f"interval of the mean, at {percent} confidence"
-            above.axvspan(*ends, color=DARK, alpha=BAND, linewidth=0.0, label=label)
+            above.axvspan(*ends, color=chart.DARK, alpha=chart.BAND, linewidth=0.0, label=label)
         if self.mean is not None:
-            above.axvline(self.mean, color=DARK, linewidth=1.0, linestyle="--", label="mean")
+            above.axvline(self.mean, color=chart.DARK, linewidth=1.0, linestyle="--", label="mean")
         above.set_ylim(0.0, 1.05 * max(heights))
         x, value, lower, upper = self._thinned(edges[0], edges[-1])
         label = f"band for all values at once, at {percent} confidence"
-        add_band(below, x, (lower, upper), label, step="post")
+        chart.add_band(below, x, (lower, upper), label, step="post")
         label = "share of the runs up to there"
-        below.plot(x, value, color=BLUE, linewidth=1.0, drawstyle="steps-post", label=label)
+        below.plot(x, value, color=chart.BLUE, linewidth=1.0, drawstyle="steps-post", label=label)
         # A rare event is a flat line else.
         below.set_ylim(0.0, 1.0 if value[-1] >= 0.5 else min(1.0, 1.15 * upper[-1]))
-        return picture(figure, tips)
+        return chart.picture(figure, tips)
 
     def _repr_svg_(self) -> str | None:
         return None if self.count == 0 else self.chart().text

@@ -61,19 +61,16 @@ class EdgeEntry:
         return EngineEdge(self.process, self.source, self.targets[branch], self.sync, select)
 
 
-class EdgeTable:
+class EdgeTable(dict[int, list[EdgeEntry]]):
     """The edges of a model, by process. Those of a process are asked for when they are needed."""
 
     def __init__(self, of_process: Callable[[int], list[RawEdge]]) -> None:
+        super().__init__()
         self._of_process = of_process
-        self._known: dict[int, list[EdgeEntry]] = {}
 
-    def __getitem__(self, process: int) -> list[EdgeEntry]:
-        edges = self._known.get(process)
-        if edges is None:
-            edges = [EdgeEntry(*entry) for entry in self._of_process(process)]
-            self._known[process] = edges
-        return edges
+    def __missing__(self, process: int) -> list[EdgeEntry]:
+        self[process] = [EdgeEntry(*entry) for entry in self._of_process(process)]
+        return self[process]
 
 
 def step_of(edges: EdgeTable, step: list[tuple[int, int, int, list[int]]]) -> EngineStep:

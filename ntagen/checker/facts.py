@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ntagen.checker.picture.diagram import BranchPoint, Diagram, Edge, Location
+import msgspec
+
+from ntagen.checker.picture.diagram import Diagram
 from ntagen.checker.queries import Query as Query
 from ntagen.checker.queries import queries_from as queries_from
 
@@ -177,48 +179,8 @@ class Facts:
     @classmethod
     def from_object(cls, found: dict[str, Any]) -> Facts:
         """Makes the values from the engine's object ``ntagen-model``."""
-        return cls(
-            templates=tuple(_template(entry) for entry in found["templates"]),
-            processes=tuple(
-                Process(
-                    entry["name"],
-                    entry["template"],
-                    entry["priority"],
-                    location_count=entry["locations"],
-                    edge_count=entry["edges"],
-                )
-                for entry in found["processes"]
-            ),
-            variables=tuple(
-                Variable(**{**entry, "dimensions": tuple(entry["dimensions"])})
-                for entry in found["variables"]
-            ),
-            clocks=tuple(Clock(**entry) for entry in found["clocks"]),
-            channels=tuple(Channel(**entry) for entry in found["channels"]),
-            features=tuple(found["features"]),
-            scalar_sets=tuple(ScalarSet(**entry) for entry in found["scalar_sets"]),
-            state=StateSize(**found["state"]),
-            queries=queries_from(found["queries"]),
-        )
-
-
-def _template(entry: dict[str, Any]) -> Template:
-    return Template(
-        entry["name"],
-        tuple(entry["parameters"]),
-        tuple(Location(**_drawn(location)) for location in entry["locations"]),
-        tuple(BranchPoint(**_drawn(point)) for point in entry["branch_points"]),
-        tuple(Edge(**_drawn(edge)) for edge in entry["edges"]),
-    )
-
-
-def _drawn(entry: dict[str, Any]) -> dict[str, Any]:
-    """The attributes of a part, its places as pairs."""
-    values = dict(entry)
-    if values.get("position") is not None:
-        values["position"] = tuple(values["position"])
-    if "nails" in values:
-        values["nails"] = tuple(tuple(nail) for nail in values["nails"])
-    if "labels" in values:
-        values["labels"] = {kind: tuple(point) for kind, point in values["labels"].items()}
-    return values
+        processes = [
+            one | {"location_count": one["locations"], "edge_count": one["edges"]}
+            for one in found["processes"]
+        ]
+        return msgspec.convert(found | {"processes": processes}, cls)

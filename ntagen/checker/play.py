@@ -17,8 +17,9 @@ from fractions import Fraction
 from typing import Any, Literal
 
 import ntagen._checker as _checker
-from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of, state_of
-from ntagen.errors import InputError, ModelError
+from ntagen.checker.errors import failing
+from ntagen.checker.runs import Edge, Run, State, edges_of, runs_of, state_of
+from ntagen.errors import InputError
 
 __all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window", "played"]
 
@@ -209,7 +210,7 @@ class Play:
             next=Next(
                 kind=then["kind"],
                 delay=None if raw["ticks"] is None else Fraction(raw["ticks"], unit),
-                edges=_edges(then.get("edges", ())),
+                edges=edges_of(then.get("edges", ())),
                 winner=then.get("winner"),
                 why=then.get("by") or then.get("gap", ""),
             ),
@@ -322,19 +323,14 @@ def played(play: Play, steps: int, seed: int) -> Run:
 def _refusing() -> Iterator[None]:
     """Turns the engine's errors into ours."""
     try:
-        yield
-    except _checker.FailedError as error:
-        raise ModelError(error.args[0]) from None
+        with failing():
+            yield
     except ValueError as error:
         raise InputError(str(error)) from None
 
 
-def _edges(raw: list[dict[str, Any]]) -> tuple[Edge, ...]:
-    return tuple(edge_of(edge) for edge in raw)
-
-
 def _reply(raw: dict[str, Any], unit: int) -> Reply:
-    return Reply(_edges(raw["edges"]), tuple(_window(window, unit) for window in raw["windows"]))
+    return Reply(edges_of(raw["edges"]), tuple(_window(window, unit) for window in raw["windows"]))
 
 
 def _window(raw: list[Any], unit: int) -> Window:

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+
+from ntagen.errors import InputError
 
 if TYPE_CHECKING:
+    from ntagen.checker.picture.gantt import Stay
     from ntagen.checker.picture.page import Svg
 
 __all__ = [
@@ -23,11 +27,17 @@ __all__ = [
     "Run",
     "State",
     "Step",
-    "edge_of",
+    "edges_of",
     "runs_of",
     "simulated",
     "state_of",
 ]
+
+MOST_STEPS: Final = 500
+"""A sequence chart of a longer run cannot be read."""
+
+MOST_CHANGES: Final = 20_000
+"""A Gantt chart with more steps would take a browser minutes."""
 
 End = Literal["after", "loop", "waits", "stuck"]
 
@@ -141,9 +151,26 @@ class Run:
         Raises:
             InputError: The run has too many steps for a picture.
         """
-        from ntagen.checker.charts import gantt_chart
+        from ntagen.checker.picture.gantt import gantt
 
-        return gantt_chart(self)
+        count = len(self.steps)
+        if count > MOST_CHANGES:
+            raise InputError(
+                f"the run has {count} steps, and a Gantt chart shows at most {MOST_CHANGES}\n"
+                "hint: ask for a shorter run"
+            )
+        if last := self.duration:
+            moments, unit = moments_of(self), "time in the model's unit"
+        else:
+            last, unit = Fraction(len(self.states)), "state"
+            moments = [Fraction(index) for index in range(len(self.states))]
+        marks = []
+        if self.end == "loop" and self.loop is not None:
+            marks = [(moments[self.loop], "loop"), (last, "back")]
+        elif self.end != "after":
+            marks = [(last, {"waits": "waits for ever", "stuck": "stuck"}[self.end])]
+        heading = self._heading(", which takes no time")
+        return gantt(stays_of(self, [*moments, last]), heading, unit, marks)
 
     def sequence(self) -> Svg:
         """The run as a sequence chart: a line for each process, and what passes between them.
@@ -151,9 +178,39 @@ class Run:
         Raises:
             InputError: The run has too many steps for a picture.
         """
-        from ntagen.checker.charts import sequence_chart
+        from ntagen.checker.picture.sequence import Event, sequence
 
-        return sequence_chart(self)
+        count = len(self.steps)
+        if count > MOST_STEPS:
+            raise InputError(
+                f"the run has {count} steps, and a sequence chart shows at most {MOST_STEPS}\n"
+                "hint: draw it as a Gantt chart, or ask for a shorter run"
+            )
+        events = []
+        moments = moments_of(self)
+        for number, (before, after) in enumerate(pairwise(self.states)):
+            changes = ", ".join(
+                f"{name} = {value}"
+                for name, value in after.variables.items()
+                if value != before.variables[name]
+            )
+            edges, when = self.steps[number].edges, f"at {_number(moments[number + 1])}"
+            moves = {edge.process: after.locations[edge.process] for edge in edges}
+            events.append(Event(when, moves, _label(edges), changes))
+        ends = {
+            "after": f"then it waits {_number(self.delay)}" if self.delay else "",
+            "loop": f"from here on as after step {self.loop}, for ever",
+            "waits": "then time passes for ever",
+            "stuck": "nothing is possible any more",
+        }
+        heading = self._heading(" in time 0")
+        return sequence(self.states[0].locations, events, heading, ends[self.end])
+
+    def _heading(self, timeless: str) -> str:
+        """The heading of a picture; a run without time has its own words for that."""
+        steps = "1 step" if len(self.steps) == 1 else f"{len(self.steps)} steps"
+        time = f" in time {_number(self.duration)}" if self.duration else timeless
+        return f"{f'{self.title}: ' if self.title else ''}Run of {steps}{time}"
 
     def __str__(self) -> str:
         lines = [f"{self.title}:"] if self.title else []
@@ -171,6 +228,45 @@ class Run:
         return "\n".join([*lines, *last[self.end]])
 
 
+def moments_of(run: Run) -> list[Fraction]:
+    """When each state of a run is entered."""
+    return list(accumulate((step.delay for step in run.steps), initial=Fraction(0)))
+
+
+def stays_of(run: Run, moments: list[Fraction]) -> list[Stay]:
+    """How long each process stays where, by process; `moments` are of the states, and the end.
+
+    A process that takes an edge back to the same location stays there again.
+    """
+    from ntagen.checker.picture.gantt import Stay
+
+    stays = []
+    for process in run.states[0].locations:
+        entered = [0] + [
+            index
+            for index, step in enumerate(run.steps, start=1)
+            if any(edge.process == process for edge in step.edges)
+        ]
+        for index, following in pairwise([*entered, len(moments) - 1]):
+            place = run.states[index].locations[process]
+            stays.append(Stay(process, place, moments[index], moments[following]))
+    return stays
+
+
+def _number(value: Fraction) -> str:
+    """A number as people write it: decimal if it has few places, else as a fraction."""
+    return f"{float(value):g}" if 10_000 % value.denominator == 0 else str(value)
+
+
+def _label(edges: Sequence[Edge]) -> str:
+    """What the edges of a step do: the sender's synchronisation with its choices."""
+    if not edges:
+        return ""
+    first = edges[0]
+    select = ", ".join(f"{name}={value}" for name, value in first.select.items())
+    return " ".join(part for part in (first.sync, f"[{select}]" if select else "") if part)
+
+
 def runs_of(traces: dict[str, Any]) -> tuple[Run, ...]:
     """The runs with exact times in a trace as the engine writes it."""
     found = traces.get("traces", [traces])
@@ -183,10 +279,7 @@ def _run(raw: dict[str, Any], title: str | None) -> Run:
     end = raw["end"]
     return Run(
         states=tuple(state_of(state, unit) for state in raw["states"][: len(steps) + 1]),
-        steps=tuple(
-            Step(Fraction(step["wait"], unit), tuple(edge_of(edge) for edge in step["edges"]))
-            for step in steps
-        ),
+        steps=tuple(Step(Fraction(step["wait"], unit), edges_of(step["edges"])) for step in steps),
         end=end["kind"],
         loop=end.get("state"),
         delay=Fraction(end.get("wait", 0), unit),
@@ -200,10 +293,10 @@ def state_of(raw: dict[str, Any], unit: int) -> State:
     return State(raw["locations"], raw["variables"], clocks)
 
 
-def edge_of(raw: dict[str, Any]) -> Edge:
-    """An edge from the engine's JSON."""
+def edges_of(raw: Iterable[dict[str, Any]] | None) -> tuple[Edge, ...]:
+    """Edges from the engine's JSON."""
     names = ("process", "source", "target", "sync", "guard", "update", "select")
-    return Edge(*(raw[name] for name in names))
+    return tuple(Edge(*(one[name] for name in names)) for one in raw or ())
 
 
 OPEN_WINDOW_UNITS = 5
@@ -265,7 +358,7 @@ def _choice(raw: dict[str, Any], unit: int) -> Choice:
         (Fraction(first, unit), None if last is None else Fraction(last, unit))
         for first, last in raw["windows"]
     )
-    return Choice(tuple(edge_of(edge) for edge in raw["edges"]), windows)
+    return Choice(edges_of(raw["edges"]), windows)
 
 
 def _decision(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ntagen.checker.runs import Edge, Run, Step, edge_of, runs_of
+from ntagen.checker.runs import Edge, Run, Step, edges_of, runs_of
 
 _WIDTH = 96
 """Lists of names are folded at about this many characters."""
@@ -65,13 +65,7 @@ def _exact(run: Run, most: int | None) -> list[str]:
     lines = [*_start(first.locations, first.variables), *_steps(steps, most)]
     if run.delay:
         lines.append(f"{_label('')}until {now + run.delay} nothing moves")
-    ends = {
-        "after": [],
-        "loop": [f"{_label('')}as after step {run.loop} from here on, for ever"],
-        "waits": [f"{_label('')}time passes for ever"],
-        "stuck": [f"{_label('')}nothing is possible any more"],
-    }
-    return lines + ends[run.end]
+    return lines + _ending(run.end, run.loop)
 
 
 def _is_set(clock: str, value: Fraction, before: Fraction, step: Step) -> bool:
@@ -89,25 +83,30 @@ def _symbolic(trace: Mapping[str, Any], most: int | None) -> list[str]:
     steps = [
         _Told(
             None,
-            tuple(map(edge_of, edges)),
+            edges_of(edges),
             _changes(states[index]["variables"], states[index + 1]["variables"]),
         )
         for index, edges in enumerate(trace["transitions"])
     ]
     lines = [*_start(states[0]["locations"], states[0]["variables"]), *_steps(steps, most)]
     ending = trace.get("ending", {})
-    ends = {
-        "loop": f"{_label('')}as after step {ending.get('loop')} from here on, for ever",
-        "waits": f"{_label('')}time passes for ever",
-        "stuck": f"{_label('')}nothing is possible any more",
+    return lines + _ending(ending.get("kind", "after"), ending.get("loop"))
+
+
+def _ending(kind: str, loop: int | None) -> list[str]:
+    """How a trace goes on for ever, or why it does not; nothing if it just ends."""
+    said = {
+        "loop": f"as after step {loop} from here on, for ever",
+        "waits": "time passes for ever",
+        "stuck": "nothing is possible any more",
     }
-    return [*lines, ends[ending["kind"]]] if ending else lines
+    return [] if kind == "after" else [_label("") + said[kind]]
 
 
 def _failing(edges: list[dict[str, Any]], state: Mapping[str, Any]) -> Iterator[str]:
     """The step in which the model fails, and the state before it."""
     yield f"{_label('')}fails in the next step:"
-    yield _INDENT + _move(tuple(map(edge_of, edges)))
+    yield _INDENT + _move(edges_of(edges))
     values = [f"{name} = {value}" for name, value in state["variables"].items() if value]
     yield from _folded([*values, *state["zone"]])
 

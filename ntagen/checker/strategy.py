@@ -10,17 +10,19 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import ntagen._checker as _checker
+from ntagen.checker.decisions import Decision, StrategyState, state_of
+from ntagen.checker.errors import failing, rejecting
 from ntagen.checker.play import Play, played
-from ntagen.checker.runs import Edge, Run, State, edge_of, runs_of
-from ntagen.errors import InputError, ModelError, UndecidedError
+from ntagen.checker.runs import Edge, Run, State, edges_of, runs_of
+from ntagen.errors import InputError, UndecidedError
 from ntagen.files import write_files
 
 if TYPE_CHECKING:
@@ -93,49 +95,6 @@ class Advice:
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
-    """What a strategy does in some zones of a state.
-
-    Attributes:
-        zones: It applies in each of these zones. A zone is a list of constraints, such as
-            ``x <= 3``, that all hold; the empty list always holds.
-        edges: The edges that are taken together, the sender's first; empty means to wait. If an
-            edge of the controller leads to a branch point, this is one leg; the environment picks
-            any.
-        rank: As in `Advice`.
-    """
-
-    zones: tuple[tuple[str, ...], ...]
-    edges: tuple[Edge, ...]
-    rank: int
-
-    def __str__(self) -> str:
-        zones = " or ".join(" && ".join(zone) or "true" for zone in self.zones)
-        return f"{zones}: {', '.join(map(str, self.edges)) or 'wait'}"
-
-
-@dataclass(frozen=True, slots=True)
-class StrategyState:
-    """The decisions of a strategy for some locations and variables.
-
-    Attributes:
-        locations: The location of each process.
-        variables: The value of each variable.
-        is_goal: Whether play has ended here, won, for all clock values.
-        decisions: What to do. The first decision that applies counts; in a permissive strategy
-            each one that applies is allowed.
-        legs: In a strategy of the environment, the legs that it picks for moves of the controller:
-            for each move the first that applies.
-    """
-
-    locations: dict[str, str] = field(hash=False)
-    variables: dict[str, int | float] = field(hash=False)
-    is_goal: bool
-    decisions: tuple[Decision, ...]
-    legs: tuple[Decision, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Verification:
     """The result of an independent check.
 
@@ -189,7 +148,7 @@ class Strategy:
         return len(self._raw)
 
     def __iter__(self) -> Iterator[StrategyState]:
-        return map(_state, json.loads(self.json())["states"])
+        return map(state_of, json.loads(self.json())["states"])
 
     @property
     def under(self) -> Strategy | None:
@@ -212,7 +171,7 @@ class Strategy:
             InputError: The run is not possible in the model.
             ModelError: The model has a run-time error.
         """
-        with _rejecting():
+        with rejecting(), failing():
             start: Literal["initial", "anywhere"] | dict[str, Any] | None
             start = json.loads(self._raw.start_json(self.priorities))
         if start is None:
@@ -226,7 +185,7 @@ class Strategy:
             UndecidedError: The strategy does not have this state.
             InputError: The model does not have this state.
         """
-        return _state(json.loads(self._at(self._given(state))))
+        return state_of(json.loads(self._at(self._given(state))))
 
     def action(self, state: StateLike, *, time: ExactNumber | None = None) -> Advice:
         """What the strategy does in a state.
@@ -271,14 +230,8 @@ class Strategy:
                 "the strategy has a time limit, and the state does not say how late it is\n"
                 f"hint: give the time since the start: time=…, or {_TIME} among the clocks"
             )
-        try:
+        with failing(), self._refusing(given):
             raw = json.loads(self._raw.advice_json(json.dumps(given)))
-        except LookupError as error:
-            raise self._undecided(given, error) from None
-        except ValueError as error:
-            raise InputError(f"{error}\n{self._way_out(error, given)}") from None
-        except _checker.FailedError as error:
-            raise ModelError(error.args[0]) from None
         if raw["over"]:
             return (Advice("done"),)
         return tuple(_advice(decision, raw["waiting"]) for decision in raw["now"])
@@ -313,7 +266,7 @@ class Strategy:
             state = {"locations": first.locations, "variables": first.variables}
         given = self._given(state)
         return zones_chart(
-            _state(json.loads(self._at(given))),
+            state_of(json.loads(self._at(given))),
             self._clock_order,
             (x, y),
             {name: Fraction(*value) for name, value in given["clocks"].items()},
@@ -357,7 +310,7 @@ class Strategy:
         Raises:
             InputError: The strategy's query does not fit the model.
         """
-        with _rejecting():
+        with rejecting(), failing():
             holds, lines = self._raw.verify(self.forced, self.priorities, states)
         return Verification(holds, tuple(lines))
 
@@ -368,7 +321,7 @@ class Strategy:
             InputError: The strategy's query does not fit the model.
             ModelError: The initial state cannot be computed.
         """
-        with _rejecting():
+        with rejecting(), failing():
             return Play(self._raw.play(self.query, self.forced, self.priorities))
 
     def simulate(self, steps: int = 100, seed: int = 0) -> Run:
@@ -425,8 +378,14 @@ class Strategy:
         )
 
     def _at(self, given: dict[str, Any]) -> str:
-        try:
+        with self._refusing(given):
             return self._raw.state_json(json.dumps(given))
+
+    @contextlib.contextmanager
+    def _refusing(self, given: dict[str, Any]) -> Iterator[None]:
+        """Turns the engine's errors about a state into ours."""
+        try:
+            yield
         except LookupError as error:
             raise self._undecided(given, error) from None
         except ValueError as error:
@@ -451,7 +410,7 @@ class Strategy:
                 "hint: play under it does not get there, or it does not win from there"
             )
         clocks = " ".join(f"{name}={Fraction(*value)}" for name, value in given["clocks"].items())
-        decisions = _state(json.loads(self._at(given))).decisions
+        decisions = state_of(json.loads(self._at(given))).decisions
         lines = [f"  {decision}" for decision in decisions[:_DECISIONS_SHOWN]] or ["  none"]
         if len(decisions) > _DECISIONS_SHOWN:
             lines.append(f"  … and {len(decisions) - _DECISIONS_SHOWN} more")
@@ -463,17 +422,6 @@ class Strategy:
                 ]
             )
         )
-
-
-@contextlib.contextmanager
-def _rejecting() -> Iterator[None]:
-    """Turns the engine's errors about a query or model into ours."""
-    try:
-        yield
-    except _checker.RejectedError as error:
-        raise InputError("\n".join(text.rstrip() for text in error.args[0])) from None
-    except _checker.FailedError as error:
-        raise ModelError(error.args[0]) from None
 
 
 _STATE_HINT = (
@@ -495,36 +443,13 @@ def _pair(name: str, value: object) -> tuple[int, int]:
     raise InputError(f"the value {value!r} of clock {name} is not an exact number\nhint: {hint}")
 
 
-def _edges(raw: list[dict[str, Any]] | None) -> tuple[Edge, ...]:
-    return tuple(edge_of(edge) for edge in raw or ())
-
-
 def _advice(decision: dict[str, Any], waiting: dict[str, Any] | None) -> Advice:
     if decision["edges"] is not None or waiting is None:
-        return Advice("act", edges=_edges(decision["edges"]), rank=decision["rank"])
+        return Advice("act", edges=edges_of(decision["edges"]), rank=decision["rank"])
     ticks, unit = waiting["ticks"], waiting["ticks_per_unit"]
     return Advice(
         "wait",
         delay=None if ticks is None else Fraction(ticks, unit),
-        then=_edges(waiting["then"][0]["edges"]) if waiting["then"] else (),
+        then=edges_of(waiting["then"][0]["edges"]) if waiting["then"] else (),
         rank=decision["rank"],
-    )
-
-
-def _state(raw: dict[str, Any]) -> StrategyState:
-    return StrategyState(
-        raw["locations"],
-        raw["variables"],
-        raw["goal"],
-        _decisions(raw["decisions"]),
-        _decisions(raw.get("legs", ())),
-    )
-
-
-def _decisions(raw: Iterable[dict[str, Any]]) -> tuple[Decision, ...]:
-    return tuple(
-        Decision(
-            zones=tuple(map(tuple, one["zones"])), edges=_edges(one["action"]), rank=one["rank"]
-        )
-        for one in raw
     )

@@ -158,12 +158,8 @@ class OverTime:
             "runs": self.runs.tolist(),
             "quantiles": list(self.quantiles),
             **{
-                name: {text: _finite(values) for text, values in found.items()}
-                for name, found in (
-                    ("mean", self.mean),
-                    ("lower", self.lower),
-                    ("upper", self.upper),
-                )
+                name: {text: _finite(values) for text, values in getattr(self, name).items()}
+                for name in ("mean", "lower", "upper")
             },
         }
 

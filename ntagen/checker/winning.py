@@ -4,9 +4,6 @@ Decisions name their zones by constraints, such as ``x-y <= 3``. A clock that is
 has a value, then the picture is the plane at that value, or it has none, then it is the shadow of
 the zones: what is done for some value of that clock. Both are exact: a zone is closed as a
 difference bound matrix, and its rows of other clocks are left out.
-
-Strategies draw themselves (`ntagen.checker.strategy.Strategy.zones`), so strategies know this
-module, and it knows of them only what it reads.
 """
 
 from __future__ import annotations
@@ -14,8 +11,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from typing import Final, Protocol
+from itertools import product
+from typing import Final
 
+from ntagen.checker.decisions import StrategyState
 from ntagen.checker.picture.page import Svg
 from ntagen.checker.picture.zones import WAIT, Area, Axes, Half, zones_picture
 from ntagen.errors import InputError
@@ -32,48 +31,8 @@ Bound = tuple[Fraction, bool]
 """A bound, and whether it is strict."""
 
 
-class Edge(Protocol):
-    """An edge that is taken: `ntagen.checker.runs.Edge`."""
-
-
-class Decision(Protocol):
-    """`ntagen.checker.strategy.Decision`."""
-
-    @property
-    def zones(self) -> Sequence[Sequence[str]]:
-        """Where it applies."""
-
-    @property
-    def edges(self) -> Sequence[Edge]:
-        """What is taken; empty to wait."""
-
-    @property
-    def rank(self) -> int:
-        """Its rank."""
-
-
-class State(Protocol):
-    """`ntagen.checker.strategy.StrategyState`."""
-
-    @property
-    def locations(self) -> Mapping[str, str]:
-        """The location of each process."""
-
-    @property
-    def variables(self) -> Mapping[str, int | float]:
-        """The value of each variable."""
-
-    @property
-    def is_goal(self) -> bool:
-        """Whether play is over, won."""
-
-    @property
-    def decisions(self) -> Sequence[Decision]:
-        """What is done."""
-
-
 def zones_chart(
-    state: State,
+    state: StrategyState,
     clocks: Sequence[str],
     drawn: tuple[str | None, str | None],
     values: Mapping[str, Fraction],
@@ -217,13 +176,10 @@ def _halves(
     for name in names - {""}:
         _tighten(bounds, ("", name), (Fraction(0), False))
     # Closed by the algorithm of Floyd and Warshall, all rows but those of the axes can go.
-    for over in names:
-        for left in names:
-            for right in names:
-                first, second = bounds.get((left, over)), bounds.get((over, right))
-                if first is not None and second is not None:
-                    through = (first[0] + second[0], first[1] or second[1])
-                    _tighten(bounds, (left, right), through)
+    for over, left, right in product(names, repeat=3):
+        first, second = bounds.get((left, over)), bounds.get((over, right))
+        if first is not None and second is not None:
+            _tighten(bounds, (left, right), (first[0] + second[0], first[1] or second[1]))
     along = {"": (0, 0), drawn[0]: (1, 0)} | ({} if drawn[1] is None else {drawn[1]: (0, 1)})
     halves = []
     for (left, right), (value, strict) in bounds.items():

@@ -203,7 +203,7 @@ def _report(error: BaseException) -> int:
                 error.show()
             return InputError.exit_code
         case NtagenError():
-            _say(_with_severity(str(error)))
+            _say(with_severity(str(error)))
             return error.exit_code
         case LimitReached():
             _say(f"error: {error}")
@@ -220,7 +220,7 @@ def _report(error: BaseException) -> int:
             return PIPE_CLOSED
         case OSError():
             _abandon_output()
-            _say(_with_severity(_describe(error)))
+            _say(with_severity(_describe(error)))
             return InputError.exit_code
         case ImportError():
             _say(
@@ -233,7 +233,7 @@ def _report(error: BaseException) -> int:
             return INTERNAL_ERROR
 
 
-def _with_severity(message: str) -> str:
+def with_severity(message: str) -> str:
     """Puts "error: " before a message, unless its first line has the word already."""
     first_line = message.partition("\n")[0]
     return message if re.search(r"\berror\b", first_line) else f"error: {message}"

@@ -3,44 +3,39 @@
 from __future__ import annotations
 
 import contextlib
-import re
 import sys
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli import INTERNAL_ERROR
+from ntagen.cli import INTERNAL_ERROR, with_severity
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
-from ntagen.cli.loading import (
+from ntagen.cli.loading import load_model, pointing_to_explanations, show_warnings
+from ntagen.cli.models.answer_formats import FORMATS
+from ntagen.cli.models.answer_rows import Format
+from ntagen.cli.models.evidence import Outputs, Questions, backed
+from ntagen.cli.models.idle_options import idle_options, unwritten
+from ntagen.cli.models.options import SETTINGS, engine_options
+from ntagen.cli.models.outcomes import Outcome, exit_code
+from ntagen.cli.models.plan_lists import LINES, ListLimits
+from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
+from ntagen.cli.models.spread_runs import Spreading, joint_answers
+from ntagen.cli.options import (
     constant_option,
     external_option,
     include_option,
-    load_model,
-    pointing_to_explanations,
-    show_warnings,
+    overflow_rule,
+    path_argument,
+    path_option,
 )
-from ntagen.cli.models.answer_formats import FORMATS, Format, GitHub, JsonLines, JUnit, Sarif
-from ntagen.cli.models.answer_rows import Human
-from ntagen.cli.models.cluster_runs import Spreading
-from ntagen.cli.models.evidence import backed
-from ntagen.cli.models.idle_options import idle_options, unwritten
-from ntagen.cli.models.joint_answers import joint_answers
-from ntagen.cli.models.options import SETTINGS, engine_options
-from ntagen.cli.models.outcomes import Outcome, exit_code
-from ntagen.cli.models.outputs import Outputs
-from ntagen.cli.models.plan_lists import LINES, ListLimits
-from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
-from ntagen.cli.models.questions import Questions
-from ntagen.cli.models.run_progress import progress_of, say_interrupted
-from ntagen.cli.notes import given_options, say
-from ntagen.cli.rules import overflow_rule
+from ntagen.cli.progress import progress_of, say_interrupted
 from ntagen.cli.settings import settings_option
 from ntagen.cli.signals import LimitReached
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, given_options, say
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 from ntagen.values import dataclass
@@ -84,8 +79,8 @@ class _CheckCommand(Renamed):
     "trace fails its check), 130 interrupted (the counters so far are printed; random runs until "
     "then are an answer, with 3), 141 nobody reads the output any more, 143 ended by SIGTERM.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("second_path", metavar="[FILE.q]", required=False, type=click.Path(path_type=Path))
+@path_argument("model_path", metavar="MODEL")
+@path_argument("second_path", metavar="[FILE.q]", required=False)
 @click.option(
     "--query",
     "asked",
@@ -94,11 +89,10 @@ class _CheckCommand(Renamed):
     help="A query, or the name of a query of the model. You can give this option several times.  "
     "[default: all queries of the model]",
 )
-@click.option(
+@path_option(
     "--queries",
     "query_file",
     metavar="FILE.q",
-    type=click.Path(path_type=Path),
     help="A file of queries; they are answered instead of the model's own. You can also write the "
     "file after MODEL, without --queries.",
 )
@@ -113,7 +107,7 @@ class _CheckCommand(Renamed):
 @click.option(
     "--format",
     "form",
-    type=click.Choice(FORMATS),
+    type=click.Choice(list(FORMATS)),
     help="How answers are printed: for people (human), one JSON object on a line for each query "
     "(json), annotations of GitHub Actions (github), or a report for CI (junit, sarif).  "
     "[default: human]",
@@ -130,10 +124,9 @@ class _CheckCommand(Renamed):
     help="Write the trace that shows why: a witness or a counterexample. - is standard output. "
     "With several queries, FILE has the trace of the last query that has one.",
 )
-@click.option(
+@path_option(
     "--certificate",
     metavar="FILE",
-    type=click.Path(path_type=Path),
     help="Write the set of all reached states, for `ntagen verify`. Only an E<> that is not "
     "satisfied and an A[] that is satisfied have one. With several of them, FILE has that of the "
     "last.",
@@ -231,8 +224,9 @@ def command(
     inputs = {"model": model_path} | ({"queries": query_path} if query_path else {})
     require_apart(outputs.wanted(), inputs)
     options = _options(outputs, given, settings)
-    shown = _format("json" if as_json else form or "human", trace_is_written=trace is not None)
-    with _rejections_in(shown, model_path), pointing_to_explanations(is_human):
+    printed = FORMATS["json" if as_json else form or "human"]
+    shown = printed(model_path, trace_is_written=trace is not None)
+    with _rejections_in(shown), pointing_to_explanations(is_human):
         with doing("loading the model"):
             loaded = load_model(model_path, include, overflow, constants, allow_external)
         todo = _queries(loaded, asked, query_path)
@@ -244,7 +238,7 @@ def command(
     named = given_options()
     say(idle_options(named, values, forms, ranks=questions.ranks_plans))
     spreading = Spreading(dask, todo, options, _why_not_spread(joint, allow_external))
-    shown.loaded(model_path, loaded.model)
+    shown.loaded(loaded.model)
     together = (
         joint_answers(loaded.model, todo, options, named, quiet=not is_human) if joint else {}
     )
@@ -370,7 +364,7 @@ class _Run:
             return _shown(self.shown, outcome.stopped(reached))
         except InputError as error:
             # The other queries may be right, and the user wants their answers.
-            outcome = replace(outcome, refusal=_with_severity(str(error)))
+            outcome = replace(outcome, refusal=with_severity(str(error)))
             self.shown.one(outcome)
             return outcome
         if answer.verified is False:
@@ -389,15 +383,16 @@ class _Run:
             InputError: The query is wrong.
             LimitReached: A limit came first.
         """
-        from ntagen.verifyta.statistical import of_model
-
         if isinstance(known, InputError):
             raise known
         if known is not None:
             return known
         fields: dict[str, Any] = {"timeout_s": left_s, "folder": query.folder}
         fields["strategy"] = is_used or self.outputs.strategy is not None
-        fields |= of_model(query.options, self.given)
+        if query.options:
+            from ntagen.verifyta.options import of_model
+
+            fields |= of_model(query.options, self.given)
         fields |= self.questions.options(query, self.options)
         wanted = replace(self.options, **fields)
         model = self.questions.model
@@ -450,33 +445,14 @@ def _why_not_spread(joint: bool, allow_external: Sequence[Path]) -> str:
     return "libraries are loaded by this machine only" if allow_external else ""
 
 
-def _format(name: str, *, trace_is_written: bool) -> Format:
-    """How answers are printed."""
-    if name == "human":
-        return Human(trace_is_written=trace_is_written)
-    formats: dict[str, Callable[[], Format]] = {
-        "json": JsonLines,
-        "github": GitHub,
-        "junit": JUnit,
-        "sarif": Sarif,
-    }
-    return formats[name]()
-
-
 @contextlib.contextmanager
-def _rejections_in(shown: Format, path: Path) -> Iterator[None]:
+def _rejections_in(shown: Format) -> Iterator[None]:
     """Also puts the rejection of a model or a list of queries into the output."""
     try:
         yield
     except (InputError, LimitReached) as error:
-        shown.refused(path, str(error))
+        shown.refused(str(error))
         raise
-
-
-def _with_severity(rejection: str) -> str:
-    """A rejection with "error: " before it, unless its first line has the word already."""
-    first = rejection.partition("\n")[0]
-    return rejection if re.search(r"\berror\b", first) else f"error: {rejection}"
 
 
 def _criteria(text: str | None) -> tuple[str, ...]:

@@ -220,12 +220,17 @@ def current() -> Guard:
 
 def resident_bytes() -> int | None:
     """The memory that this process takes; ``None`` where the system does not say it."""
+    return taken_bytes(1)
+
+
+def taken_bytes(column: int) -> int | None:
+    """The virtual (0) or the resident memory (1) of this process, where the system says it."""
     try:
         descriptor = os.open("/proc/self/statm", os.O_RDONLY)
     except OSError:
         return None
     try:
-        return int(os.read(descriptor, 64).split()[1]) * _PAGE_BYTES
+        return int(os.read(descriptor, 64).split()[column]) * _PAGE_BYTES
     finally:
         os.close(descriptor)
 

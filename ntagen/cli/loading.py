@@ -9,67 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import click
-
-from ntagen.cli.notes import say_idle
-from ntagen.cli.rules import Decorator
-from ntagen.cli.terminal import echo, echo_message
+from ntagen.cli.terminal import echo, echo_message, say_idle
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
     from ntagen.checker import OverflowRule
     from ntagen.loading import Loaded
+    from ntagen.nsl import Task
 
 WARNINGS_SHOWN: Final = 10
 """At most this many warnings are printed: a model may have the same one in many templates."""
-
-
-def include_option() -> Decorator:
-    """The option ``--include``."""
-    return click.option(
-        "--include",
-        metavar="DIR",
-        multiple=True,
-        type=click.Path(path_type=Path),
-        help="Allow an environment to include files below this folder too, not only below its own. "
-        "You can give this option several times.",
-    )
-
-
-def external_option() -> Decorator:
-    """The option ``--allow-external``."""
-    return click.option(
-        "--allow-external",
-        metavar="PATH",
-        multiple=True,
-        type=click.Path(path_type=Path),
-        help="Allow a UPPAAL model to import this library, or those of this folder, in statistical "
-        "queries. Their code runs with your rights, so allow only what you trust. You can give "
-        "this option several times.",
-    )
-
-
-def constant_option() -> Decorator:
-    """The option ``--constant``: pairs of a name and a value."""
-
-    def pairs(_: click.Context, __: click.Parameter, given: tuple[str, ...]) -> dict[str, str]:
-        values = {}
-        for one in given:
-            name, sign, value = one.partition("=")
-            if not (name.strip() and sign and value.strip()):
-                raise click.BadParameter(f"{one!r} is not NAME=VALUE, such as N=4")
-            values[name.strip()] = value.strip()
-        return values
-
-    return click.option(
-        "--constant",
-        "constants",
-        metavar="NAME=VALUE",
-        multiple=True,
-        callback=pairs,
-        help="Give a constant of the model another value, such as N=4; that of a template is "
-        "TEMPLATE.NAME=VALUE. You can give this option several times.",
-    )
 
 
 def load_model(
@@ -115,6 +64,20 @@ def load_model(
     return loaded
 
 
+def load_task(path: Path, include: Sequence[Path] = ()) -> Task:
+    """Loads a task. Prints warnings to standard error.
+
+    Raises:
+        InputError: The file is wrong.
+        OSError: The file cannot be read.
+    """
+    from ntagen import nsl
+
+    task = nsl.load_task(path, include=include)
+    show_warnings([warning.render() for warning in task.warnings])
+    return task
+
+
 _LEFT_OUT: Final = "warning[W0213]"
 """The warning that a double is left out of symbolic queries."""
 
@@ -136,13 +99,8 @@ def pointing_to_explanations(wanted: bool) -> Iterator[None]:
     except InputError as error:
         if not wanted:
             raise
-        raise InputError(with_pointer(str(error))) from error
-
-
-def with_pointer(rejection: str) -> str:
-    """A rejection with the command that explains its first diagnostic, if it has one."""
-    pointer = pointer_to_page(rejection)
-    return f"{rejection}\n{pointer}" if pointer else rejection
+        pointer = pointer_to_page(str(error))
+        raise InputError(f"{error}\n{pointer}" if pointer else str(error)) from error
 
 
 def pointer_to_page(rejection: str) -> str:

@@ -11,23 +11,22 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
-from ntagen.cli.limits import limits
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.models.plot_models import (
     KINDS,
     MODELS,
     MOST_DRAWN,
     MOST_SEARCHED,
     OF_GRAPHS,
+    OF_RUNS,
     OF_ZONES,
+    RUN_SETTINGS,
     Wish,
     plot_model,
 )
-from ntagen.cli.models.plot_runs import NAMES
-from ntagen.cli.models.plot_runs import SETTINGS as OF_RUNS
-from ntagen.cli.notes import say_idle
+from ntagen.cli.options import include_option, limits, output_option, path_argument, path_option
 from ntagen.cli.settings import Setting, settings_option
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.files import open_file, require_apart
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ SETTINGS: Final = (
         f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends "
         f"in .dot may have {MOST_SEARCHED:,}]",
     ),
-    *OF_RUNS,
+    *RUN_SETTINGS,
 )
 """What ``--set`` takes."""
 
@@ -71,13 +70,10 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     epilog="Exit codes: 0 drawn, 2 the input or the name of the picture is wrong, "
     "3 the engine reached a limit; what random runs say until then is drawn.",
 )
-@click.argument("source", metavar="ENV.nsl|RUN.mcap|MODEL", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.png|pdf|svg|html|gif|dot",
-    type=click.Path(path_type=Path),
-    help="The picture to write; .html and .gif are for scenes and runs, .dot is for state spaces.  "
+@path_argument("source", metavar="ENV.nsl|RUN.mcap|MODEL")
+@output_option(
+    "FILE.png|pdf|svg|html|gif|dot",
+    "The picture to write; .html and .gif are for scenes and runs, .dot is for state spaces.  "
     "[default: the source's name with .png, of a model with .svg, in the current folder]",
 )
 @click.option(
@@ -89,11 +85,10 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     type=click.IntRange(min=0),
     help="Draw at most this many plans. 0 draws the scene alone, without a search for plans.",
 )
-@click.option(
+@path_option(
     "--strategy",
     "tree_path",
     metavar="FILE.json",
-    type=click.Path(path_type=Path),
     help="In a tissue that answers, draw the strategy in this file, which ntagen check --plans "
     "wrote for this task, and do not look for one.",
 )
@@ -180,7 +175,7 @@ def command(
         {"asked": "--query"} | OF_ZONES | OF_GRAPHS,
         "without --as: the scene is drawn, not its model",
     )
-    say_idle(NAMES, "here: no random runs are drawn")
+    say_idle(OF_RUNS, "here: no random runs are drawn")
     ranking = settings.get("ranking")
     criteria = () if ranking is None else parse_ranking(ranking)
     if _is_log(source):
@@ -237,14 +232,11 @@ def _of_scene(
 ) -> Picture:
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
-    from ntagen.nsl import load_task
     from ntagen.plot.face import picture_with_plans
     from ntagen.plot.run import picture_of_plans
 
     with doing("loading the task"):
-        task = load_task(source, include=include)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
+        task = load_task(source, include)
     configuration = configure(task.given, task.scene)
     settings = configuration.settings
     timeout_s = current().left_s()

@@ -1,9 +1,14 @@
-"""Numbers with a unit on the command line: sizes, times and lengths."""
+"""Values on the command line: sizes, times and lengths with their units, counts, pairs.
+
+Each function reads a text; click takes it as the type of an option, and adds the option's name to
+the message about a wrong value.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from typing import Final
 
@@ -22,131 +27,94 @@ _BYTES_PER: Final = {
     "GIB": 2**30,
     "TIB": 2**40,
 }
-_SECONDS_PER: Final = {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0}
 
 
-class _Quantity(click.ParamType[float]):
-    """A number with a unit, such as ``4GiB`` or ``60s``."""
+def _quantity(name: str, units: Mapping[str, float]) -> Callable[[object], float]:
+    """Reads a number with a unit, such as ``4GiB`` or ``60s``."""
+    sizes = {unit.lower(): size for unit, size in units.items()}
 
-    def __init__(self, name: str, units: dict[str, float] | dict[str, int]) -> None:
-        self.name = name
-        self._units = units
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
+    def read(value: object) -> float:
         match = re.fullmatch(r"\s*([0-9]*\.?[0-9]+)\s*([A-Za-z]*)\s*", str(value))
-        units = {unit.lower(): size for unit, size in self._units.items()}
-        if not match or match[2].lower() not in units:
-            known = ", ".join(unit for unit in self._units if unit)
-            self.fail(
-                f"{value!r} is not a {self.name}; write a number and one of {known}", param, ctx
+        if not match or match[2].lower() not in sizes:
+            known = ", ".join(unit for unit in units if unit)
+            raise click.BadParameter(
+                f"{value!r} is not a {name}; write a number and one of {known}"
             )
-        return float(match[1]) * units[match[2].lower()]
+        return float(match[1]) * sizes[match[2].lower()]
+
+    return read
 
 
-LEAST_BYTES: Final = 2**16
+_LEAST_BYTES: Final = 2**16
 """No search fits into less: who writes such a number has left out the unit."""
 
+_MULTIPLES: Final = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 
-class _Size(_Quantity):
-    """A size; a small number needs its unit."""
+_bytes = _quantity("size", _BYTES_PER)
 
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        size = super().convert(value, param, ctx)
-        if size < LEAST_BYTES:
-            number = re.match(r"[\s0-9.]*", str(value))
-            meant = number[0].strip() if number else ""
-            self.fail(
-                f"{value!r} is less than any search needs; did you mean {meant}GiB or {meant}MiB?",
-                param,
-                ctx,
-            )
-        return size
-
-
-class _Count(click.ParamType[int]):
-    """A whole number from 1, also with a multiple: ``10k``, ``2M``, ``1e6`` or ``1_000_000``."""
-
-    name = "number"
-    _multiples: Final = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> int:
-        text = str(value).strip().lower().replace("_", "")
-        match = re.fullmatch(r"([0-9]{1,15}(?:\.[0-9]{1,9})?)(?:e([0-9]{1,2}))?([kmg]?)", text)
-        if match:
-            factor = 10 ** int(match[2] or 0) * self._multiples[match[3]]
-            number = Fraction(match[1]) * factor
-            if number.denominator == 1 and 1 <= number < 2**63:
-                return int(number)
-        self.fail(
-            f"{value!r} is not a whole number from 1; write for example 5000, 10k or 2M", param, ctx
-        )
-
-
-class Number(click.ParamType[float]):
-    """A number between two others, which are not included."""
-
-    name = "number"
-
-    def __init__(self, low: float, high: float) -> None:
-        self._low = low
-        self._high = high
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """The number."""
-        try:
-            number = float(str(value))
-        except ValueError:
-            number = math.nan
-        if not self._low < number < self._high:
-            wanted = (
-                f"a number between {self._low:g} and {self._high:g}"
-                if self._high < math.inf
-                else f"a number greater than {self._low:g}"
-            )
-            self.fail(f"{value!r} is not {wanted}", param, ctx)
-        return number
-
-
-class Pair(click.ParamType[tuple[float, float]]):
-    """Two numbers with a comma between them, the lesser one first; or one number for both."""
-
-    name = "pair"
-
-    def __init__(self, low: float, high: float, *, one_is_enough: bool = False) -> None:
-        self._number = Number(low, high)
-        self._one_is_enough = one_is_enough
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, float]:
-        """The numbers, in their order."""
-        words = str(value).split(",")
-        if len(words) == 1 and self._one_is_enough:
-            words *= 2
-        if len(words) != 2:
-            self.fail(f"{value!r} is not a pair of numbers; write LOW,HIGH", param, ctx)
-        first, second = (self._number.convert(word.strip(), param, ctx) for word in words)
-        if not self._one_is_enough and not first < second:
-            self.fail(f"{value!r}: the first number must be less than the second", param, ctx)
-        return first, second
-
-
-SIZE: Final = _Size("size", _BYTES_PER)
-"""Such as ``4GiB``; in bytes."""
-
-TIME: Final = _Quantity("time", _SECONDS_PER)
+duration = _quantity("time", {"": 1.0, "ms": 1e-3, "s": 1.0, "min": 60.0, "m": 60.0, "h": 3600.0})
 """Such as ``60s``; in seconds."""
 
-LENGTH: Final = _Quantity("length", {"": 1.0, **MM_PER})
+length = _quantity("length", {"": 1.0, **MM_PER})
 """Such as ``30mm``; in mm."""
 
-COUNT: Final = _Count()
-"""Such as ``10k``."""
+
+def size(value: object) -> int:
+    """Such as ``4GiB``; in bytes. A small number needs its unit."""
+    found = _bytes(value)
+    if found < _LEAST_BYTES:
+        number = re.match(r"[\s0-9.]*", str(value))
+        meant = number[0].strip() if number else ""
+        raise click.BadParameter(
+            f"{value!r} is less than any search needs; did you mean {meant}GiB or {meant}MiB?"
+        )
+    return int(found)
+
+
+def count(value: object) -> int:
+    """A whole number from 1, also with a multiple: ``10k``, ``2M``, ``1e6`` or ``1_000_000``."""
+    text = str(value).strip().lower().replace("_", "")
+    match = re.fullmatch(r"([0-9]{1,15}(?:\.[0-9]{1,9})?)(?:e([0-9]{1,2}))?([kmg]?)", text)
+    if match:
+        found = Fraction(match[1]) * 10 ** int(match[2] or 0) * _MULTIPLES[match[3]]
+        if found.denominator == 1 and 1 <= found < 2**63:
+            return int(found)
+    raise click.BadParameter(
+        f"{value!r} is not a whole number from 1; write for example 5000, 10k or 2M"
+    )
+
+
+def number(low: float, high: float) -> Callable[[object], float]:
+    """Reads a number between two others, which are not included."""
+
+    def read(value: object) -> float:
+        try:
+            found = float(str(value))
+        except ValueError:
+            found = math.nan
+        if not low < found < high:
+            where = f"between {low:g} and {high:g}" if high < math.inf else f"greater than {low:g}"
+            raise click.BadParameter(f"{value!r} is not a number {where}")
+        return found
+
+    return read
+
+
+def pair(
+    low: float, high: float, *, one_is_enough: bool = False
+) -> Callable[[object], tuple[float, float]]:
+    """Reads two numbers with a comma between them, the lesser one first; or one for both."""
+    part = number(low, high)
+
+    def read(value: object) -> tuple[float, float]:
+        words = str(value).split(",")
+        if len(words) == 1 and one_is_enough:
+            words *= 2
+        if len(words) != 2:
+            raise click.BadParameter(f"{value!r} is not a pair of numbers; write LOW,HIGH")
+        first, second = (part(word.strip()) for word in words)
+        if not one_is_enough and not first < second:
+            raise click.BadParameter(f"{value!r}: the first number must be less than the second")
+        return first, second
+
+    return read

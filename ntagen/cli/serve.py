@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.quantities import SIZE, TIME
+from ntagen.cli.options import path_argument
+from ntagen.cli.quantities import duration, size
 from ntagen.cli.terminal import echo
 from ntagen.files import read_file
 
@@ -19,7 +20,7 @@ from ntagen.files import read_file
     former={"--open": "open the address that is printed"},
     epilog="Exit codes: 2 the port or a file is wrong, 130 ended by Ctrl-C.",
 )
-@click.argument("file", required=False, type=click.Path(path_type=Path))
+@path_argument("file", required=False)
 @click.option(
     "--port",
     metavar="PORT",
@@ -31,7 +32,7 @@ from ntagen.files import read_file
     "--timeout",
     "timeout_s",
     metavar="TIME",
-    type=TIME,
+    type=duration,
     default="60s",
     show_default=True,
     help="Stop what is asked for after this time, with reading and drawing.",
@@ -40,7 +41,7 @@ from ntagen.files import read_file
     "--memory",
     "memory_bytes",
     metavar="SIZE",
-    type=SIZE,
+    type=size,
     default="1GiB",
     show_default=True,
     help="Stop what takes this much memory.",
@@ -49,7 +50,7 @@ from ntagen.files import read_file
     "--upload",
     "upload_bytes",
     metavar="SIZE",
-    type=SIZE,
+    type=size,
     default="32MiB",
     show_default=True,
     help="Refuse files that are larger.",
@@ -58,8 +59,8 @@ def command(
     file: Path | None,
     port: int,
     timeout_s: float,
-    memory_bytes: float,
-    upload_bytes: float,
+    memory_bytes: int,
+    upload_bytes: int,
 ) -> None:
     """Show models, environments and runs in the browser: verdicts, traces and pictures.
 
@@ -73,13 +74,13 @@ def command(
       ntagen serve model.xml
       ntagen serve --port 8080 --timeout 10min --memory 4GiB
     """  # noqa: D301  click wants the control character
-    from ntagen.serve.limits import Limits
+    from ntagen.serve.jobs import Limits
     from ntagen.serve.server import Server
 
     limits = Limits(
         timeout_s=timeout_s,
-        memory_bytes=int(memory_bytes),
-        upload_bytes=int(upload_bytes),
+        memory_bytes=memory_bytes,
+        upload_bytes=upload_bytes,
         jobs=max(2, os.cpu_count() or 1),
     )
     data = None if file is None else read_file(file, limits.upload_bytes)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ntagen.cli.rules import Decorator
+from ntagen.cli.options import Decorator
 from ntagen.cli.terminal import echo
 from ntagen.values import dataclass
 
@@ -31,7 +31,7 @@ class Setting:
     """
 
     form: str
-    type: click.ParamType[Any]
+    type: click.ParamType[Any] | Callable[[str], Any]
     help: str
     name: str = ""
 
@@ -153,8 +153,8 @@ def _read(
         if one.field in values:
             raise click.UsageError(f"the setting {one.words!r} is given twice")
         try:
-            value = text.removeprefix(one.words).strip()
-            values[one.field] = one.type.convert(value or one.type.fail("no value"), None, ctx)
+            kind, value = click.types.convert_type(one.type), text.removeprefix(one.words).strip()
+            values[one.field] = kind.convert(value or kind.fail("no value"), None, ctx)
         except click.BadParameter as error:
             raise click.UsageError(f"--set {one.form!r}: {error.message}") from error
     return values

@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import resources
+from itertools import pairwise
 from typing import Final, Literal
 
 from ntagen.nsl import Diagnostic, SourceError, loads_task
@@ -113,11 +114,10 @@ def _told(tokens: Sequence[Token], index: int) -> str:
     if token.type not in ("NAME", "STRING") and (token.text in KEYWORDS or token.text in SOLIDS):
         return _keyword(token.text)
     if token.type == "NAME":
-        for number, one in enumerate(tokens):
-            if one.type == "NAME" and one.text == token.text and _names(tokens, number):
-                kind = tokens[number - 1].text
+        for kind, one in _declarations(tokens):
+            if one.text == token.text:
                 line = one.span.source.line(one.line).strip()
-                return f"```nsl\n{line}\n```\n{kind} on line {one.line}"
+                return f"```nsl\n{line}\n```\n{kind.text} on line {one.line}"
     return ""
 
 
@@ -166,11 +166,9 @@ def statements() -> dict[str, tuple[str, str, str]]:
 
 def declared(text: str) -> list[Declared]:
     """The names of a text in their order: of the environment, regions, values and loops."""
-    tokens = _tokens(text)
     return [
-        Declared(one.text, tokens[i - 1].text, tokens[i - 1].span.start, one.span.end)
-        for i, one in enumerate(tokens)
-        if one.type == "NAME" and _names(tokens, i)
+        Declared(name.text, kind.text, kind.span.start, name.span.end)
+        for kind, name in _declarations(_tokens(text))
     ]
 
 
@@ -235,12 +233,11 @@ def _continuations(statement: Sequence[Token], tokens: Sequence[Token]) -> tuple
 
 def _names_in(tokens: Sequence[Token], only: str | None = None) -> list[Word]:
     """The names that are declared, or only those of one kind."""
-    found = {}
-    for i, one in enumerate(tokens):
-        if one.type == "NAME" and _names(tokens, i):
-            kind = tokens[i - 1].text
-            if kind == only or (only is None and kind != "environment"):
-                found[one.text] = Word(one.text, "name", kind)
+    found = {
+        name.text: Word(name.text, "name", kind.text)
+        for kind, name in _declarations(tokens)
+        if kind.text == only or (only is None and kind.text != "environment")
+    }
     return list(found.values())
 
 
@@ -276,10 +273,11 @@ def _surroundings(before: Sequence[Token]) -> tuple[BlockKind, list[Token]]:
     return stack[-1], statement
 
 
-def _names(tokens: Sequence[Token], index: int) -> bool:
-    """Whether a token is a name at its declaration."""
-    before = tokens[index - 1] if index else None
-    return before is not None and before.type not in ("NAME", "STRING") and before.text in NAMING
+def _declarations(tokens: Sequence[Token]) -> Iterator[tuple[Token, Token]]:
+    """The names at their declarations, each after the keyword before it."""
+    for kind, name in pairwise(tokens):
+        if name.type == "NAME" and kind.type not in ("NAME", "STRING") and kind.text in NAMING:
+            yield kind, name
 
 
 def _is_word(text: str) -> bool:

@@ -18,8 +18,7 @@ from importlib import resources
 from typing import Any, Final
 
 from ntagen.errors import InputError
-from ntagen.serve.jobs import ENDINGS, File, Workshop
-from ntagen.serve.limits import Limits, Refusal
+from ntagen.serve.jobs import ENDINGS, File, Limits, Refusal, Workshop
 
 HOST: Final = "127.0.0.1"
 _TOKEN: Final = "X-Ntagen-Token"
@@ -139,25 +138,8 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Listener
 
     def do_GET(self) -> None:
-        """Answers GET."""
-        self._answer("GET")
-
-    def do_HEAD(self) -> None:
-        """Answers HEAD: what GET would answer, without the content."""
-        self._answer("GET")
-
-    def do_POST(self) -> None:
-        """Answers POST."""
-        self._answer("POST")
-
-    def do_DELETE(self) -> None:
-        """Answers DELETE."""
-        self._answer("DELETE")
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Says nothing: the address has the token."""
-
-    def _answer(self, method: str) -> None:
+        """Answers a request; HEAD as GET, without the content."""
+        method = "GET" if self.command == "HEAD" else self.command
         url = urllib.parse.urlsplit(self.path)
         values = dict(urllib.parse.parse_qsl(url.query))
         try:
@@ -170,6 +152,11 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send(refusal.status, "text/plain; charset=utf-8", refusal.message.encode())
             else:
                 self._json({"error": refusal.message}, refusal.status)
+
+    do_HEAD = do_POST = do_DELETE = do_GET  # noqa: N815  the names of the standard library
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Says nothing: the address has the token."""
 
     def _admit(self, values: dict[str, str]) -> None:
         """Refuses who is not the user, or was sent by another site."""

@@ -235,13 +235,19 @@ def _home(bench: _Bench, moved_s: float) -> None:
     bench.device.pull(moved_mm)
 
 
-def _ends_early(bench: _Bench) -> None:
+def _halted(bench: _Bench, after_s: float) -> Halted:
+    """Makes a push whose watch halts it after a time; returns what the watch raised."""
     halted = Halted("of a check")
+    raised = bench.told(halted, lambda: bench.device.push(bench.length_mm), after_s)
+    need(raised is halted, f"the push ended with {raised!r}, not with the Halted of its watch")
+    return halted
+
+
+def _ends_early(bench: _Bench) -> None:
     after_s = 0.3 * bench.seconds
     began_s = time.monotonic()
-    raised = bench.told(halted, lambda: bench.device.push(bench.length_mm), after_s)
+    halted = _halted(bench, after_s)
     took_s = time.monotonic() - began_s
-    need(raised is halted, f"the push ended with {raised!r}, not with the Halted of its watch")
     if 0.0 < halted.part <= 1.0:
         bench.device.pull(halted.part * bench.length_mm)
     late_s = took_s - after_s
@@ -253,25 +259,16 @@ def _ends_early(bench: _Bench) -> None:
 
 def _part(bench: _Bench) -> None:
     for share in (0.3, 0.6):
-        halted = Halted("of a check")
         after_s = share * bench.seconds
-        raised = bench.told(halted, lambda: bench.device.push(bench.length_mm), after_s)
-        need(raised is halted, f"the push ended with {raised!r}, not with the Halted of its watch")
-        part = halted.part
+        part = _halted(bench, after_s).part
         need(0.0 <= part <= 1.0, f"the part of the motion that was made is {part}")
         bench.device.pull(part * bench.length_mm)
         # From the first call of the watch on, it moved at the speed that was asked for, or slower.
         most = bench.speeds.push_mm_per_s * (bench.told_s - bench.calls[0] + _STOP_S)
-        need(
-            part * bench.length_mm <= most + _SMALL_MM,
-            f"a push that was ended after {after_s:.2f} s has made {part:.2f} of "
-            f"{bench.length_mm:g} mm, which is too much",
-        )
-        need(
-            part >= 0.3 * share,
-            f"a push that was ended after {after_s:.2f} s has made {part:.2f} of "
-            f"{bench.length_mm:g} mm, which is too little",
-        )
+        made = f"{part:.2f} of {bench.length_mm:g} mm, which is too"
+        found = f"a push that was ended after {after_s:.2f} s has made {made}"
+        need(part * bench.length_mm <= most + _SMALL_MM, f"{found} much")
+        need(part >= 0.3 * share, f"{found} little")
 
 
 def _stop_in_motion(bench: _Bench) -> None:

@@ -3,8 +3,8 @@
 Scripts and programs that call ``verifyta`` find here what they rely on. What is known of that comes
 from public clients and logs; ``docs/verifyta.md`` says what is the same and what differs.
 
-``network`` is the model by numbers, ``trace`` a symbolic trace in these numbers. ``compiled``,
-``xtr``, ``trace_xml`` and ``trace_text`` write them as files and text. ``options`` reads the
+``trace`` is the model by numbers, and a symbolic trace in these numbers. ``compiled``, ``xtr``,
+``trace_xml`` and ``trace_text`` write them as files and text. ``options`` reads the
 command line, ``output`` has the lines that are printed, ``places`` the places of mistakes. Nothing
 here prints.
 """

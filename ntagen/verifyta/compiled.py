@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
-from ntagen.verifyta.network import Network
+from ntagen.verifyta.trace import Network, network_of
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
@@ -27,20 +27,12 @@ layout
 """
 
 
-class _Expressions:
-    """The texts of expressions, each with its address."""
-
-    def __init__(self) -> None:
-        self.texts: list[str] = []
-
-    def add(self, text: str, default: str) -> int:
-        """The address of a label, or of what stands for an empty one."""
-        self.texts.append(" ".join(text.split()) or default)
-        return len(self.texts) - 1
+def compiled_text(model: Model) -> str:
+    """The compiled form of a model as one text; lines end with line feeds only."""
+    return "".join(_pieces(network_of(model)))
 
 
-def compiled_form(network: Network) -> Iterator[str]:
-    """The file in pieces; lines end with line feeds only."""
+def _pieces(network: Network) -> Iterator[str]:
     yield _LAYOUT_COLUMNS
     index = 0
     for number, clock in enumerate(network.clocks):
@@ -59,29 +51,29 @@ def compiled_form(network: Network) -> Iterator[str]:
             yield f"{index}:location:{flags}:{location.name}\n"
             index += 1
     yield "\ninstructions\n#address: opcode\n\nprocesses\n#index:initial:name\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    numbered = list(enumerate(zip(network.processes, first_locations, strict=True)))
+    for number, (process, first) in numbered:
         yield f"{number}:{first + process.initial}:{process.name}\n"
-    expressions = _Expressions()
+    texts: list[str] = []
+
+    def address(label: str, default: str) -> int:
+        """That of a label, or of what stands for an empty one."""
+        texts.append(" ".join(label.split()) or default)
+        return len(texts) - 1
+
     yield "\nlocations\n#index:process:invariant\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    for number, (process, first) in numbered:
         for offset, location in enumerate(process.locations):
-            invariant = expressions.add(location.invariant, _ALWAYS)
+            invariant = address(location.invariant, _ALWAYS)
             yield f"{first + offset}:{number}:{invariant}\n"
     yield "\nedges\n#process:source:target:guard:sync:update\n"
-    for number, (process, first) in enumerate(zip(network.processes, first_locations, strict=True)):
+    for number, (process, first) in numbered:
         for edge in process.edges:
-            guard = expressions.add(edge.guard, _ALWAYS)
-            sync = expressions.add(edge.sync, _NO_SYNC)
-            update = expressions.add(edge.update, _ALWAYS)
+            guard = address(edge.guard, _ALWAYS)
+            sync = address(edge.sync, _NO_SYNC)
+            update = address(edge.update, _ALWAYS)
             ends = f"{first + edge.source}:{first + edge.target}"
             yield f"{number}:{ends}:{guard}:{sync}:{update}\n"
     yield "\nexpressions\n#address:reads:writes:text\n"
-    for address, text in enumerate(expressions.texts):
-        yield f"{address}:::{text}\n"
-
-
-def compiled_text(model: Model) -> str:
-    """The compiled form of a model as one text."""
-    from ntagen.verifyta.network import network_of
-
-    return "".join(compiled_form(network_of(model)))
+    for number, text in enumerate(texts):
+        yield f"{number}:::{text}\n"

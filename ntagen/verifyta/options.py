@@ -10,9 +10,10 @@ refused. There is no fourth kind: an unknown option is an error.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Sequence
-from typing import Final, Literal
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, Final, Literal
 
 from ntagen.errors import InputError
 from ntagen.values import dataclass
@@ -30,7 +31,7 @@ class Option:
         value: What its value is called; empty if it has none.
         effect: Whether ntagen honours it.
         help: What it does; for an option that is refused, why.
-        choices: The values that it may have; empty for any.
+        more: Values that it may have besides those in the name of the value.
     """
 
     letter: str
@@ -38,12 +39,17 @@ class Option:
     value: str
     effect: Effect
     help: str
-    choices: tuple[str, ...] = ()
+    more: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """Its long name, or else its short one."""
         return self.long or self.letter
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The values that it may have; empty for any."""
+        return (*(self.value.split("|") if "|" in self.value else ()), *self.more)
 
 
 _LEARNING: Final = "it is for learning, which ntagen does not do"
@@ -63,7 +69,6 @@ OPTIONS: Final = (
         "honoured",
         "Make a trace: 0 some, 1 shortest, 2 fastest. Without -f and -X it is written to standard "
         "error; strategies of control queries are written to standard output.",
-        ("0", "1", "2"),
     ),
     Option("-f", "", "PREFIX", "honoured", "Write the trace of query n to PREFIX-n (.xtr)."),
     Option("-X", "", "PREFIX", "honoured", "Write the trace of query n to PREFIXn.xml."),
@@ -76,7 +81,7 @@ OPTIONS: Final = (
         "honoured",
         "Search breadth first (0), depth first (1) or in random depth-first order (2). 3 and 4 are "
         "taken as 0.",
-        ("0", "1", "2", "3", "4"),
+        ("3", "4"),
     ),
     Option("-r", "--seed", "N", "honoured", "The seed of the random order and of random runs."),
     Option("-s", "--silence-progress", "", "honoured", "Do not mark lines as progress."),
@@ -90,11 +95,9 @@ OPTIONS: Final = (
         "honoured",
         "Write the strategy of each `strategy NAME = control: …` to DIR/NAME.",
     ),
-    Option(
-        "", "--generate-strategy", "0|1|2", "idle", "Strategies are always made.", ("0", "1", "2")
-    ),
+    Option("", "--generate-strategy", "0|1|2", "idle", "Strategies are always made."),
     Option("-n", "--extrapolation", "0..4", "idle", "Answers are exact.", tuple("01234")),
-    Option("-S", "", "0|1|2", "idle", "How many states are stored.", ("0", "1", "2")),
+    Option("-S", "", "0|1|2", "idle", "How many states are stored."),
     Option("-C", "", "", "idle", "Zones as matrices."),
     Option("-b", "", "", "idle", "The search is breadth first."),
     Option("-H", "--hashtable-size", "N", "idle", "The size of a table."),
@@ -110,7 +113,6 @@ OPTIONS: Final = (
         "0|1",
         "idle",
         "Zones as matrices or by their fewest constraints.",
-        ("0", "1"),
     ),
     Option(
         "-A",
@@ -262,19 +264,30 @@ def _take(option: Option, value: str | None, rest: list[str], given: dict[str, s
             raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
         value = rest.pop(0)
     value = value or ""
+    _require(option, value)
+    given[option.name] = value
+
+
+def _require(option: Option, value: str) -> None:
+    """Refuses a value that an option cannot have.
+
+    Raises:
+        InputError: It is one.
+    """
+    wanted = ""
     if option.choices and value not in option.choices:
-        raise InputError(f"{option.name} is {value!r}, but must be {_choices(option)}")
-    if option.value == "N" and not value.lstrip("-").isdigit():
-        raise InputError(f"{option.name} is {value!r}, but must be an integer")
-    if option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
-        raise InputError(f"{option.name} is {value!r}, but must be a positive integer")
-    if option.value in _RANGES:
+        wanted = f"{', '.join(option.choices[:-1])} or {option.choices[-1]}".removeprefix(" or ")
+    elif option.value == "N" and not value.lstrip("-").isdigit():
+        wanted = "an integer"
+    elif option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
+        wanted = "a positive integer"
+    elif option.value in _RANGES:
         low, high, words = _RANGES[option.value]
-        if not low < _number(value) < high:
-            raise InputError(f"{option.name} is {value!r}, but must be a number {words}")
+        wanted = "" if low < _number(value) < high else f"a number {words}"
+    if wanted:
+        raise InputError(f"{option.name} is {value!r}, but must be {wanted}")
     if option.value and not value:
         raise InputError(f"{option.name} needs a value: {option.name} {option.value}")
-    given[option.name] = value
 
 
 def _number(value: str) -> float:
@@ -284,5 +297,44 @@ def _number(value: str) -> float:
         return math.nan
 
 
-def _choices(option: Option) -> str:
-    return f"{', '.join(option.choices[:-1])} or {option.choices[-1]}".removeprefix(" or ")
+_FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
+    "--seed": ("seed", int),
+    "--runs": ("runs", int),
+    "--alpha": ("alpha", float),
+    "--beta": ("beta", float),
+    "--epsilon": ("epsilon", float),
+    "--delta": ("delta", float),
+    "--discretization": ("discretisation", float),
+}
+"""For each option of random runs, the field of `ntagen.checker.Options`, and its type."""
+
+
+def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:
+    """The fields of `ntagen.checker.Options` that a model file says for a query.
+
+    Args:
+        options: The options of the file; what is not for random runs, or has a value without
+            meaning, is left out.
+        given: The fields that the command line says itself.
+    """
+    usable = {}
+    for name in options.keys() & _FIELDS.keys():
+        field, read = _FIELDS[name]
+        with contextlib.suppress(InputError):
+            _require(_BY_LONG[name], options[name].strip())
+            if field not in given and (number := read(options[name])) >= 0:
+                usable[field] = number
+    return usable
+
+
+def statistical(given: Mapping[str, str]) -> dict[str, Any]:
+    """The fields of `ntagen.checker.Options` that these options say.
+
+    Args:
+        given: The values of options by their long names; others than those for random runs count
+            for nothing.
+    """
+    fields = {field: read(given[name]) for name, (field, read) in _FIELDS.items() if name in given}
+    if "--u0" in given or "--u1" in given:
+        fields["odds_ratios"] = float(given.get("--u0", "0.9")), float(given.get("--u1", "1.1"))
+    return fields

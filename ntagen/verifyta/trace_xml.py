@@ -10,8 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Final
 from xml.sax.saxutils import escape, quoteattr
 
-from ntagen.verifyta.network import Edge, Network, Process
-from ntagen.verifyta.trace import Trace, as_assigned
+from ntagen.verifyta.trace import Edge, Network, Process, Trace, as_assigned, numbered
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 _GLOBAL: Final = "sys"
 
 
-def trace_xml(trace: Trace, network: Network) -> Iterator[str]:
+def _trace_xml(network: Network, trace: Trace) -> Iterator[str]:
     """The file in pieces."""
     yield '<?xml version="1.0" encoding="UTF-8"?>\n'
     yield '<trace initial_node="State1" trace_options="symbolic">'
@@ -63,12 +62,8 @@ def trace_xml(trace: Trace, network: Network) -> Iterator[str]:
 
 def trace_xml_text(model: Model, answer: Answer) -> str | None:
     """The first trace of an answer as the text of a file; ``None`` if it has none."""
-    from ntagen.verifyta.network import network_of
-    from ntagen.verifyta.trace import trace_of
-
-    network = network_of(model)
-    trace = trace_of(answer, network)
-    return None if trace is None else "".join(trace_xml(trace, network))
+    found = numbered(model, answer)
+    return None if found is None else "".join(_trace_xml(*found))
 
 
 def _words(words: Iterable[str]) -> str:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ntagen.verifyta.trace import Matrix, Part, State, Trace
+from ntagen.verifyta.trace import Matrix, Part, State, Trace, numbered
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _Bound = tuple[int, bool] | None
 
 
-def xtr(trace: Trace) -> Iterator[str]:
+def _xtr(trace: Trace) -> Iterator[str]:
     """The file in pieces."""
     yield _state(trace.states[0])
     for state, transition in zip(trace.states[1:], trace.transitions, strict=True):
@@ -35,11 +35,8 @@ def xtr(trace: Trace) -> Iterator[str]:
 
 def xtr_text(model: Model, answer: Answer) -> str | None:
     """The first trace of an answer as the text of a file; ``None`` if it has none."""
-    from ntagen.verifyta.network import network_of
-    from ntagen.verifyta.trace import trace_of
-
-    trace = trace_of(answer, network_of(model))
-    return None if trace is None else "".join(xtr(trace))
+    found = numbered(model, answer)
+    return None if found is None else "".join(_xtr(found[1]))
 
 
 def _state(state: State) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from ntagen.serve.limits import Limits
+from ntagen.serve.jobs import Limits
 from ntagen.serve.server import Server
 
 ROOT = Path(__file__).parents[2]

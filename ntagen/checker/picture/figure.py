@@ -12,10 +12,10 @@ import math
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _INCHES_PER_PIXEL: Final = 1.0 / 96.0
@@ -39,7 +39,7 @@ _INHERITED: Final = (
     "font-weight",
     "text-anchor",
 )
-_ALIGNED: Final = {"start": "left", "middle": "center", "end": "right"}
+_ALIGNED: Final[dict[str, Any]] = {"start": "left", "middle": "center", "end": "right"}
 
 
 CHART_STYLE: Final[dict[Any, Any]] = {
@@ -128,7 +128,7 @@ def figure_of(svg: str) -> Figure:
     axes.set_axis_off()
     axes.set_xlim(0.0, width)
     axes.set_ylim(height, 0.0)
-    _Painter(axes).element(root, {}, (0.0, 0.0))
+    _draw(axes, root, {}, (0.0, 0.0))
     return figure
 
 
@@ -136,71 +136,61 @@ _Place = tuple[float, float]
 """By how much a page within another one is moved."""
 
 
-@dataclass(slots=True)
-class _Painter:
-    """Draws one element after the other; later ones cover earlier ones."""
+def _draw(axes: Axes, one: ET.Element, inherited: Mapping[str, str], place: _Place) -> None:
+    """Draws an element and what is in it, above what was drawn before; a tooltip is not seen."""
+    name = one.tag.rpartition("}")[2]
+    style = dict(inherited)
+    style |= {key: one.attrib[key] for key in _INHERITED if key in one.attrib}
+    if name in ("svg", "g"):
+        for child in one:
+            _draw(axes, child, style, _moved(one, place) if name == "svg" else place)
+    elif name == "text":
+        _draw_text(axes, one, style, place)
+    elif name != "title":
+        _draw_shape(axes, name, {**style, **one.attrib}, place)
 
-    axes: Any
-    layer: int = field(default=0)
 
-    def element(self, one: ET.Element, inherited: Mapping[str, str], place: _Place) -> None:
-        """Draws an element and what is in it; a tooltip is not seen."""
-        name = one.tag.rpartition("}")[2]
-        style = dict(inherited)
-        style |= {key: one.attrib[key] for key in _INHERITED if key in one.attrib}
-        if name in ("svg", "g"):
-            for child in one:
-                self.element(child, style, _moved(one, place) if name == "svg" else place)
-        elif name == "text":
-            self._text(one, style, place)
-        elif name != "title":
-            self._shape(name, {**style, **one.attrib}, place)
+def _draw_shape(axes: Axes, name: str, given: Mapping[str, str], place: _Place) -> None:
+    from matplotlib.patches import PathPatch
 
-    def _shape(self, name: str, given: Mapping[str, str], place: _Place) -> None:
-        from matplotlib.patches import PathPatch
+    outline, is_closed = _outline(name, given, place)
+    stroke = given.get("stroke", "none")
+    width = _POINTS_PER_PIXEL * float(given.get("stroke-width", 1.0))
+    patch = PathPatch(
+        outline,
+        facecolor=given.get("fill", "#000000") if is_closed else "none",
+        edgecolor=stroke,
+        linewidth=0.0 if stroke == "none" else width,
+        joinstyle="round" if given.get("stroke-linejoin") == "round" else "miter",
+        capstyle="butt",
+        zorder=1.0,
+    )
+    if dashes := [float(one) for one in given.get("stroke-dasharray", "").split()]:
+        # In units of the line's width.
+        patch.set_linestyle((0.0, [one * _POINTS_PER_PIXEL / width for one in dashes]))
+    axes.add_patch(patch)
 
-        outline, is_closed = _outline(name, given, place)
-        fill = given.get("fill", "#000000") if is_closed else "none"
-        stroke = given.get("stroke", "none")
-        width = _POINTS_PER_PIXEL * float(given.get("stroke-width", 1.0))
-        patch = PathPatch(
-            outline,
-            facecolor=fill,
-            edgecolor=stroke,
-            linewidth=0.0 if stroke == "none" else width,
-            joinstyle="round" if given.get("stroke-linejoin") == "round" else "miter",
-            capstyle="butt",
-            zorder=self._next_layer(),
+
+def _draw_text(axes: Axes, one: ET.Element, style: Mapping[str, str], place: _Place) -> None:
+    from matplotlib.patheffects import withStroke
+
+    size = _FONT_SCALE * _POINTS_PER_PIXEL * float(style.get("font-size", 12.0))
+    for text, left, base in _lines(one):
+        drawn = axes.text(
+            place[0] + left,
+            place[1] + base,
+            text,
+            parse_math=False,
+            color=style.get("fill", "#000000"),
+            fontsize=size,
+            fontweight=style.get("font-weight", "normal"),
+            ha=_ALIGNED[style.get("text-anchor", "start")],
+            va="baseline",
+            zorder=1.0,
         )
-        if dashes := [float(one) for one in given.get("stroke-dasharray", "").split()]:
-            # In units of the line's width.
-            patch.set_linestyle((0.0, [one * _POINTS_PER_PIXEL / width for one in dashes]))
-        self.axes.add_patch(patch)
-
-    def _text(self, one: ET.Element, style: Mapping[str, str], place: _Place) -> None:
-        from matplotlib.patheffects import withStroke
-
-        size = _FONT_SCALE * _POINTS_PER_PIXEL * float(style.get("font-size", 12.0))
-        for text, left, base in _lines(one):
-            drawn = self.axes.text(
-                place[0] + left,
-                place[1] + base,
-                text,
-                parse_math=False,
-                color=style.get("fill", "#000000"),
-                fontsize=size,
-                fontweight=style.get("font-weight", "normal"),
-                ha=_ALIGNED[style.get("text-anchor", "start")],
-                va="baseline",
-                zorder=self._next_layer(),
-            )
-            if style.get("stroke", "none") != "none":
-                width = _POINTS_PER_PIXEL * float(style.get("stroke-width", 1.0))
-                drawn.set_path_effects([withStroke(linewidth=width, foreground=style["stroke"])])
-
-    def _next_layer(self) -> int:
-        self.layer += 1
-        return self.layer
+        if style.get("stroke", "none") != "none":
+            width = _POINTS_PER_PIXEL * float(style.get("stroke-width", 1.0))
+            drawn.set_path_effects([withStroke(linewidth=width, foreground=style["stroke"])])
 
 
 def _moved(page: ET.Element, place: _Place) -> _Place:

@@ -14,7 +14,7 @@ UPPAAL's editor. The layout is deterministic. Cost: linear in edges times the la
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Final, TypeVar
@@ -61,6 +61,12 @@ def labels_of(part: Location | Edge) -> list[tuple[LabelKind, str]]:
     return [(kind, text) for kind, text in texts if text]
 
 
+def _size(labels: Sequence[tuple[LabelKind, str]]) -> tuple[float, int]:
+    """The width and the height of labels below each other."""
+    width = max((text_width(text) for _, text in labels), default=0.0)
+    return width, sum(text_height(text) for _, text in labels)
+
+
 def placed(diagram: Diagram) -> Diagram:
     """The template with a place for every location, branch point and label."""
     if any(node.position is None for node in diagram.nodes):
@@ -93,7 +99,7 @@ def _with_labels(location: Location) -> Location:
         return location
     x, y = location.position
     stack = [entry for entry in labels_of(location) if entry[0] not in location.labels]
-    top = y - sum(text_height(text) for _, text in stack) // 2
+    top = y - _size(stack)[1] // 2
     return _stacked(location, stack, (x + LOCATION_RADIUS + _LABEL_GAP, top))
 
 
@@ -108,8 +114,7 @@ def _with_path(edge: Edge, positions: dict[str, Point]) -> Edge:
     stack = [entry for entry in labels_of(edge) if entry[0] not in edge.labels]
     path = [source, *edge.nails, target]
     (x1, y1), (x2, y2) = max(pairwise(path), key=lambda ends: _squared_length(*ends))
-    height = sum(text_height(text) for _, text in stack)
-    return _stacked(edge, stack, ((x1 + x2) // 2 + 6, (y1 + y2 - height) // 2))
+    return _stacked(edge, stack, ((x1 + x2) // 2 + 6, (y1 + y2 - _size(stack)[1]) // 2))
 
 
 def _squared_length(first: Point, second: Point) -> int:
@@ -207,15 +212,12 @@ def _location_box(diagram: Diagram, index: int, ends: list[tuple[int, int] | Non
     """The room of a location or branch point with its labels and loops."""
     if index >= len(diagram.locations):
         return _Box(BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS, BRANCH_POINT_RADIUS)
-    texts = [text for _, text in labels_of(diagram.locations[index])]
-    right = LOCATION_RADIUS + _LABEL_GAP + max((text_width(text) for text in texts), default=0.0)
-    half = max(LOCATION_RADIUS, sum(text_height(text) for text in texts) / 2)
-    box = _Box(LOCATION_RADIUS, right, half)
+    width, height = _size(labels_of(diagram.locations[index]))
+    right = LOCATION_RADIUS + _LABEL_GAP + width
+    box = _Box(LOCATION_RADIUS, right, max(LOCATION_RADIUS, height / 2))
     for pair, edge in zip(ends, diagram.edges, strict=True):
         if pair == (index, index):
-            loop = [text for _, text in labels_of(edge)]
-            width = max((text_width(text) for text in loop), default=0.0)
-            height = sum(text_height(text) for text in loop)
+            width, height = _size(labels_of(edge))
             box.left += _LOOP_REACH + width + 8
             box.half = max(box.half, height / 2, LOCATION_RADIUS + 8)
     return box
@@ -233,9 +235,7 @@ def _chain(
     layers: dict[int, list[int]],
 ) -> list[int]:
     """Makes the places of an edge in the layers between its ends, from its source to its target."""
-    texts = [text for _, text in labels_of(edge)]
-    width = max((text_width(text) + 8 for text in texts), default=4.0)
-    height = sum(text_height(text) for text in texts)
+    width, height = _size(labels_of(edge))
     upper, lower = sorted(pair, key=lambda node: ranks[node])
     top, bottom = 2 * ranks[upper], 2 * ranks[lower]
     # Labels lie in the layers between those of the locations, as near to the middle as possible.
@@ -243,7 +243,7 @@ def _chain(
     chain = []
     before = upper
     for layer in range(top + 1, bottom):
-        box = _Box(4, width, height / 2) if layer == labelled else _Box(4, 4, 0)
+        box = _Box(4, width + 8 if width else 4, height / 2) if layer == labelled else _Box(4, 4, 0)
         boxes.append(box)
         number = len(boxes) - 1
         layers[layer].append(number)
@@ -341,8 +341,7 @@ def _with_places(diagram: Diagram, boxes: list[_Box], chains: dict[int, list[int
         elif edge.source in index_of and edge.source == edge.target:
             x, y = place(index_of[edge.source])
             edges.append(_looped(edge, (x - loops[edge.source], y)))
-            widths = [text_width(text) for _, text in labels_of(edge)]
-            loops[edge.source] += _LOOP_REACH + round(max(widths, default=0.0)) + 8
+            loops[edge.source] += _LOOP_REACH + round(_size(labels_of(edge))[0]) + 8
         else:
             edges.append(edge)
     count = len(diagram.locations)
@@ -369,8 +368,7 @@ def _routed(edge: Edge, chain: list[int], boxes: list[_Box], *, upwards: bool) -
         nails += [(round(boxes[box].x), round(boxes[box].y + end)) for end in ends]
     stack = labels_of(edge)
     widest = max(chain, key=lambda box: boxes[box].half)
-    height = sum(text_height(text) for _, text in stack)
-    corner = (round(boxes[widest].x) + 6, round(boxes[widest].y) - height // 2)
+    corner = (round(boxes[widest].x) + 6, round(boxes[widest].y) - _size(stack)[1] // 2)
     return _stacked(replace(edge, nails=tuple(nails), labels={}), stack, corner)
 
 
@@ -378,8 +376,7 @@ def _looped(edge: Edge, position: Point) -> Edge:
     """A loop to the left of a place, with its labels beyond it."""
     x, y = position
     stack = labels_of(edge)
-    width = max((text_width(text) for _, text in stack), default=0.0)
-    height = sum(text_height(text) for _, text in stack)
+    width, height = _size(stack)
     nails = ((x - _LOOP_REACH, y - 14), (x - _LOOP_REACH, y + 14))
     corner = (x - _LOOP_REACH - 4 - round(width), y - height // 2)
     return _stacked(replace(edge, nails=nails, labels={}), stack, corner)

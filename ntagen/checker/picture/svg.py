@@ -6,7 +6,6 @@ environment and legs of branch points are dashed. Each kind of label has its own
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -113,7 +112,7 @@ def _arrow(
     edge: Edge, path: Sequence[Point], source_radius: float, target_radius: float, *, dashed: bool
 ) -> Iterator[str]:
     """The line of an edge, cut off at the circles of its ends, and its arrow head."""
-    points = [(float(x), float(y)) for x, y in path]
+    points = [complex(x, y) for x, y in path]
     points[0] = _towards(points[0], points[1], source_radius)
     tip = _towards(points[-1], points[-2], target_radius)
     back = _towards(tip, points[-2], _ARROW_LENGTH)
@@ -121,44 +120,29 @@ def _arrow(
     color = edge.color or _LINE_COLOR
     dash = ' stroke-dasharray="5 3"' if dashed else ""
     yield (f'<path d="{_rounded(points)}" fill="none" stroke="{color}" stroke-width="1.2"{dash}/>')
-    length = math.dist(tip, back) or 1.0
-    across = (
-        (tip[1] - back[1]) / length * _ARROW_HALF_WIDTH,
-        (back[0] - tip[0]) / length * _ARROW_HALF_WIDTH,
-    )
-    head = (
-        tip,
-        (back[0] + across[0], back[1] + across[1]),
-        (back[0] - across[0], back[1] - across[1]),
-    )
-    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in head)
+    across = -1j * (tip - back) / (abs(tip - back) or 1.0) * _ARROW_HALF_WIDTH
+    corners = " ".join(map(_xy, (tip, back + across, back - across)))
     yield f'<polygon points="{corners}" fill="{color}"/>'
 
 
-def _rounded(points: Sequence[tuple[float, float]]) -> str:
+def _rounded(points: Sequence[complex]) -> str:
     """The SVG path through the points, with rounded bends."""
-    first, last = points[0], points[-1]
-    steps = [f"M{first[0]:.1f},{first[1]:.1f}"]
+    steps = [f"M{_xy(points[0])}"]
     for (before, bend), (_, after) in pairwise(pairwise(points)):
-        radius = min(_BEND_RADIUS, math.dist(before, bend) / 2, math.dist(bend, after) / 2)
+        radius = min(_BEND_RADIUS, abs(before - bend) / 2, abs(bend - after) / 2)
         enter, leave = _towards(bend, before, radius), _towards(bend, after, radius)
-        steps.append(
-            f"L{enter[0]:.1f},{enter[1]:.1f} "
-            f"Q{bend[0]:.1f},{bend[1]:.1f} {leave[0]:.1f},{leave[1]:.1f}"
-        )
-    steps.append(f"L{last[0]:.1f},{last[1]:.1f}")
-    return " ".join(steps)
+        steps.append(f"L{_xy(enter)} Q{_xy(bend)} {_xy(leave)}")
+    return " ".join([*steps, f"L{_xy(points[-1])}"])
 
 
-def _towards(
-    start: tuple[float, float], end: tuple[float, float], distance: float
-) -> tuple[float, float]:
-    """The point at a distance from the start on the way to the end."""
-    length = math.dist(start, end)
-    if length == 0.0:
-        return start
-    share = distance / length
-    return start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share
+def _xy(point: complex) -> str:
+    return f"{point.real:.1f},{point.imag:.1f}"
+
+
+def _towards(start: complex, end: complex, distance: float) -> complex:
+    """The point at a distance from the start on the way to the end; points are x + y·i."""
+    length = abs(end - start)
+    return start + (end - start) * (distance / length) if length else start
 
 
 def _branch_point(point: BranchPoint) -> Iterator[str]:
@@ -204,19 +188,12 @@ def _text(corner: Point, text: str, color: str) -> str:
 
 def _bounds(diagram: Diagram) -> tuple[float, float, float, float]:
     """The smallest rectangle around a placed template: left, top, right, bottom."""
-    boxes: list[tuple[float, float, float, float]] = []
     reach = LOCATION_RADIUS + _INITIAL_GAP
-    for x, y in positions_of(diagram).values():
-        boxes.append((x - reach, y - reach, x + reach, y + reach))
-    for edge in diagram.edges:
-        boxes += [(x, y, x, y) for x, y in edge.nails]
+    boxes: list[tuple[float, float, float, float]] = [
+        (x - reach, y - reach, x + reach, y + reach) for x, y in positions_of(diagram).values()
+    ]
+    boxes += [(x, y, x, y) for edge in diagram.edges for x, y in edge.nails]
     for (x, y), _, text in drawn_labels(diagram):
         boxes.append((x, y, x + text_width(text), y + text_height(text)))
-    if not boxes:
-        return 0.0, 0.0, 0.0, 0.0
-    return (
-        min(box[0] for box in boxes),
-        min(box[1] for box in boxes),
-        max(box[2] for box in boxes),
-        max(box[3] for box in boxes),
-    )
+    left, top, right, bottom = zip(*boxes or [(0.0, 0.0, 0.0, 0.0)], strict=True)
+    return min(left), min(top), max(right), max(bottom)

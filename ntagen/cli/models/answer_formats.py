@@ -1,6 +1,6 @@
 """The answers of `ntagen check` for programs: JSON lines, GitHub, JUnit and SARIF.
 
-Each has the methods of `Human` in `answer_rows`. JSON and GitHub print an answer as soon as it is
+JSON and GitHub print an answer as soon as it is
 there; a JUnit or SARIF report is one document at the end.
 """
 
@@ -11,43 +11,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final
 
+from ntagen.cli.models.answer_rows import Format, Human
 from ntagen.cli.models.outcomes import Mistake, Outcome, fault_of, mistakes_in, summary
 from ntagen.cli.terminal import echo, safe
 from ntagen.version import VERSION
 
-if TYPE_CHECKING:
-    from ntagen.checker import Model
 
-FORMATS: Final = ("human", "json", "github", "junit", "sarif")
-"""The formats of answers, by their names on the command line."""
-
-
-class Format(Protocol):
-    """How answers are printed."""
-
-    def loaded(self, path: Path, model: Model) -> None:
-        """The model is accepted."""
-
-    def refused(self, path: Path, rejection: str) -> None:
-        """The model, or the list of queries, is rejected; this is the end."""
-
-    def one(self, outcome: Outcome) -> None:
-        """A query is answered or refused."""
-
-    def end(self, outcomes: Sequence[Outcome]) -> None:
-        """All queries are answered."""
-
-
-class JsonLines:
+class JsonLines(Format):
     """A JSON object for each query, on one line."""
-
-    def loaded(self, path: Path, model: Model) -> None:
-        """Prints nothing."""
-
-    def refused(self, path: Path, rejection: str) -> None:
-        """Prints nothing: there is no query to say it of."""
 
     def one(self, outcome: Outcome) -> None:
         """Prints the line of a query."""
@@ -57,9 +30,6 @@ class JsonLines:
         for piece in _line(outcome):
             echo(piece, nl=False)
         echo()
-
-    def end(self, outcomes: Sequence[Outcome]) -> None:
-        """Prints nothing."""
 
 
 def _line(outcome: Outcome) -> list[str]:
@@ -113,27 +83,23 @@ def _record(outcome: Outcome) -> dict[str, object]:
     return record
 
 
-class GitHub:
+class GitHub(Format):
     """Annotations of GitHub Actions for what is wrong, and all queries on one line."""
 
-    def loaded(self, path: Path, model: Model) -> None:
-        """Remembers the file."""
-        self._path = str(path)
-
-    def refused(self, path: Path, rejection: str) -> None:
+    def refused(self, rejection: str) -> None:
         """Prints an annotation for each mistake of the model."""
-        for mistake in _mistakes(str(path), rejection):
+        for mistake in _mistakes(self.path, rejection):
             self._annotate(mistake, "The model is rejected", "\n".join(mistake.lines))
 
     def one(self, outcome: Outcome) -> None:
         """Prints an annotation if the run fails because of the query."""
         if outcome.is_fault:
             title = outcome.query.name or outcome.query.text
-            self._annotate(_fault(outcome, self._path), title, _explained(outcome))
+            self._annotate(_fault(outcome, self.path), title, _explained(outcome))
 
     def end(self, outcomes: Sequence[Outcome]) -> None:
         """Prints all queries on one line."""
-        echo(f"{self._path}: {summary(outcomes)}")
+        echo(f"{self.path}: {summary(outcomes)}")
 
     def _annotate(self, at: Mistake, title: str, text: str) -> None:
         fields = {"file": at.path, "line": at.line, "col": at.column, "title": title}
@@ -141,21 +107,14 @@ class GitHub:
         echo(f"::{at.severity} {shown}::{_data(text)}")
 
 
-class JUnit:
+class JUnit(Format):
     """A JUnit report: a test case for each query."""
 
-    def loaded(self, path: Path, model: Model) -> None:
-        """Remembers the file."""
-        self._path = str(path)
-
-    def refused(self, path: Path, rejection: str) -> None:
+    def refused(self, rejection: str) -> None:
         """Prints a report with one test case: the model itself."""
         first = rejection.partition("\n")[0]
-        case = _case(str(path), "model", f"<error message={_attribute(first)}>", rejection, "error")
-        self._print(str(path), [case], errors=1, failures=0, seconds=0.0)
-
-    def one(self, outcome: Outcome) -> None:
-        """Prints nothing yet."""
+        case = _case(self.path, "model", f"<error message={_attribute(first)}>", rejection, "error")
+        self._print([case], errors=1, failures=0, seconds=0.0)
 
     def end(self, outcomes: Sequence[Outcome]) -> None:
         """Prints the report."""
@@ -166,18 +125,15 @@ class JUnit:
             if kind is not None:
                 tag = f"<{kind} message={_attribute(fault_of(outcome))}>"
             name = f"{query.name}: {query.text}" if query.name else query.text
-            cases.append(_case(self._path, name, tag, _explained(outcome), kind, _seconds(outcome)))
+            cases.append(_case(self.path, name, tag, _explained(outcome), kind, _seconds(outcome)))
         self._print(
-            self._path,
             cases,
             errors=kinds.count("error"),
             failures=kinds.count("failure"),
             seconds=sum(map(_seconds, outcomes)),
         )
 
-    def _print(
-        self, path: str, cases: list[str], *, errors: int, failures: int, seconds: float
-    ) -> None:
+    def _print(self, cases: list[str], *, errors: int, failures: int, seconds: float) -> None:
         counts = (
             f'tests="{len(cases)}" failures="{failures}" errors="{errors}" time="{seconds:.3f}"'
         )
@@ -185,7 +141,8 @@ class JUnit:
         echo(
             '<?xml version="1.0" encoding="utf-8"?>\n'
             f'<testsuites name="ntagen" {counts}>\n'
-            f"<testsuite name={_attribute(path)} {counts}>\n{body}\n</testsuite>\n</testsuites>"
+            f"<testsuite name={_attribute(self.path)} {counts}>\n"
+            f"{body}\n</testsuite>\n</testsuites>"
         )
 
 
@@ -207,24 +164,17 @@ def _case(path: str, name: str, tag: str, text: str, kind: str | None, seconds: 
     return f"{start}>{tag}{escape(safe(text))}</{kind}></testcase>" if kind else f"{start}/>"
 
 
-class Sarif:
+class Sarif(Format):
     """A SARIF 2.1.0 report: a result for each thing that is wrong."""
 
-    def loaded(self, path: Path, model: Model) -> None:
-        """Remembers the file."""
-        self._path = str(path)
-
-    def refused(self, path: Path, rejection: str) -> None:
+    def refused(self, rejection: str) -> None:
         """Prints a report with the mistakes of the model."""
-        self._print([_result(one, "\n".join(one.lines)) for one in _mistakes(str(path), rejection)])
-
-    def one(self, outcome: Outcome) -> None:
-        """Prints nothing yet."""
+        self._print([_result(one, "\n".join(one.lines)) for one in _mistakes(self.path, rejection)])
 
     def end(self, outcomes: Sequence[Outcome]) -> None:
         """Prints the report."""
         faults = [one for one in outcomes if one.is_fault]
-        self._print([_result(_fault(one, self._path), _explained(one)) for one in faults])
+        self._print([_result(_fault(one, self.path), _explained(one)) for one in faults])
 
     def _print(self, results: list[dict[str, Any]]) -> None:
         tool = {
@@ -303,3 +253,13 @@ def _data(text: str) -> str:
 
 def _field(text: str) -> str:
     return re.sub("[:,]", lambda sign: f"%{ord(sign[0]):02X}", _data(text))
+
+
+FORMATS: Final[dict[str, type[Format]]] = {
+    "human": Human,
+    "json": JsonLines,
+    "github": GitHub,
+    "junit": JUnit,
+    "sarif": Sarif,
+}
+"""The formats of answers, by their names on the command line."""

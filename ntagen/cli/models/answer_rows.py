@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.loading import pointer_to_page
 from ntagen.cli.models.outcomes import Outcome, summary
-from ntagen.cli.models.run_rows import distribution_line
 from ntagen.cli.terminal import Styled, echo, echo_message
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Estimate, Model
+    from ntagen.checker import Answer, Distribution, Estimate, Model
 
 _MARK: Final = {
     "satisfied": ("yes", "green"),
@@ -28,18 +28,37 @@ REMARKS_SHOWN: Final = 4
 """So many lines of a query's comment are shown."""
 
 
-class Human:
+class Format:
+    """How answers are printed; this one prints nothing.
+
+    Args:
+        path: The model.
+        trace_is_written: Whether traces are written anyway.
+    """
+
+    def __init__(self, path: Path, *, trace_is_written: bool) -> None:
+        self.path = str(path)
+        self.trace_is_written = trace_is_written
+
+    def loaded(self, model: Model) -> None:
+        """The model is accepted."""
+
+    def refused(self, rejection: str) -> None:
+        """The model, or the list of queries, is rejected; it is printed as any other error, too."""
+
+    def one(self, outcome: Outcome) -> None:
+        """A query is answered or refused."""
+
+    def end(self, outcomes: Sequence[Outcome]) -> None:
+        """All queries are answered."""
+
+
+class Human(Format):
     """Prints each answer as soon as it is there."""
 
-    def __init__(self, *, trace_is_written: bool) -> None:
-        self._trace_is_written = trace_is_written
-
-    def loaded(self, path: Path, model: Model) -> None:
+    def loaded(self, model: Model) -> None:
         """Prints which model is asked."""
-        echo(f"{path}: loaded in {1000 * model.load_seconds:.1f} ms")
-
-    def refused(self, path: Path, rejection: str) -> None:
-        """Prints nothing: the rejection of the model is printed as any other error."""
+        echo(f"{self.path}: loaded in {1000 * model.load_seconds:.1f} ms")
 
     def one(self, outcome: Outcome) -> None:
         """Prints the row of a query."""
@@ -87,7 +106,7 @@ class Human:
         if answer.wrapped is not None and answer.verdict != "error":
             where = f"first at {answer.wrapped}"
             lines.append(f"a result does not fit into 32 bits and wraps round, {where}")
-        return lines if self._trace_is_written else [*lines, *_way_to_failure(answer)]
+        return lines if self.trace_is_written else [*lines, *_way_to_failure(answer)]
 
 
 _USUAL_METHODS: Final = ("Clopper-Pearson", "Student (asymptotic)")
@@ -106,7 +125,7 @@ def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
     stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
     values = answer.distribution
-    if values is not None and (shown := distribution_line(values)) is not None:
+    if values is not None and (shown := _distribution_line(values)) is not None:
         lines.append(shown)
     return [*lines, answer.message] if answer.message else lines
 
@@ -117,6 +136,51 @@ def _made(answer: Answer) -> list[str]:
     facts = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     facts += [f"{count:,} run" + ("s" if count != 1 else ""), f"{1000 * answer.seconds:.1f} ms"]
     return [", ".join(facts), *([answer.message] if answer.message else [])]
+
+
+_HEIGHTS: Final = "▁▂▃▄▅▆▇█"
+_MOST_BARS: Final = 30
+
+
+def _distribution_line(found: Distribution) -> str | None:
+    """When runs reach what is asked, or what they are worth; ``None`` if none of them has a value.
+
+    For example ``reached at 1.83 to 9.97, mean 6.41 ▁▁▂▃▅▆█▇▆▅▃``.
+    """
+    if found.min is None or found.max is None or found.mean is None:
+        return None
+    if found.of == "value":
+        said = "values"
+    else:
+        verb = "broken" if found.broken else "reached"
+        said = f"{verb} after" if found.of == "moves" else f"{verb} at"
+        said += f" {found.label.removeprefix('value of the clock ')} =" * (found.of == "clock")
+    unit = " moves" if found.of == "moves" else ""
+    if found.min == found.max:
+        return f"{said} {found.min:.6g}{unit} in {found.count:,} of {found.runs:,} runs"
+    line = f"{said} {found.min:.6g} to {found.max:.6g}{unit}, mean {found.mean:.6g}"
+    shown = bars(found.to_json()["histogram"]["counts"])
+    return f"{line}  {shown}" if _is_printable(shown) else line
+
+
+def bars(counts: list[int]) -> str:
+    """Counts as bars of different heights; many neighbours become one bar."""
+    together = -(-len(counts) // _MOST_BARS)
+    sums = [sum(counts[i : i + together]) for i in range(0, len(counts), together)]
+    # The last bar may stand for fewer buckets than the others.
+    sums[-1] = sums[-1] * together // (len(counts) - (len(sums) - 1) * together)
+    most = max(sums)
+    heights = [-(-one * len(_HEIGHTS) // most) for one in sums]
+    return "".join(_HEIGHTS[one - 1] if one else " " for one in heights).rstrip()
+
+
+def _is_printable(text: str) -> bool:
+    """Whether standard output has these characters."""
+    try:
+        text.encode(sys.stdout.encoding or "ascii")
+    except (LookupError, UnicodeEncodeError):
+        return False
+    return True
 
 
 def _interval(estimate: Estimate) -> str:

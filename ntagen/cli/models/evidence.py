@@ -1,25 +1,93 @@
-"""Writes the evidence for an answer: traces, certificates, strategies and plans."""
+"""How the queries of a model are asked, and where the evidence for answers is written.
+
+Evidence is a trace, a certificate, a strategy or a list of plans.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import field, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ntagen.cli.guard import doing
 from ntagen.cli.models.outcomes import Outcome
-from ntagen.cli.models.outputs import Outputs
+from ntagen.cli.models.plan_lists import LINES, ListLimits, Written, write_document, write_lines
 from ntagen.cli.models.queries import Asked
 from ntagen.cli.signals import LimitReached
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
+from ntagen.values import dataclass
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from ntagen.checker import Answer, Model, Options
 
-    from ntagen.checker import Answer, Model
-    from ntagen.cli.models.questions import Questions
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Where evidence is written; ``None`` is nowhere."""
+
+    trace: str | None
+    certificate: Path | None
+    strategy: str | None
+    plans: str | None
+    ranking: tuple[str, ...]
+    limits: ListLimits = field(default_factory=ListLimits)
+    written: set[str] = field(default_factory=set)
+    """The options whose output has been written."""
+    stops: dict[str, str] = field(default_factory=dict)
+    """By query: ``time`` or ``memory`` if that limit ended a list of plans."""
+
+    def missing(self) -> list[str]:
+        """The options whose output was asked for and has not been written."""
+        wanted = self.wanted().items()
+        return [name for name, target in wanted if target and name not in self.written]
+
+    def wanted(self) -> dict[str, str | Path | None]:
+        """Where the output of each option is written."""
+        return {
+            "--trace": self.trace,
+            "--certificate": self.certificate,
+            "--strategy": self.strategy,
+            "--plans": self.plans,
+        }
+
+
+class Questions:
+    """How the queries of a model are asked; about a task's model more can be said.
+
+    Args:
+        model: The model.
+    """
+
+    ranks_plans = False
+    """Whether lists of plans are ranked, and certified."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+
+    def options(self, query: Asked, options: Options) -> dict[str, Any]:
+        """Options that a query needs besides those that are given."""
+        return {}
+
+    def answer(self, query: Asked, options: Options) -> Answer:
+        """The answer to a query.
+
+        Raises:
+            InputError: The query is wrong.
+        """
+        return self.model.answer(query.text, options)
+
+    def write_plans(self, answer: Answer, target: str, outputs: Outputs) -> Written:
+        """Writes the plans of an answer."""
+        if Path(target).suffix == LINES:
+            return write_lines(answer, Path(target), outputs.limits)
+        return write_document(answer, target, outputs.limits)
+
+    def completed(self, outcome: Outcome, outputs: Outputs) -> Outcome:
+        """An outcome whose evidence is written, with what else is to be said of it."""
+        return outcome
 
 
 def backed(outcome: Outcome, outputs: Outputs, questions: Questions, *, verify: bool) -> Outcome:

@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from ntagen.cli.models.options import OPTIONS, STATISTICAL
+from ntagen.cli.models.options import OPTIONS, SETTINGS, STATISTICAL
 
 if TYPE_CHECKING:
     from ntagen.checker import QueryForm
-
-_SYMBOLIC_ONLY: Final = {
-    "search": "--search has no effect here: games are explored in an order of their own",
-    "wanted_trace": "--set 'trace …' has no effect here: it chooses among the runs of symbolic "
-    "queries",
-}
-"""For each parameter, the note if all queries are games."""
-
-_GAMES_ONLY: Final = {
-    "guide": "--set 'guide …' has no effect here: it guides games, and no query is a game",
-    "forced": "--forced has no effect here: it is a rule of games, and no query is a game",
-    "priorities": "--set 'priorities …' has no effect here: only games and queries under a "
-    "strategy may ignore priorities; in other queries they always count",
-}
-"""For each parameter, the note if no query is a game or under a strategy."""
 
 _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
@@ -54,58 +39,65 @@ def idle_options(
     """
     if not queries:
         return []
-    notes = []
-    if all(query.kind in ("control", "control_t*") for query in queries):
-        notes += [note for name, note in _SYMBOLIC_ONLY.items() if name in given]
-    elif "wanted_trace" in given and not (values["trace"] or values["verify"]):
-        notes.append("--set 'trace …' has no effect without --trace")
-    if not any(query.is_game or query.uses for query in queries):
-        notes += [note for name, note in _GAMES_ONLY.items() if name in given]
-    if "threads" in given and not any(_takes_threads(query, values) for query in queries):
-        notes.append(
-            "--threads has no effect here: games under partial observation use one thread, and so "
-            "do E[], A<> and -->, and searches that are not breadth first"
-        )
+    notes: list[str] = []
+
+    def idle(name: str, is_idle: bool, why: str) -> None:
+        if is_idle and name in given:
+            notes.append(f"{_spelled(name)} has no effect {why}")
+
+    is_symbolic = not all(query.kind in ("control", "control_t*") for query in queries)
+    has_rules = any(query.is_game or query.uses for query in queries)
     keeps_values = any(values[name] for name in ("strategy", "plans", "verify"))
-    if "reductions" in given and keeps_values and all(query.is_game for query in queries):
-        notes.append(
-            "--reductions has no effect here: of the reductions games make live-variables only, "
-            "and strategies and plans are about states with all their values"
-        )
-    notes += _of_statistics(given, values, queries)
-    if "allow_write" in given and not any(query.kind == "saveStrategy" for query in queries):
-        notes.append("--allow-write has no effect here: no query saves a strategy")
-    for name in ("max_plans", "ranking"):
-        if name in given and not values["plans"]:
-            notes.append(f"{_spelled(name)} has no effect without --plans")
-    if "ranking" in given and values["plans"] and not ranks:
-        notes.append("--set 'ranking …' has no effect here: only plans of environments are ranked")
+    idle("search", not is_symbolic, "here: games are explored in an order of their own")
+    idle("wanted_trace", not is_symbolic, "here: it chooses among the runs of symbolic queries")
+    has_trace = values["trace"] or values["verify"]
+    idle("wanted_trace", is_symbolic and not has_trace, "without --trace")
+    idle("guide", not has_rules, "here: it guides games, and no query is a game")
+    idle("forced", not has_rules, "here: it is a rule of games, and no query is a game")
+    idle(
+        "priorities",
+        not has_rules,
+        "here: only games and queries under a strategy may ignore priorities; in other queries "
+        "they always count",
+    )
+    idle(
+        "threads",
+        not any(_takes_threads(query, values) for query in queries),
+        "here: games under partial observation use one thread, and so do E[], A<> and -->, and "
+        "searches that are not breadth first",
+    )
+    idle(
+        "reductions",
+        keeps_values and all(query.is_game for query in queries),
+        "here: of the reductions games make live-variables only, and strategies and plans are "
+        "about states with all their values",
+    )
+    _find_idle_statistics(idle, given, values, queries)
+    saves = any(query.kind == "saveStrategy" for query in queries)
+    idle("allow_write", not saves, "here: no query saves a strategy")
+    idle("max_plans", not values["plans"], "without --plans")
+    idle("ranking", not values["plans"], "without --plans")
+    is_ranked = ranks or not values["plans"]
+    idle("ranking", not is_ranked, "here: only plans of environments are ranked")
     return notes
 
 
-def _of_statistics(
-    given: Collection[str], values: Mapping[str, object], queries: Sequence[QueryForm]
-) -> list[str]:
-    """A note for each option of statistical queries, if no query takes it."""
-    if any(query.is_statistical for query in queries):
-        notes = [
-            f"{_spelled(name)} has no effect without --set 'levels …'"
-            for name in ("effort", "repetitions")
-            if name in given and "levels" not in given
-        ]
-    else:
-        notes = [
-            f"{_spelled(name)} has no effect here: no query is a statistical one"
-            for name in STATISTICAL
-            if name in given
-        ]
-        if "seed" in given and values["search"] != "random":
-            notes.append("--seed has no effect without --search random or a statistical query")
-    if "under_choice" in given and not any(one.is_statistical and one.uses for one in queries):
-        notes.append(
-            "--set 'under choice …' has no effect here: no statistical query is under a strategy"
-        )
-    return notes
+def _find_idle_statistics(
+    idle: Callable[[str, bool, str], None],
+    given: Collection[str],
+    values: Mapping[str, object],
+    queries: Sequence[QueryForm],
+) -> None:
+    """Tells the options of statistical queries that no query takes."""
+    has_runs = any(query.is_statistical for query in queries)
+    for name in ("effort", "repetitions"):
+        idle(name, has_runs and "levels" not in given, "without --set 'levels …'")
+    for name in STATISTICAL:
+        idle(name, not has_runs, "here: no query is a statistical one")
+    is_fixed = not has_runs and values["search"] != "random"
+    idle("seed", is_fixed, "without --search random or a statistical query")
+    is_under = any(one.is_statistical and one.uses for one in queries)
+    idle("under_choice", not is_under, "here: no statistical query is under a strategy")
 
 
 def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
@@ -119,7 +111,9 @@ def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
 
 def _spelled(name: str) -> str:
     """An option or a setting of this name, as it stands on the command line."""
-    return f"--{name}" if name in OPTIONS else f"--set '{name.replace('_', ' ')} …'"
+    if name in OPTIONS:
+        return f"--{name.replace('_', '-')}"
+    return f"--set '{next(one.words for one in SETTINGS if one.field == name)} …'"
 
 
 def unwritten(wanted: Mapping[str, str | Path | None], written: Collection[str]) -> list[str]:

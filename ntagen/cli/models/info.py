@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
-from ntagen.cli.limits import bounded
-from ntagen.cli.loading import include_option, load_model, pointing_to_explanations
-from ntagen.cli.terminal import echo, safe, table_console
+from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.options import bounded, include_option, path_argument
+from ntagen.cli.terminal import echo, print_table
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from ntagen.checker import Model
     from ntagen.checker.facts import Channel, Clock, Process, Template, Variable
-    from ntagen.drive.configure import Configuration
-    from ntagen.nsl import Task
+
+    _Part = TypeVar("_Part", bound=Process | Clock | Channel)
 
 ROWS_SHOWN: Final = 40
 """A table shows at most this many rows; the JSON object has all."""
@@ -35,7 +33,7 @@ ROWS_SHOWN: Final = 40
     former={"--svg": "`ntagen plot MODEL --as templates` draws them"},
     epilog="Exit codes: 0 done, 2 the input is wrong, 3 stopped by a limit.",
 )
-@click.argument("path", metavar="MODEL", type=click.Path(path_type=Path))
+@path_argument("path", metavar="MODEL")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
 @include_option()
 @bounded
@@ -79,75 +77,30 @@ def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
     """  # noqa: D301  click wants the control character
     with pointing_to_explanations(not as_json), doing("loading the model"):
         loaded = load_model(path, include)
-    model, configuration = loaded.model, None
-    if loaded.task is not None:
-        from ntagen.drive.configure import configure
-
-        configuration = configure(loaded.task.given, loaded.task.scene)
+    model, task = loaded.model, loaded.task
     if as_json:
         with doing("describing the model"):
             text = model.facts_json()
-        if loaded.task is not None and configuration is not None:
-            from ntagen.cli.needle.precision import precision_facts
-            from ntagen.cli.needle.region_rows import region_facts
+        if task is not None:
+            from ntagen.cli.needle.task_facts import task_facts
 
-            more = {
-                **precision_facts(loaded.task.scene),
-                "spins": list(loaded.task.scene.limits.spins),
-                "settings": _settings(configuration),
-                "regions": region_facts(loaded.task.scene),
-            }
-            text = json.dumps(json.loads(text) | more)
+            text = json.dumps(json.loads(text) | task_facts(task))
         echo(text)
         return
     _show(path, model)
-    if loaded.task is not None and configuration is not None:
-        _show_task(loaded.task, configuration)
+    if task is not None:
+        from ntagen.cli.needle.steering import show_settings
+        from ntagen.cli.needle.task_facts import task_lines
+        from ntagen.drive.configure import configure
 
-
-def _settings(configuration: Configuration) -> dict[str, dict[str, object]]:
-    """The settings for JSON, by their words: value in the unit of the log, and origin."""
-    from ntagen.parameters import PARAMETERS
-
-    return {
-        parameter.words: {
-            "field": parameter.field,
-            "value": configuration.value(parameter),
-            "shown": parameter.shown(configuration.value(parameter)),
-            "origin": configuration.origin(parameter),
-        }
-        for parameter in PARAMETERS
-    }
-
-
-def _show_task(task: Task, configuration: Configuration) -> None:
-    """Prints regions, devices and settings of an environment."""
-    from ntagen.cli.needle.precision import precision_line, spins_line
-    from ntagen.cli.needle.region_rows import region_rows
-    from ntagen.cli.needle.steering import show_settings
-
-    kinds = [region.kind for region in task.scene.regions]
-    counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
-    echo(f"\nregions: {', '.join(counts)}")
-    for row in region_rows(task.scene, ROWS_SHOWN):
-        echo(f"  {row}")
-    echo(precision_line(task.scene))
-    if (spins := spins_line(task.scene)) is not None:
-        echo(spins)
-    for device in (task.device, task.tracker):
-        if device is not None:
-            echo(str(device))
-    echo("settings of ntagen drive, and where they come from:")
-    show_settings(configuration)
+        for line in task_lines(task, ROWS_SHOWN):
+            echo(line)
+        echo("settings of ntagen drive, and where they come from:")
+        show_settings(configure(task.given, task.scene))
 
 
 def _show(path: Path, model: Model) -> None:
-    console = table_console()
-
-    def say(line: str) -> None:
-        console.print(safe(line), soft_wrap=True)
-
-    say(
+    echo(
         f"{path}: {_count(len(model.processes), 'process', 'processes')} of "
         f"{_count(len(model.templates), 'template')}, "
         f"{_count(len(model.variables), 'variable')}, {_count(len(model.clocks), 'clock')}, "
@@ -157,55 +110,44 @@ def _show(path: Path, model: Model) -> None:
     words.append(f"{model.state.variable_words} for variables")
     if model.state.meta_words:
         words.append(f"{model.state.meta_words} for meta variables")
-    say(
+    echo(
         f"state: {_count(model.state_words, 'word')} of 32 bits ({', '.join(words)}), "
         f"and a zone of {_count(len(model.clocks), 'clock')}"
     )
     features = ", ".join(feature.replace("-", " ") for feature in model.features)
-    say(f"features: {features or 'plain timed automata'}")
+    echo(f"features: {features or 'plain timed automata'}")
     for one in model.scalar_sets:
         if one.reduced:
             reduction = "symmetry reduction exchanges its members"
         else:
             where = "" if one.place is None else f", at {one.place}: {one.at}"
             reduction = f"no symmetry reduction: {one.obstacle}{where}"
-        say(f"scalar set of {_count(one.size, 'member')}: {reduction}")
-    for table in _tables(model):
-        console.print()
-        console.print(table)
+        echo(f"scalar set of {_count(one.size, 'member')}: {reduction}")
+    _show_table(_template_rows(model.templates), "template", "locations", "edges", "features")
+    _show_table(_families(model.processes, _process_cells), "process", "template", "priority")
+    _show_table(_variable_rows(model.variables), "variable", "type", "words")
+    _show_table(_families(model.clocks, _clock_cells), "clock", "kind")
+    _show_table(_families(model.channels, _channel_cells), "channel", "kind", "priority")
+    _show_table(([query.text, query.comment] for query in model.queries), "query", "comment")
 
 
-def _tables(model: Model) -> list[Table]:
-    """The tables that have rows."""
-    tables = [
-        _table("template", _template_rows(model.templates), "locations", "edges", "features"),
-        _table("process", _process_rows(model.processes), "template", "priority"),
-        _table("variable", _variable_rows(model.variables), "type", "words"),
-        _table("clock", _clock_rows(model.clocks), "kind"),
-        _table("channel", _channel_rows(model.channels), "kind", "priority"),
-        _table("query", [[query.text, query.comment] for query in model.queries], "comment"),
-    ]
-    return [table for table in tables if table.row_count]
-
-
-def _table(first: str, rows: Iterable[Sequence[str]], *columns: str) -> Table:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
+def _show_table(rows: Iterable[Sequence[str]], *headings: str) -> None:
+    """Prints a table after a blank line; without rows it prints nothing."""
     shown = list(rows)
-    headings = [first, *columns]
-    # Columns without any entry are left out.
-    used = [i for i in range(len(headings)) if i == 0 or any(row[i] for row in shown)]
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-    for i in used:
-        is_number = headings[i] in {"locations", "edges", "words", "priority"}
-        table.add_column(headings[i], justify="right" if is_number else "left", overflow="fold")
-    for row in shown[:ROWS_SHOWN]:
-        table.add_row(*(Text(safe(row[i])) for i in used))
+    if not shown:
+        return
+    # Columns that say nothing are left out.
+    used = [
+        i
+        for i, heading in enumerate(headings)
+        if any(row[i] and (heading, row[i]) != ("priority", "0") for row in shown)
+    ]
+    cells = [[row[i] for i in used] for row in shown[:ROWS_SHOWN]]
     if len(shown) > ROWS_SHOWN:
-        table.add_row(Text(f"… {len(shown) - ROWS_SHOWN} more (all of them: --json)"))
-    return table
+        cells.append([f"… {len(shown) - ROWS_SHOWN} more (all of them: --json)"])
+    echo()
+    numbers = ("locations", "edges", "words", "priority")
+    print_table([headings[i] for i in used], cells, numbers)
 
 
 def _template_rows(templates: Sequence[Template]) -> Iterable[list[str]]:
@@ -222,15 +164,27 @@ def _template_rows(templates: Sequence[Template]) -> Iterable[list[str]]:
         yield [heading if template.parameters else template.name, *numbers, ", ".join(notes)]
 
 
-def _process_rows(processes: Sequence[Process]) -> Iterable[list[str]]:
-    has_priorities = any(process.priority for process in processes)
+def _families(parts: Iterable[_Part], cells: Callable[[_Part], list[str]]) -> Iterable[list[str]]:
+    """A row for neighbours that differ only in the indexes of their names."""
 
-    def kind(process: Process) -> tuple[str, str, int]:
-        return _family(process.name), process.template, process.priority
+    def kind(part: _Part) -> tuple[str, list[str]]:
+        return _family(part.name), cells(part)
 
-    for (_, template, priority), group in groupby(processes, kind):
-        names = [process.name for process in group]
-        yield [_joined(names), template, str(priority) if has_priorities else ""]
+    for (_, found), group in groupby(parts, kind):
+        yield [_joined([one.name for one in group]), *found]
+
+
+def _process_cells(process: Process) -> list[str]:
+    return [process.template, str(process.priority)]
+
+
+def _clock_cells(clock: Clock) -> list[str]:
+    return ["hybrid: left out" if clock.hybrid else ""]
+
+
+def _channel_cells(channel: Channel) -> list[str]:
+    words = ["urgent"] * channel.urgent + ["broadcast" if channel.broadcast else "binary"]
+    return [" ".join(words), str(channel.priority)]
 
 
 def _variable_rows(variables: Sequence[Variable]) -> Iterable[list[str]]:
@@ -245,24 +199,6 @@ def _type(variable: Variable) -> str:
     meta = "meta " if variable.meta else ""
     kind = variable.type.replace("int[-2147483648,2147483647]", "int32_t")
     return f"{meta}{kind}{' array ' if sizes else ''}{sizes}"
-
-
-def _clock_rows(clocks: Sequence[Clock]) -> Iterable[list[str]]:
-    for (_, hybrid), group in groupby(clocks, lambda one: (_family(one.name), one.hybrid)):
-        names = [clock.name for clock in group]
-        yield [_joined(names), "hybrid: left out" if hybrid else ""]
-
-
-def _channel_rows(channels: Sequence[Channel]) -> Iterable[list[str]]:
-    has_priorities = any(channel.priority for channel in channels)
-
-    def kind(channel: Channel) -> tuple[str, str, int]:
-        words = ["urgent"] * channel.urgent + ["broadcast" if channel.broadcast else "binary"]
-        return _family(channel.name), " ".join(words), channel.priority
-
-    for (_, words, priority), group in groupby(channels, kind):
-        names = [channel.name for channel in group]
-        yield [_joined(names), words, str(priority) if has_priorities else ""]
 
 
 def _family(name: str) -> str:

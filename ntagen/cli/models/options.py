@@ -4,79 +4,57 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 from typing import Final
 
 import click
 
-from ntagen.cli.limits import LIMITS
-from ntagen.cli.option_groups import gathered
-from ntagen.cli.quantities import Number, Pair
-from ntagen.cli.rules import Decorator, forced_rule
+from ntagen.cli.options import LIMITS, Decorator, forced_rule, gathered, path_option
+from ntagen.cli.quantities import number, pair
 from ntagen.cli.settings import Setting
 
+_MOST_THREADS: Final = 2048
 
-class _Threads(click.ParamType[int]):
+
+def _threads(value: object) -> int:
     """A number of threads; ``all`` is 0, one for each core."""
-
-    name = "threads"
-    most = 2048
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> int:
-        text = str(value).strip().lower()
-        if text == "all":
-            return 0
-        if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) > self.most:
-            self.fail(
-                f"{value!r} is not a number of threads; write 1 to {self.most}, or all", param, ctx
-            )
-        return int(text)
+    text = str(value).strip().lower()
+    if text == "all":
+        return 0
+    if not re.fullmatch(r"[0-9]{1,6}", text) or int(text) > _MOST_THREADS:
+        raise click.BadParameter(
+            f"{value!r} is not a number of threads; write 1 to {_MOST_THREADS}, or all"
+        )
+    return int(text)
 
 
-class _Heuristics(click.ParamType[tuple[str, ...]]):
+def _heuristics(value: object) -> tuple[str, ...]:
     """Names of heuristics, separated by commas."""
+    from ntagen.checker import HEURISTICS
 
-    name = "heuristics"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        from ntagen import checker
-
-        names = tuple(name.strip() for name in str(value).split(",") if name.strip())
-        for name in names:
-            if name not in checker.HEURISTICS:
-                known = "".join(f"\n  {one}: {does}" for one, does in checker.HEURISTICS.items())
-                self.fail(f"{name!r} is not a heuristic. The heuristics are:{known}", param, ctx)
-        return names
+    names = tuple(name.strip() for name in str(value).split(",") if name.strip())
+    for name in names:
+        if name not in HEURISTICS:
+            known = "".join(f"\n  {one}: {does}" for one, does in HEURISTICS.items())
+            raise click.BadParameter(f"{name!r} is not a heuristic. The heuristics are:{known}")
+    return names
 
 
-class _Reductions(click.ParamType[str]):
+def _reductions(value: object) -> str:
     """Which reductions a search may make: ``all``, ``none``, or names with commas between them."""
+    from ntagen.checker import REDUCTIONS
 
-    name = "reductions"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> str:
-        from ntagen.checker import REDUCTIONS
-
-        names = [name.strip() for name in str(value).split(",")]
-        for name in names if names not in (["all"], ["none"]) else ():
-            if name not in REDUCTIONS:
-                known = f"{', '.join(REDUCTIONS[:-1])} and {REDUCTIONS[-1]}"
-                self.fail(
-                    f"{name!r} is not a reduction. Write all, none, or some of {known} with commas "
-                    "between them",
-                    param,
-                    ctx,
-                )
-        return ",".join(names)
+    names = [name.strip() for name in str(value).split(",")]
+    for name in names if names not in (["all"], ["none"]) else ():
+        if name not in REDUCTIONS:
+            known = f"{', '.join(REDUCTIONS[:-1])} and {REDUCTIONS[-1]}"
+            raise click.BadParameter(
+                f"{name!r} is not a reduction. Write all, none, or some of {known} with commas "
+                "between them"
+            )
+    return ",".join(names)
 
 
-_SHARE: Final = Number(0, 1)
+_SHARE: Final = number(0, 1)
 
 RUNS: Final = (
     Setting(
@@ -105,7 +83,7 @@ RUNS: Final = (
     ),
     Setting(
         "threads N",
-        _Threads(),
+        _threads,
         "The number of threads, or `all` for one per core. Threads share the breadth-first search "
         "of E<>, A[], sup, inf and bounds, the computation with zones in games, and the random "
         "runs of Pr and E. Liveness, partial observation, shortest and fastest traces and "
@@ -116,7 +94,7 @@ RUNS: Final = (
 
 _DISCRETISATION: Final = Setting(
     "discretisation STEP",
-    Number(0, math.inf),
+    number(0, math.inf),
     "Solve equations of clocks in steps of this length.  [default: as their errors need]",
 )
 
@@ -142,7 +120,7 @@ STATISTICAL_SETTINGS: Final = (
     ),
     Setting(
         "value bounds LOW,HIGH",
-        Pair(-math.inf, math.inf),
+        pair(-math.inf, math.inf),
         "For E: in every run the value lies between these; then the interval is right for any "
         "number of runs.  [default: what the ranges of integers in the query say]",
     ),
@@ -172,13 +150,13 @@ STATISTICAL_SETTINGS: Final = (
     ),
     Setting(
         "delta WIDTH[,WIDTH]",
-        Pair(0, 1, one_is_enough=True),
+        pair(0, 1, one_is_enough=True),
         "For Pr >= p: so near to p nothing is promised; one number for both sides, or one for "
         "below and one for above.  [default: 0.01]",
     ),
     Setting(
         "odds ratios LOW,HIGH",
-        Pair(0, math.inf),
+        pair(0, math.inf),
         "For Pr >= Pr: if the ratio of the odds lies between these, nothing is promised.  "
         "[default: 0.9,1.1]",
     ),
@@ -248,7 +226,7 @@ SETTINGS: Final = (
     ),
     Setting(
         "without NAME,…",
-        _Heuristics(),
+        _heuristics,
         "For experiments: switch these heuristics of the engine off. Verdicts do not depend on "
         "them; time and counts do. A wrong name lists all names.",
     ),
@@ -274,7 +252,7 @@ OPTIONS: Final[dict[str, Decorator]] = {
     "reductions": click.option(
         "--reductions",
         metavar="all|none|LIST",
-        type=_Reductions(),
+        type=_reductions,
         default="all",
         help="Which reductions a search may make: all, none, or a LIST with commas between them. "
         "symmetry: treat states as one if they differ only by exchanged members of scalar sets, "
@@ -294,11 +272,10 @@ OPTIONS: Final[dict[str, Decorator]] = {
         "which is slower. Answers do not depend on it.  [default: jit]",
     ),
     **LIMITS,
-    "allow_write": click.option(
+    "allow_write": path_option(
         "--allow-write",
         metavar="DIR",
         multiple=True,
-        type=click.Path(path_type=Path),
         help="Allow saveStrategy in queries to write below this folder too, not only below the "
         "current one. You can give this option several times. saveStrategy replaces no files but "
         "strategies.",

@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.models.queries import Asked
 from ntagen.cli.signals import LimitReached
@@ -184,12 +184,6 @@ def mistakes_in(text: str) -> Iterator[Mistake]:
         elif found:
             found[-1][1].append(line)
     for match, lines in found:
-        yield Mistake(
-            path=match["path"],
-            line=int(match["line"] or 0),
-            column=int(match["column"] or 0),
-            code=match["code"],
-            text=match["text"],
-            severity=match["severity"],
-            lines=tuple(lines),
-        )
+        parts: dict[str, Any] = match.groupdict()
+        parts |= {name: int(match[name] or 0) for name in ("line", "column")}
+        yield Mistake(**parts, lines=tuple(lines))

@@ -7,7 +7,6 @@ what was written in part is removed again.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -16,6 +15,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from ntagen.cli.progress import rate, status
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import GrowingFile, write_files
@@ -148,17 +148,6 @@ def _counted(pieces: Iterable[str], show: _Show) -> Iterator[str]:
 @contextmanager
 def counting(quiet: bool) -> Iterator[_Show]:
     """Gives the function that takes how many plans are listed; a terminal shows the number."""
-    if quiet or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-
-    start_s = time.monotonic()
-    with Console(stderr=True).status("listing plans …") as status:
-
-        def show(count: int) -> None:
-            seconds = time.monotonic() - start_s
-            rate = count / seconds if seconds > 0 else 0
-            status.update(f"{count:,} plans listed ({rate:,.0f}/s)")
-
-        yield show
+    start = time.monotonic()
+    with status("listing plans …", quiet=quiet) as show:
+        yield lambda n: show(f"{n:,} plans listed ({rate(n, time.monotonic() - start)})")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,12 +11,20 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import doing
-from ntagen.cli.loading import constant_option, include_option, load_model, pointing_to_explanations
+from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.models.queries import queries_of
 from ntagen.cli.models.session import Session
-from ntagen.cli.notes import say_idle
+from ntagen.cli.options import (
+    constant_option,
+    forced_rule,
+    include_option,
+    overflow_rule,
+    path_argument,
+    path_option,
+    priority_rule,
+)
 from ntagen.cli.progress import shown_progress
-from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.errors import InputError
 from ntagen.files import require_apart
 
@@ -37,12 +44,11 @@ DEFEATED: Final = 1
     epilog="Exit codes: 0 done, 1 the strategy lost or has no next move, 2 the input is "
     "rejected, 3 stopped by a limit, 4 run-time error in the model.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.option(
+@path_argument("model_path", metavar="MODEL")
+@path_option(
     "--strategy",
     "strategy_path",
     metavar="FILE.json",
-    type=click.Path(path_type=Path),
     help="The strategy to play against, as `ntagen check --strategy` writes it.",
 )
 @click.option(
@@ -65,10 +71,9 @@ DEFEATED: Final = 1
     default=0,
     help="For --auto: the same seed gives the same play.  [default: 0]",
 )
-@click.option(
+@path_option(
     "--log",
     metavar="FILE",
-    type=click.Path(path_type=Path),
     help="When the play ends, write it as a trace; `ntagen verify MODEL FILE` checks it.",
 )
 @forced_rule()
@@ -150,21 +155,17 @@ def command(
 
 def _query(model: Model, asked: str | None) -> str:
     """The query with the name `asked`, `asked` itself as a query, or the model's only game."""
-    games = [query for query in model.queries if re.search(r"\bcontrol\b", query.text)]
-    if asked is None:
-        if len(games) == 1:
-            return games[0].text
-        shown = "".join(f"\n  {query.text}" for query in games)
-        raise InputError(
-            f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
-            "hint: give a control query with --query, or a strategy file with --strategy"
-        )
-    for query in games:
-        name = query.comment.strip().partition("\n")[0].strip()
-        named = re.match(r"strategy\s+(\w+)\s*=", query.text)
-        if asked.strip() in (name, named[1] if named else None):
-            return query.text
-    return asked
+    if asked is not None:
+        return queries_of(model, (asked,), None)[0].text
+    queries = queries_of(model, (), None) if model.queries else []
+    games = [query for query in queries if query.form and query.form.is_game]
+    if len(games) == 1:
+        return games[0].text
+    shown = "".join(f"\n  {query.text}" for query in games)
+    raise InputError(
+        f"the model has {len(games) or 'no'} control queries{':' if games else ''}{shown}\n"
+        "hint: give a control query with --query, or a strategy file with --strategy"
+    )
 
 
 def _reader() -> Callable[[], str | None]:

@@ -1,4 +1,4 @@
-"""The pictures of `ntagen plot` that show models: traces, zones of strategies, state spaces."""
+"""The pictures of `ntagen plot` that show models: traces, zones, state spaces, random runs."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import click
+
 from ntagen.checker.picture.page import kind_of
 from ntagen.cli.guard import current, doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
-from ntagen.cli.models.plot_runs import NAMES, plot_runs
+from ntagen.cli.models.options import RUNS
 from ntagen.cli.models.queries import Asked, queries_of
-from ntagen.cli.models.run_progress import STATISTICAL
-from ntagen.cli.notes import say_idle
-from ntagen.cli.progress import shown_progress
+from ntagen.cli.progress import progress_of, say_interrupted, shown_progress
+from ntagen.cli.settings import Setting
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.files import require_apart
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
-    from ntagen.checker import Model
+    from ntagen.checker import Answer, Model
     from ntagen.checker.picture.page import Svg
     from ntagen.checker.runs import Run
     from ntagen.checker.strategy import Strategy
@@ -45,6 +47,25 @@ GRAPHS: Final = ("states", "discrete")
 
 OF_ZONES: Final = {"at": "--at", "clocks": "--set 'clocks …'"}
 OF_GRAPHS: Final = {"limit": "--set 'limit …'"}
+
+RUN_SETTINGS: Final = (
+    *RUNS,
+    Setting(
+        "buckets N",
+        click.IntRange(min=1),
+        "The number of buckets of the histogram.  [default: the square root of the number of "
+        "values, at most 120]",
+    ),
+    Setting("bucket width WIDTH", click.FLOAT, "How wide a bucket is, instead."),
+)
+"""The settings that count for random runs only."""
+
+OF_RUNS: Final = {one.field: f"--set '{one.words} …'" for one in RUN_SETTINGS}
+"""How each of them is given."""
+
+_DRAWING_S: Final = 3.0
+_DRAWING_BYTES: Final = 200 << 20
+"""Enough to load matplotlib and to draw, on a slow machine too."""
 
 MOST_DRAWN: Final = 100
 """If no number is given, the picture of a graph has at most this number of states."""
@@ -71,6 +92,10 @@ class Wish:
 
     memory_bytes: int | None
 
+    def limits(self) -> dict[str, Any]:
+        """What is left for a search, as fields of `ntagen.checker.Options`."""
+        return {"timeout_s": current().left_s(), "memory_bytes": self.memory_bytes}
+
 
 def plot_model(
     source: Path, path: Path | None, wish: Wish, include: Sequence[Path]
@@ -85,16 +110,13 @@ def plot_model(
     with pointing_to_explanations(True):
         with doing("loading the model"):
             model = load_model(source, include).model
+        path = path or Path(f"{source.stem}.svg")
+        require_apart({"-o": path}, {"source": source})
         if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
             say_idle(OF_ZONES, "without --as zones")
             say_idle(OF_GRAPHS, "without --as states or discrete")
-            path = path or Path(f"{source.stem}.svg")
-            require_apart({"-o": path}, {"source": source})
-            limits = {"timeout_s": current().left_s(), "memory_bytes": wish.memory_bytes}
-            return path, plot_runs(model, asked, path, wish.settings, limits)
-        say_idle(NAMES, "here: no random runs are drawn")
-        path = path or Path(f"{source.stem}.svg")
-        require_apart({"-o": path}, {"source": source})
+            return path, _plot_runs(model, asked, path, wish.settings, wish.limits())
+        say_idle(OF_RUNS, "here: no random runs are drawn")
         _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
         return path, 0
 
@@ -108,7 +130,7 @@ def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
     if wish.kind is None and wish.asked is None and len(model.queries) != 1:
         return None
     query = _query(model, wish)
-    if query.form is not None and query.form.kind in STATISTICAL:
+    if query.form is not None and query.form.is_statistical:
         return query
     if wish.kind == "runs":
         raise InputError(
@@ -132,11 +154,7 @@ def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
     if is_graph:
         _plot_graph(model, path, wish)
         return
-    if wish.kind == "templates":
-        with doing("drawing the templates"):
-            _templates(model).save(path)
-        return
-    with doing("drawing the picture"):
+    with doing("drawing the templates" if wish.kind == "templates" else "drawing the picture"):
         _drawn(model, wish).save(path)
 
 
@@ -151,8 +169,7 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
     searched = max(MOST_SEARCHED, given or 0)
     try:
         with doing("the search for the states"):
-            left_s = current().left_s()
-            space = model.state_space(searched, timeout_s=left_s, memory_bytes=wish.memory_bytes)
+            space = model.state_space(searched, **wish.limits())
     except LimitError as error:
         said = str(error).partition("\n")[0]
         if str(searched) not in said:
@@ -166,13 +183,11 @@ def _plot_graph(model: Model, path: Path, wish: Wish) -> None:
         space.save(path, clocks=clocks, limit=MOST_DRAWN if given is None else given)
 
 
-def _templates(model: Model) -> Svg:
-    from ntagen.checker.picture.svg import draw_all
-
-    return draw_all(model.templates)
-
-
 def _drawn(model: Model, wish: Wish) -> Svg:
+    if wish.kind == "templates":
+        from ntagen.checker.picture.svg import draw_all
+
+        return draw_all(model.templates)
     query = _query(model, wish)
     if wish.kind == "zones":
         return _zones(model, query, wish)
@@ -203,12 +218,7 @@ def _query(model: Model, wish: Wish) -> Asked:
 def _zones(model: Model, query: Asked, wish: Wish) -> Svg:
     """The zones of the strategy of a game."""
     with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
-        strategy = model.synthesize(
-            query.text,
-            timeout_s=current().left_s(),
-            memory_bytes=wish.memory_bytes,
-            progress=report,
-        )
+        strategy = model.synthesize(query.text, progress=report, **wish.limits())
     axes = _axes(wish.settings.get("clocks"))
     return strategy.zones(_state(strategy, wish.at), x=axes[0], y=axes[1])
 
@@ -256,13 +266,7 @@ def _number(word: str, value: str) -> int | float:
 def _trace(model: Model, query: Asked, wish: Wish) -> Run:
     """The trace of a query, with exact times."""
     with doing("the search for the answer"), shown_progress(query.text, quiet=False) as report:
-        answer = model.check(
-            query.text,
-            trace=True,
-            timeout_s=current().left_s(),
-            memory_bytes=wish.memory_bytes,
-            progress=report,
-        )
+        answer = model.check(query.text, trace=True, progress=report, **wish.limits())
     if answer.verdict == "error":
         raise ModelError(answer.message or "the model has a run-time error")
     if answer.verdict == "unknown":
@@ -277,3 +281,60 @@ def _trace(model: Model, query: Asked, wish: Wish) -> Run:
         f"{query.text} is {answer.verdict}, and has no trace\n"
         "hint: E<> p that is satisfied and A[] p that is not have one"
     )
+
+
+def _plot_runs(
+    model: Model, query: Asked, path: Path, settings: dict[str, Any], limits: dict[str, Any]
+) -> int:
+    """Draws what random runs say; returns the exit code.
+
+    Args:
+        model: The model.
+        query: The query that is answered by random runs.
+        path: The picture.
+        settings: Those of `RUN_SETTINGS` that are given, by their names.
+        limits: Those of `ntagen.checker.Options`.
+
+    Raises:
+        InputError: The query or the name of the picture is wrong, or there is nothing to draw.
+        LimitError: A limit came before there was anything to draw.
+    """
+    from ntagen.checker import Interrupted
+
+    kind_of(path)
+    options = {one.field: settings[one.field] for one in RUNS if one.field in settings}
+    code = 0
+    try:
+        with progress_of(query.text, query.form, quiet=False) as reports:
+            answer = model.check(query.text, **options, **limits, **reports)
+    except Interrupted as interrupted:
+        answer = interrupted.answer
+        say_interrupted(query.text, 0)
+    if answer.verdict == "error":
+        raise ModelError(answer.message or "the model has a run-time error")
+    if answer.verdict == "unknown":
+        code = LimitError.exit_code
+        said = f"stopped by the {answer.limit_text}"
+        if answer.estimate is None and not answer.trajectories:
+            raise LimitError(f"{query.text} was {said} before there was anything to draw")
+        echo(f"note: {said}: the picture shows the runs until then", err=True)
+        current().allow(_DRAWING_S, _DRAWING_BYTES)
+    _chart_of(answer, settings).save(path)
+    return code
+
+
+def _chart_of(answer: Answer, settings: dict[str, Any]) -> Svg:
+    distribution = answer.distribution
+    if distribution is not None and distribution.count == 0:
+        what = "breaks" if distribution.broken else "reaches"
+        raise InputError(
+            f"none of {distribution.runs:,} runs {what} what {answer.query.strip()} asks, so there "
+            "is nothing to draw\nhint: make more of them (--set 'runs …'), or longer ones"
+        )
+    chart = answer.chart(settings.get("buckets"), settings.get("bucket_width"))
+    if chart is None:
+        raise InputError(
+            f"{answer.query.strip()} shows no run, so there is nothing to draw\n"
+            "hint: make more runs, or longer ones"
+        )
+    return chart

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, ParamSpec
+from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError, NtagenError
@@ -42,14 +41,6 @@ HELP: Final = """\
   q          quit"""
 
 
-@dataclass(frozen=True, slots=True)
-class _Mark:
-    """A moment of the play to which the user can go back."""
-
-    length: int
-    time: Fraction
-
-
 class Session:
     """A play with its user."""
 
@@ -59,7 +50,8 @@ class Session:
         self._rival = "environment" if strategy.winning else "controller"
         self._time = Fraction(0)
         self._shown: State | None = None
-        self._marks: list[_Mark] = []
+        # The lengths and times of the play to which the user can go back.
+        self._marks: list[tuple[int, Fraction]] = []
         self._ending: str | None = None
         self._silent = 0
         self.is_defeated = False
@@ -214,34 +206,42 @@ class Session:
             line = read()
             if line is None:
                 return False
-            words = _words(line)
-            name = words[0] if words else "w"
-            match name:
-                case "q" | "quit" | "exit":
-                    return False
-                case "?" | "h" | "help":
-                    echo(HELP)
-                case "s":
-                    self._show_state(whole=True)
-                case "m":
-                    self._show_moves(situation, None)
-                case "log":
-                    _said(self.write, Path(" ".join(words[1:]) or "play.json"))
-                case "u" | "r":
-                    self._back(everything=name == "r")
-                    return True
-                case _ if self._ending is not None:
-                    echo("the play is over: u undo, r restart, q quit")
-                case _:
-                    if _said(self._step, situation, words):
-                        return True
+            try:
+                if (is_played := self._obeyed(_words(line), situation)) is not None:
+                    return is_played
+            except NtagenError as error:
+                echo(str(error))
+
+    def _obeyed(self, words: Sequence[str], situation: Situation) -> bool | None:
+        """Obeys a command; whether the play goes on, or ``None`` if it has not changed."""
+        name = words[0] if words else "w"
+        match name:
+            case "q" | "quit" | "exit":
+                return False
+            case "?" | "h" | "help":
+                echo(HELP)
+            case "s":
+                self._show_state(whole=True)
+            case "m":
+                self._show_moves(situation, None)
+            case "log":
+                self.write(Path(" ".join(words[1:]) or "play.json"))
+            case "u" | "r":
+                self._back(everything=name == "r")
+                return True
+            case _ if self._ending is not None:
+                echo("the play is over: u undo, r restart, q quit")
+            case _:
+                self._step(situation, words)
+                return True
+        return None
 
     def _step(self, situation: Situation, words: Sequence[str]) -> None:
         """Makes the move, or waits, as the user typed."""
         if len(words) > 2:
             raise InputError(f"{' '.join(words)} is not a command; type ? for help")
         delay = _delay(words[1]) if len(words) == 2 else None
-        mark = _Mark(len(self._play), self._time)
+        mark = (len(self._play), self._time)
         if not words or words[0] == "w":
             if delay is None:
                 self._wait(situation)
@@ -304,24 +304,10 @@ class Session:
     def _back(self, everything: bool) -> None:
         if everything:
             self._marks.clear()
-        mark = self._marks.pop() if self._marks else _Mark(0, Fraction(0))
-        self._play.undo(mark.length)
-        self._time = mark.time
+        length, self._time = self._marks.pop() if self._marks else (0, Fraction(0))
+        self._play.undo(length)
         self._ending, self._shown, self.is_defeated = None, None, False
         self._silent = 0
-
-
-_P = ParamSpec("_P")
-
-
-def _said(action: Callable[_P, None], *given: _P.args, **named: _P.kwargs) -> bool:
-    """Whether an action succeeded; if not, prints the error."""
-    try:
-        action(*given, **named)
-    except NtagenError as error:
-        echo(str(error))
-        return False
-    return True
 
 
 def _meant(situation: Situation, word: str) -> Reply:

@@ -9,11 +9,17 @@ from typing import Any, Final
 import click
 
 from ntagen.cli.guard import doing
-from ntagen.cli.limits import bounded
-from ntagen.cli.loading import constant_option, include_option, load_model, pointing_to_explanations
-from ntagen.cli.notes import say_idle
-from ntagen.cli.rules import forced_rule, overflow_rule, priority_rule
-from ntagen.cli.terminal import echo
+from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.options import (
+    bounded,
+    constant_option,
+    forced_rule,
+    include_option,
+    overflow_rule,
+    path_argument,
+    priority_rule,
+)
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.files import EVIDENCE_BYTES, read_file
 
 VIOLATED: Final = 1
@@ -31,8 +37,8 @@ _WITHOUT_RULES: Final = re.compile(rb'\s*\{\s*"format"\s*:\s*"ntagen-(trace|cert
     epilog="Exit codes: 0 the evidence holds, 1 it does not, 2 the input is rejected, 3 the check "
     "does not cover the model or the query, or a limit came first.",
 )
-@click.argument("model_path", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("file", metavar="FILE", type=click.Path(path_type=Path))
+@path_argument("model_path", metavar="MODEL")
+@path_argument("file", metavar="FILE")
 @forced_rule(
     "For strategies: when the environment must move at a moment at which time cannot pass. Give "
     "the rule that the strategy was made with.  [default: tiga]"

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.models.run_progress import progress_of, say_interrupted
+from ntagen.cli.guard import taken_bytes
+from ntagen.cli.progress import progress_of, say_interrupted
+from ntagen.cli.signals import INTERRUPTED
 from ntagen.cli.terminal import echo, echo_exactly
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart, write_files
@@ -23,9 +25,6 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 """The exit code of every mistake; verdicts have none of their own."""
-
-INTERRUPTED: Final = 130
-"""The exit code if the user has ended random runs, as for every interruption."""
 
 COMPILE_ONLY: Final = "UPPAAL_COMPILE_ONLY"
 """If it is set and not empty, the compiled form of the model is printed and nothing is checked."""
@@ -150,8 +149,8 @@ def _progress(line: CommandLine, after: str) -> None:
 def _answer(line: CommandLine, model: Model, query: Query, number: int, inputs: list[Path]) -> None:
     """Answers a query, prints the verdict and what belongs to it, and writes its files."""
     from ntagen.checker import Options, form_of
+    from ntagen.verifyta.options import of_model, statistical
     from ntagen.verifyta.output import estimate, histogram, summary, values, verdict
-    from ntagen.verifyta.statistical import of_model, statistical
 
     text = query.text
     form = form_of(text)
@@ -198,18 +197,21 @@ def _write_trace(
     from ntagen.verifyta.trace_xml import trace_xml_text
     from ntagen.verifyta.xtr import xtr_text
 
-    files = {}
-    if line.has("-f") and (text := xtr_text(model, answer)) is not None:
-        files[Path(f"{line.value('-f')}-{number}")] = text
-    if line.has("-X") and (text := trace_xml_text(model, answer)) is not None:
-        files[Path(f"{line.value('-X')}{number}.xml")] = text
+    wanted = {
+        Path(f"{line.value('-f')}-{number}"): ("-f", xtr_text, " -- Writing witness trace to"),
+        Path(f"{line.value('-X')}{number}.xml"): ("-X", trace_xml_text, "XMLTrace outputted to:"),
+    }
+    files = {
+        file: text
+        for file, (option, written, _) in wanted.items()
+        if line.has(option) and (text := written(model, answer)) is not None
+    }
     read = {"queries" if index else "model": one for index, one in enumerate(inputs)}
     for file in files:
         require_apart({"the trace": file}, read)
     write_files(files)
     for file in files:
-        is_xml = line.has("-X") and file == Path(f"{line.value('-X')}{number}.xml")
-        echo(f"XMLTrace outputted to: {file}" if is_xml else f" -- Writing witness trace to {file}")
+        echo(f"{wanted[file][-1]} {file}")
     if line.has("-f") or line.has("-X"):
         return
     shown = trace_text(
@@ -225,9 +227,5 @@ def _write_trace(
 
 def _memory_kib() -> tuple[int, int] | None:
     """The virtual and the resident memory of this process in KiB, where the system says it."""
-    try:
-        virtual, resident = Path("/proc/self/statm").read_text("ascii").split()[:2]
-    except (OSError, ValueError):
-        return None
-    page = os.sysconf("SC_PAGE_SIZE")
-    return int(virtual) * page // _KIB, int(resident) * page // _KIB
+    virtual, resident = taken_bytes(0), taken_bytes(1)
+    return None if virtual is None or resident is None else (virtual // _KIB, resident // _KIB)

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.notes import say_idle
-from ntagen.cli.option_groups import gathered
+from ntagen.cli.options import gathered, path_option
+from ntagen.cli.terminal import say_idle
 from ntagen.errors import InputError
 from ntagen.units import deg_from_rad
 from ntagen.values import dataclass
@@ -50,11 +50,10 @@ class Wanted:
 course_options = gathered(
     "wanted",
     {
-        "tree_path": click.option(
+        "tree_path": path_option(
             "--strategy",
             "tree_path",
             metavar="FILE.json|none",
-            type=click.Path(path_type=Path),
             help="In a tissue that answers (tissue adversarial), follow the strategy in this file, "
             "which ntagen check --plans wrote for this task; or none, but plans for the expected "
             "tissue, which are made anew when the needle leaves them.  [default: a strategy that "

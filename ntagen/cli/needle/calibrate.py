@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.options import output_option, path_argument
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
@@ -44,10 +45,8 @@ def _places(
     former={"--scene": "write --at {}"},
     epilog="Exit codes: 0 done, 2 the points are rejected, 70 internal error.",
 )
-@click.argument("tracker_points", metavar="POINTS", type=click.Path(path_type=Path))
-@click.argument(
-    "scene_points", metavar="[SCENE_POINTS]", type=click.Path(path_type=Path), required=False
-)
+@path_argument("tracker_points", metavar="POINTS")
+@path_argument("scene_points", metavar="[SCENE_POINTS]", required=False)
 @click.option(
     "--frame",
     "frames",
@@ -80,12 +79,9 @@ def _places(
     help="Estimate the error at this position in the scene, in mm, or at the targets and critical "
     "regions of this scene. It can be given many times.",
 )
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.json",
-    type=click.Path(path_type=Path),
-    help="The file to write the registration to, for `ntagen drive --registration`.",
+@output_option(
+    "FILE.json",
+    "The file to write the registration to, for `ntagen drive --registration`.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def command(

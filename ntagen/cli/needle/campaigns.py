@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.terminal import echo, safe
+from ntagen.cli.options import gathered
+from ntagen.cli.terminal import aligned, echo, safe
 from ntagen.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,55 +38,40 @@ class How:
         workers: So many processes; None for one on each core.
         dask: The address of a Dask scheduler, or None.
         resume: Whether finished runs are kept.
-        logs: Whether each run has a log.
+        no_logs: Whether runs have no logs.
     """
 
     workers: int | None
     dask: str | None
     resume: bool
-    logs: bool
+    no_logs: bool
 
 
-_OPTIONS: Final = (
-    click.option(
-        "--workers",
-        metavar="N",
-        type=click.IntRange(1, 1024),
-        help="Use this many processes of this machine.  [default: one for each core]",
-    ),
-    click.option(
-        "--dask",
-        metavar="ADDRESS",
-        help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They must "
-        "have the same ntagen, and see the same files.",
-    ),
-    click.option(
-        "--resume",
-        is_flag=True,
-        help="Go on with an experiment that was interrupted. Finished runs are kept.",
-    ),
-    click.option("--no-logs", is_flag=True, help="Write no log of each run."),
+campaign_options = gathered(
+    "how",
+    {
+        "workers": click.option(
+            "--workers",
+            metavar="N",
+            type=click.IntRange(1, 1024),
+            help="Use this many processes of this machine.  [default: one for each core]",
+        ),
+        "dask": click.option(
+            "--dask",
+            metavar="ADDRESS",
+            help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They "
+            "must have the same ntagen, and see the same files.",
+        ),
+        "resume": click.option(
+            "--resume",
+            is_flag=True,
+            help="Go on with an experiment that was interrupted. Finished runs are kept.",
+        ),
+        "no_logs": click.option("--no-logs", is_flag=True, help="Write no log of each run."),
+    },
+    How,
 )
-
-
-def campaign_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
-    """Adds the options; the command gets their values as `how`."""
-
-    @functools.wraps(command)
-    def with_how(
-        *,
-        workers: int | None,
-        dask: str | None,
-        resume: bool,
-        no_logs: bool,
-        **values: object,
-    ) -> int | None:
-        return command(how=How(workers, dask, resume, not no_logs), **values)
-
-    decorated: Callable[..., int | None] = with_how
-    for option in reversed(_OPTIONS):
-        decorated = option(decorated)
-    return decorated
+"""Adds the options; the command gets their values as `how`."""
 
 
 def made(experiment: Experiment, folder: Path, how: How) -> Campaign:
@@ -107,7 +92,7 @@ def made(experiment: Experiment, folder: Path, how: How) -> Campaign:
                 folder,
                 crew_of(how.workers, how.dask),
                 resume=how.resume,
-                logs=how.logs,
+                logs=not how.no_logs,
                 notify=notify,
             )
     except KeyboardInterrupt:
@@ -150,24 +135,19 @@ def _progress() -> Iterator[Callable[[Progress], None]]:
     if sys.stderr.isatty():
         with _bar() as show:
             yield show
-    else:
-        yield _Lines().show
+        return
+    shown = -1
 
-
-class _Lines:
-    """Progress for a file: a line whenever another tenth is done."""
-
-    def __init__(self) -> None:
-        self._tenth = -1
-
-    def show(self, progress: Progress) -> None:
-        """Prints a line if there is something new."""
+    def show_line(progress: Progress) -> None:
+        nonlocal shown
         if progress.note:
             echo(f"note: {progress.note}", err=True)
         tenth = 10 * progress.done // max(1, progress.of)
-        if tenth > self._tenth:
-            self._tenth = tenth
+        if tenth > shown:
+            shown = tenth
             echo(f"{progress.done} of {progress.of} runs{_counts(progress)}", err=True)
+
+    yield show_line
 
 
 def _counts(progress: Progress) -> str:
@@ -177,37 +157,28 @@ def _counts(progress: Progress) -> str:
 @contextlib.contextmanager
 def _bar() -> Iterator[Callable[[Progress], None]]:
     """A bar with the rate and the time left."""
+    from rich import progress as columns
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        SpinnerColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
 
     console = Console(stderr=True)
-    columns = (
-        SpinnerColumn(),
-        MofNCompleteColumn(),
-        BarColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[counts]}"),
+    shown = (
+        columns.SpinnerColumn(),
+        columns.MofNCompleteColumn(),
+        columns.BarColumn(),
+        columns.TextColumn("{task.fields[rate]}"),
+        columns.TimeRemainingColumn(),
+        columns.TextColumn("{task.fields[counts]}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
-        task: Any = None
+    with columns.Progress(*shown, console=console, transient=True) as bar:
 
-        def show(progress: Any) -> None:  # noqa: ANN401  rich has a class of this name, too
-            nonlocal task
+        def show(progress: Progress) -> None:
             if progress.note:
                 console.print(safe(f"note: {progress.note}"), markup=False, highlight=False)
-            if task is None:
-                task = bar.add_task("runs", total=progress.of, rate="", counts="")
+            if not bar.tasks:
+                bar.add_task("runs", total=progress.of, rate="", counts="")
             speed = bar.tasks[0].speed
             bar.update(
-                task,
+                bar.tasks[0].id,
                 completed=progress.done,
                 rate="" if speed is None else f"{speed:.1f} runs/s",
                 counts=_counts(progress).removeprefix(", "),
@@ -234,7 +205,5 @@ def _show(document: Mapping[str, Any]) -> None:
                 "" if overall is None else f"{overall['avg']:.1f} s",
             )
         )
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for cells in rows:
-        first, *others = zip(cells, widths, strict=True)
-        echo("  ".join([first[0].ljust(first[1]), *(c.rjust(w) for c, w in others)]).rstrip())
+    for line in aligned(rows, right=range(1, 8)):
+        echo(line)

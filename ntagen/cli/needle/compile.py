@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import show_warnings
+from ntagen.cli.options import include_option, output_option, path_argument
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
@@ -15,15 +16,12 @@ from ntagen.files import write_files
     "compile",
     epilog="Exit codes: 0 written, 2 the environment or the folder is wrong.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
+@path_argument("environment", metavar="ENV.nsl")
+@output_option(
+    "DIR",
+    "The folder to write to; it is made if it does not exist.  [default: the current folder]",
     "folder",
-    metavar="DIR",
     default=".",
-    type=click.Path(path_type=Path),
-    help="The folder to write to; it is made if it does not exist.  [default: the current folder]",
 )
 @include_option()
 def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:
@@ -40,8 +38,7 @@ def command(environment: Path, folder: Path, include: tuple[Path, ...]) -> None:
     from ntagen.render import render, render_queries
 
     scene, warnings = load_with_warnings(environment, include=include)
-    for warning in warnings:
-        echo(warning.render(), err=True)
+    show_warnings([warning.render() for warning in warnings])
     name = environment.stem or environment.name
     model = folder / f"{name}.xml"
     queries = folder / f"{name}.q"

@@ -12,11 +12,10 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.needle.lab import command as simulate
-from ntagen.cli.needle.plugins import check_plugin, installed, is_plugin
+from ntagen.cli.needle.plugins import check_plugin, for_steppers, installed, is_plugin
 from ntagen.cli.needle.plugins import command as test
 from ntagen.cli.needle.tracker import look_at
-from ntagen.cli.notes import say_idle
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.steppers import axes_for, described
 from ntagen.errors import DeviceError, InputError
 
@@ -31,17 +30,13 @@ _MOST_MM: Final = 10.0
 _STEPPERS_ONLY: Final = {"motion": "--move", "yes": "--yes"}
 
 
-class _Motion(click.ParamType[tuple[str, float]]):
+_LENGTH: Final = click.FloatRange(min=0.0, max=_MOST_MM, min_open=True)
+
+
+def _motion(value: object) -> tuple[str, float]:
     """An axis, X if none is named, and how far it is moved, in mm."""
-
-    name = "motion"
-    _length: Final = click.FloatRange(min=0.0, max=_MOST_MM, min_open=True)
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, float]:
-        axis, _, length = str(value).rpartition(":")
-        return axis or "X", float(self._length(length, param, ctx))
+    axis, _, length = str(value).rpartition(":")
+    return axis or "X", float(_LENGTH(length))
 
 
 @click.group("device")
@@ -71,7 +66,7 @@ command.add_command(test)
     "--move",
     "motion",
     metavar="[AXIS:]MM",
-    type=_Motion(),
+    type=_motion,
     help=f"Also move an axis (X by itself) by this length, at most {_MOST_MM:g} mm, and back, "
     "after you agree.",
 )
@@ -142,12 +137,8 @@ def check(
 
 def _described(path: Path) -> tuple[str, Axes]:
     """The device that a task describes, and its axes."""
-    from ntagen.drive.configure import configure
-    from ntagen.nsl import load_task
-
-    task = load_task(path)
+    task, settings = for_steppers(path)
     device = described(task, path)
-    settings = configure(task.given, task.scene, needle="grbl").settings
     return f"grbl:{device.port}", axes_for(device, task.scene.needle, settings)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.answering_tissue import (
     Wanted,
     course_of,
@@ -31,16 +32,15 @@ from ntagen.cli.needle.steering import (
     show_settings,
 )
 from ntagen.cli.needle.tracker import (
-    Sense,
     Tracking,
     opened,
-    opened_live,
-    tracker_options,
+    registration_option,
+    tracker_option,
     tracking_of,
 )
-from ntagen.cli.notes import say_idle
+from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.states import State
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart
@@ -74,7 +74,7 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     },
     epilog=_EPILOG,
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("environment", metavar="ENV.nsl")
 @click.option(
     "--needle",
     default="virtual",
@@ -91,7 +91,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     is_flag=True,
     help="Ask before each plan that is followed, and before the needle is pulled back for one.",
 )
-@tracker_options
+@tracker_option
+@registration_option
 @course_options
 @known_option
 @click.option(
@@ -102,11 +103,10 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     help="The phase of the breath at the start, if regions move: from 0 to 360 degrees; by default "
     "0. A simulation moves its regions by the same clock.",
 )
-@click.option(
+@path_option(
     "--log",
     "log_path",
     metavar="RUN.mcap",
-    type=click.Path(path_type=Path),
     help="The file to write the log of the run to; an existing file is replaced.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
@@ -166,7 +166,6 @@ def command(
     from ntagen.drive.configure import configure
     from ntagen.drive.knowledge import told
     from ntagen.drive.needles import LAB
-    from ntagen.nsl import load_task
 
     if needle == LAB:
         raise InputError(
@@ -175,10 +174,7 @@ def command(
         )
     if as_json:
         say_idle({"quiet": "--quiet"}, "with --json")
-    task = load_task(environment, include=include)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
-    task = _breathing(task, breath_phase_deg)
+    task = _breathing(load_task(environment, include), breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
     is_real = configuration.needle.is_real
     _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
@@ -188,19 +184,10 @@ def command(
         return 0
     tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
     terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
-    entry, watches_force = task.scene.needle.tip, configuration.settings.force_sensing
-    # A tracker or a port that cannot be reached must not cost an earlier log.
-    with signalled_operator() as operator, contextlib.ExitStack() as stack:
+    with signalled_operator() as operator:
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
         run = _Run(environment, task, configuration, known, tracking, wanted, course)
-        if is_real:
-            setup = stack.enter_context(_real_needle(run, needle))
-            log = stack.enter_context(_log(log_path, run))
-            result = _drive_real(run, setup, log, terminal, operator)
-        else:
-            sense = stack.enter_context(opened(tracking, entry, watches_force=watches_force))
-            log = stack.enter_context(_log(log_path, run))
-            result = _drive(run, sense, log, terminal, operator)
+        result = _drive(run, needle, log_path, terminal, operator)
     if as_json:
         guarantee = guarantee_of(result, task.scene, course)
         ended = summary(result, configuration, known, log_path)
@@ -267,8 +254,11 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
     from ntagen.drive.needles import REAL
     from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
     from ntagen.grbl.port import SerialPort
+    from ntagen.tracking.opening import opened_live
 
-    settings, scene = run.configuration.settings, run.scene
+    settings, scene, tracking = run.configuration.settings, run.scene, run.tracking
+    if tracking.tracker is None:
+        raise AssertionError("a real needle has a tracker (`tracking_of`)")
     name, _, argument = needle.partition(":")
     if name == REAL:
         device = described(run.task, run.environment)
@@ -280,7 +270,9 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
     with (
         opening as actuator,
         opened_live(
-            run.tracking,
+            tracking.text,
+            tracking.tracker,
+            tracking.transform,
             scene.needle.tip,
             actuator.now_s,
             watches_force=settings.force_sensing,
@@ -290,49 +282,41 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
         yield actuator, sensor
 
 
-def _drive_real(
-    run: _Run,
-    setup: tuple[WatchedActuator, LiveSensor],
-    log: list[Journal],
-    terminal: _Terminal,
-    operator: SignalledOperator,
-) -> Driven:
-    from ntagen.drive.real import drive
-
-    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
-        return drive(
-            run.scene,
-            *setup,
-            synthesise,
-            run.configuration.settings,
-            journal,
-            known=run.known,
-            listen=operator.listen,
-            agree=agree,
-            course=run.course,
-        )
-
-
 def _drive(
     run: _Run,
-    sense: Sense | None,
-    log: list[Journal],
+    needle: str,
+    log_path: Path | None,
     terminal: _Terminal,
     operator: SignalledOperator,
 ) -> Driven:
+    """Drives a real or a simulated needle."""
+    from ntagen.drive.real import drive
     from ntagen.drive.simulate import simulate
 
-    with _around(run, log, terminal, operator) as (synthesise, journal, agree):
-        return simulate(
-            run.scene,
+    configuration, settings, scene = run.configuration, run.configuration.settings, run.scene
+    steer: Callable[..., Driven]
+    with contextlib.ExitStack() as stack:
+        if configuration.needle.is_real:
+            steer = functools.partial(drive, scene, *stack.enter_context(_real_needle(run, needle)))
+        else:
+            watches_force = settings.force_sensing
+            sensing = opened(run.tracking, scene.needle.tip, watches_force=watches_force)
+            steer = functools.partial(
+                simulate,
+                scene,
+                errors=configuration.errors,
+                make=maker(run.wanted, scene, configuration, run.course),
+                seed=configuration.seed,
+                sense=stack.enter_context(sensing),
+            )
+        # A tracker or a port that cannot be reached must not cost an earlier log.
+        log = stack.enter_context(_log(log_path, run))
+        synthesise, journal, agree = stack.enter_context(_around(run, log, terminal, operator))
+        return steer(
             synthesise,
-            run.configuration.settings,
+            settings,
             journal,
             known=run.known,
-            errors=run.configuration.errors,
-            make=maker(run.wanted, run.scene, run.configuration, run.course),
-            seed=run.configuration.seed,
-            sense=sense,
             listen=operator.listen,
             agree=agree,
             course=run.course,
@@ -350,21 +334,14 @@ def _around(
     settings = run.configuration.settings
     # The log has the strategies; nobody else asks for them.
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
-    agree = operator.agree if terminal.confirms else _agrees
-    with contextlib.ExitStack() as stack:
-        shown = []
-        if terminal.speaks:
-            moves = not terminal.confirms
-            shown.append(stack.enter_context(lines(settings.ranking, moves=moves)))
+    agree = operator.agree if terminal.confirms else lambda _: None
+    told = lines(settings.ranking, moves=not terminal.confirms)
+    with told if terminal.speaks else contextlib.nullcontext() as shown:
         try:
-            yield synthesise, Journals(*log, *shown), agree
+            yield synthesise, Journals(*log, *([shown] if shown else [])), agree
         except ModelError as error:
             # The model is ours: its exit code would say that no strategy holds.
             raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
-
-
-def _agrees(_: str) -> None:
-    """Agrees to all: nobody is asked."""
 
 
 @contextlib.contextmanager

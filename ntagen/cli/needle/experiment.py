@@ -8,23 +8,21 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.needle.campaigns import EPILOG, FORMER, How, campaign_options, ended, made
+from ntagen.cli.options import output_option, path_argument
 
 
 @click.command("experiment", cls=Renamed, former=FORMER, epilog=EPILOG)
-@click.argument("file", metavar="FILE.toml", type=click.Path(path_type=Path))
+@path_argument("file", metavar="FILE.toml")
 @click.option(
     "--runs",
     metavar="N",
     type=click.IntRange(1, 1_000_000),
     help="Make this many runs of each row; the number in the file does not count then.",
 )
-@click.option(
-    "-o",
-    "--output",
+@output_option(
+    "DIR",
+    "The folder for all results.  [default: the name of the file without .toml]",
     "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    help="The folder for all results.  [default: the name of the file without .toml]",
 )
 @campaign_options
 def command(file: Path, runs: int | None, folder: Path | None, how: How) -> int:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.steering import say_idle_errors, settings_options
+from ntagen.cli.options import include_option, path_argument
 from ntagen.cli.signals import handled
 from ntagen.cli.terminal import echo
 from ntagen.drive.steppers import axes_for, described
@@ -46,7 +47,7 @@ _LOOK_S: Final = 0.1
     },
     epilog="Exit codes: 0 the lab was closed, 2 the input is wrong.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("environment", metavar="ENV.nsl")
 @click.option(
     "--needle",
     type=click.Choice(["phantom", "virtual"]),
@@ -105,11 +106,8 @@ def command(
     from ntagen.drive.configure import configure
     from ntagen.lab.lab import Lab
     from ntagen.lab.needles import place
-    from ntagen.nsl import load_task
 
-    task = load_task(environment, include=include)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
+    task = load_task(environment, include)
     fitted = configure((*task.given, *given), task.scene, "all", needle)
     say_idle_errors(fitted.needle, given)
     margin_mm = fitted.settings.sensing_margin_mm

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option, show_warnings
+from ntagen.cli.loading import load_task, show_warnings
 from ntagen.cli.needle.match_tables import show
-from ntagen.cli.quantities import LENGTH
+from ntagen.cli.options import include_option, output_option, path_argument
+from ntagen.cli.quantities import length
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import require_apart
@@ -29,18 +31,12 @@ if TYPE_CHECKING:
 _STARTS: Final = ("free", "fit", "model")
 
 
-class _Start(click.ParamType[tuple[Any, float]]):
+def _start(value: object) -> tuple[Any, float]:
     """What is known of the start, and the length of the first part that says it, in mm."""
-
-    name = "start"
-
-    def convert(
-        self, value: object, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[Any, float]:
-        start, _, length = str(value).partition(":")
-        if start not in _STARTS:
-            self.fail(f"{start!r} is not one of {', '.join(_STARTS)}", param, ctx)
-        return start, LENGTH.convert(length or "20mm", param, ctx)
+    start, _, part = str(value).partition(":")
+    if start not in _STARTS:
+        raise click.BadParameter(f"{start!r} is not one of {', '.join(_STARTS)}")
+    return start, length(part or "20mm")
 
 
 @click.command(
@@ -49,14 +45,12 @@ class _Start(click.ParamType[tuple[Any, float]]):
     former={"--first": "write --start fit:{} or --start model:{}"},
     epilog="Exit codes: 0 done, 2 the environment or a trace is wrong, 70 internal error.",
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
-@click.argument(
-    "traces", metavar="TRACE…", type=click.Path(path_type=Path), nargs=-1, required=True
-)
+@path_argument("environment", metavar="ENV.nsl")
+@path_argument("traces", metavar="TRACE…", nargs=-1, required=True)
 @click.option(
     "--start",
     metavar="free|fit|model[:LENGTH]",
-    type=_Start(),
+    type=_start,
     default="free",
     show_default=True,
     help="What is known of the start: nothing (free); its pose by a circle fit of the first part "
@@ -82,7 +76,7 @@ class _Start(click.ParamType[tuple[Any, float]]):
     "--from",
     "from_mm",
     metavar="LENGTH",
-    type=LENGTH,
+    type=length,
     default="0mm",
     help="Match the trace from this depth on, for example after what was no insertion yet. All "
     "other depths are counted from there.",
@@ -91,7 +85,7 @@ class _Start(click.ParamType[tuple[Any, float]]):
     "--until",
     "until_mm",
     metavar="LENGTH",
-    type=LENGTH,
+    type=length,
     help="Match the trace up to this depth only, for example before a pull.",
 )
 @click.option("--predict", is_flag=True, help="Predict the rest from the first 20, 30 and 40 mm.")
@@ -108,12 +102,9 @@ class _Start(click.ParamType[tuple[Any, float]]):
     show_default=True,
     help="The unit of positions whose columns do not name one.",
 )
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.png|pdf|svg",
-    type=click.Path(path_type=Path),
-    help="Draw the traces, the paths and their deviations.",
+@output_option(
+    "FILE.png|pdf|svg",
+    "Draw the traces, the paths and their deviations.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a trace on a line.")
 @include_option()
@@ -145,14 +136,12 @@ def command(
       ntagen match examples/traces/bench.nsl examples/traces/two_rolls.csv -o match.png
       ntagen match bench.nsl trial*.csv --radius fit --predict --columns AuroraTip
     """  # noqa: D301  click wants the control character
-    from ntagen.nsl import load_task
     from ntagen.traces.matching import Options
     from ntagen.traces.reading import Columns
 
     if output is not None:
         _require_picture(output, environment, traces)
-    task = load_task(environment, include=include)
-    show_warnings([warning.render() for warning in task.warnings])
+    task = load_task(environment, include)
     options = Options(start=start[0], radius=radius, rolls=rolls, first_mm=start[1])
     part_mm = (math.inf if until_mm is None else until_mm, from_mm)
     found = []
@@ -256,8 +245,5 @@ def _prediction(prediction: Prediction) -> dict[str, Any]:
         "from_mm": prediction.from_mm,
         "rolls": len(prediction.match.rolls),
         "radius_mm": prediction.match.needle.radius_mm,
-        "ahead": [
-            {"ahead_mm": one.ahead_mm, "at_mm": one.at_mm, "max_mm": one.max_mm}
-            for one in prediction.ahead
-        ],
+        "ahead": list(map(asdict, prediction.ahead)),
     }

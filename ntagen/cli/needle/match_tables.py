@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import fmean, median
 from typing import TYPE_CHECKING
 
-from ntagen.cli.terminal import echo, safe, table_console
+from ntagen.cli.terminal import echo, print_table
 from ntagen.units import deg_from_rad
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def show(scene: Scene, options: Options, found: Sequence[Matched]) -> None:
         f"radius {radius} {needle.radius_mm:g} mm"
     )
     heads = ("points", "length", "min", "avg", "max", "radius")
-    _print("trace", heads, _match_rows(found), "rolls")
+    print_table(("trace", *heads, "rolls"), _match_rows(found), heads)
     left_out = sum(one.match.trace.outliers for one in found)
     missing = sum(one.match.trace.samples.missing for one in found)
     later = sum(one.match.trace.after_pull_out for one in found)
@@ -112,23 +112,5 @@ def _show_predictions(found: Sequence[Matched]) -> None:
             texts = [f"{median(column):.2f}" if column else "-" for column in columns]
             rows.append(["median", f"{from_mm:g}", *texts])
     echo("\npredicted from the first part alone: greatest deviation in mm over the next")
-    _print("trace", ("from", *(f"{ahead_mm:g} mm" for ahead_mm in AHEAD_MM)), rows)
-
-
-def _print(
-    first: str, numbers: Sequence[str], rows: Iterable[Sequence[str]], last: str | None = None
-) -> None:
-    """Prints a table: a name, numbers, and perhaps a text."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-    table.add_column(first, overflow="fold")
-    for name in numbers:
-        table.add_column(name, justify="right", no_wrap=True)
-    if last is not None:
-        table.add_column(last, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(safe(cell)) for cell in row))
-    table_console().print(table)
+    heads = ("from", *(f"{ahead_mm:g} mm" for ahead_mm in AHEAD_MM))
+    print_table(("trace", *heads), rows, heads)

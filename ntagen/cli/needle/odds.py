@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.notes import say_idle
-from ntagen.cli.option_groups import gathered
+from ntagen.cli.options import gathered
+from ntagen.cli.terminal import say_idle
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 

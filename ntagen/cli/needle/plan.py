@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from ntagen.cli.former_options import Renamed
-from ntagen.cli.loading import include_option
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.odds import Wanted, odds_lines, odds_options, rate, with_odds
-from ntagen.cli.quantities import TIME
+from ntagen.cli.options import include_option, output_option, path_argument
+from ntagen.cli.quantities import duration
 from ntagen.cli.terminal import echo
 from ntagen.files import require_apart, write_files
 
@@ -34,7 +35,7 @@ STOPPED: Final = 3
     epilog="Exit codes: 0 a plan was found, 1 it is proved that there is none, 2 the input is "
     "rejected, 3 the budget ended before either, 4 run-time error in the model.",
 )
-@click.argument("source", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("source", metavar="ENV.nsl")
 @click.option(
     "--best",
     "count",
@@ -51,7 +52,7 @@ STOPPED: Final = 3
     metavar="TIME",
     default="2s",
     show_default=True,
-    type=TIME,
+    type=duration,
     help="The search ends after about this time. It ends sooner if no plan can be better.",
 )
 @click.option(
@@ -65,12 +66,9 @@ STOPPED: Final = 3
     "reserve,length,rolls) are ranked by how likely they reach the target.",
 )
 @odds_options
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE.json",
-    type=click.Path(path_type=Path),
-    help="Write the best plans with their certificates.",
+@output_option(
+    "FILE.json",
+    "Write the best plans with their certificates.",
 )
 @click.option(
     "--json",
@@ -116,17 +114,14 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.engine import engine_for
-    from ntagen.nsl import load_task
     from ntagen.plan.anytime import best_plans
     from ntagen.plan.rank import split_ranking
 
     if output is not None:
         require_apart({"-o": output}, {"source": source})
     by_odds, criteria = (False, None) if ranking is None else split_ranking(ranking)
-    task = load_task(source, include=include)
+    task = load_task(source, include)
     wanted = wanted.checked(task.scene, count, by_odds=by_odds)
-    for warning in task.warnings:
-        echo(warning.render(), err=True)
     settings = configure(task.given, task.scene).settings
     settings = settings if criteria is None else replace(settings, ranking=criteria)
     engine = replace(engine_for(settings), ranking=settings.ranking)

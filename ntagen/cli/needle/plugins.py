@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.notes import say_idle
-from ntagen.cli.terminal import echo
+from ntagen.cli.options import path_option
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.steppers import axes_for, described, speeds_for
 from ntagen.errors import DeviceError, InputError
 from ntagen.extensions import DEVICES, TRACKERS, find, names, package
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from ntagen.drive.device import LiveSensor, WatchedActuator
     from ntagen.drive.plugin import Speeds
+    from ntagen.drive.settings import Settings
+    from ntagen.nsl import Task
     from ntagen.testing import Check
 
 _MOST_MM: Final = 10.0
@@ -84,10 +86,9 @@ def check_plugin(text: str, *, as_json: bool) -> int:
     "test", epilog="Exit codes: 0 all checks hold, 2 the command line is wrong, 5 a check does not."
 )
 @click.argument("device", metavar="PLUGIN[:ARGUMENT]|grbl:PORT|grbl+sim|openigtlink:…")
-@click.option(
+@path_option(
     "--task",
     metavar="TASK.nsl",
-    type=click.Path(path_type=Path),
     help="The task whose speeds, and whose axes for grbl:PORT, are used.",
 )
 @click.option(
@@ -182,16 +183,22 @@ def _agree(device: str, length_mm: float, angle_deg: float, *, yes: bool) -> Non
         raise InputError("nothing was moved\nhint: agree, or give --yes")
 
 
+def for_steppers(path: Path) -> tuple[Task, Settings]:
+    """A task, and its settings for a needle that steppers move."""
+    from ntagen.drive.configure import configure
+    from ntagen.nsl import load_task
+
+    task = load_task(path)
+    return task, configure(task.given, task.scene, needle="grbl").settings
+
+
 def _speeds(task: Path | None) -> Speeds:
     """The speeds of a task, or those that are usual."""
-    from ntagen.drive.configure import configure
     from ntagen.drive.plugin import Speeds
-    from ntagen.nsl import load_task
 
     if task is None:
         return Speeds()
-    found = load_task(task)
-    settings = configure(found.given, found.scene, needle="grbl").settings
+    found, settings = for_steppers(task)
     return speeds_for(found.scene.needle, settings)
 
 
@@ -238,16 +245,12 @@ def _emulated(speeds: Speeds) -> Iterator[tuple[str, Any]]:
 
 def _axes(text: str, task: Path | None) -> Any:  # noqa: ANN401  of a type that is imported late
     """The axes that a task describes for a controller."""
-    from ntagen.drive.configure import configure
-    from ntagen.nsl import load_task
-
     if task is None:
         raise InputError(
             f"nothing says which axis of {text} does what\nhint: give --task TASK.nsl, whose "
             "`device` describes them"
         )
-    found = load_task(task)
-    settings = configure(found.given, found.scene, needle="grbl").settings
+    found, settings = for_steppers(task)
     return axes_for(described(found, task), found.scene.needle, settings)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ntagen.cli.options import path_argument
 from ntagen.cli.terminal import echo
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     epilog="Exit codes: 0 the same decisions, 1 a different one, 2 the log cannot be read, "
     "3 the engine reached a limit.",
 )
-@click.argument("log", metavar="RUN.mcap", type=click.Path(path_type=Path))
+@path_argument("log", metavar="RUN.mcap")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 def command(log: Path, as_json: bool) -> int:
     """Repeat the decisions of a logged run and compare them.

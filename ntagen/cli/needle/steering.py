@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ntagen.cli.notes import say
-from ntagen.cli.option_groups import gathered
-from ntagen.cli.rules import Decorator
+from ntagen.cli.options import Decorator, gathered
 from ntagen.cli.settings import help_option, set_option
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import aligned, echo, say
 from ntagen.parameters import BY_WORDS, MEASURES, PARAMETERS, PARTS, Given, Parameter
 
 if TYPE_CHECKING:
@@ -104,7 +102,5 @@ def say_idle_errors(needle: Chosen, given: Sequence[Given]) -> None:
 
 def show_settings(configuration: Configuration) -> None:
     """Prints all settings: words, value, origin."""
-    rows = configuration.rows()
-    widths = [max(len(row[i]) for row in rows) for i in range(2)]
-    for words, value, origin in rows:
-        echo(f"  {words:<{widths[0]}}  {value:<{widths[1]}}  {origin}")
+    for line in aligned(configuration.rows()):
+        echo(f"  {line}")

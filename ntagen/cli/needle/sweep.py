@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.loading import load_task
 from ntagen.cli.needle.campaigns import EPILOG, FORMER, How, campaign_options, ended, made
 from ntagen.cli.needle.steering import known_option, settings_options
-from ntagen.cli.terminal import echo
+from ntagen.cli.options import output_option, path_argument
 from ntagen.parameters import SEED
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     },
     epilog=EPILOG,
 )
-@click.argument("environment", metavar="ENV.nsl", type=click.Path(path_type=Path))
+@path_argument("environment", metavar="ENV.nsl")
 @click.option(
     "--over",
     metavar="SETTING",
@@ -57,13 +58,10 @@ if TYPE_CHECKING:
     "bends exactly as planned; grbl+sim is a phantom behind an emulated stepper controller.",
 )
 @known_option
-@click.option(
-    "-o",
-    "--output",
+@output_option(
+    "DIR",
+    "The folder for all results.  [default: the names of the task and the setting]",
     "folder",
-    metavar="DIR",
-    type=click.Path(path_type=Path),
-    help="The folder for all results.  [default: the names of the task and the setting]",
 )
 @campaign_options
 @settings_options(without=(SEED,))
@@ -104,12 +102,10 @@ def command(
     """  # noqa: D301  click wants the control character
     from ntagen.experiment.one_sweep import quantity_of, sweep_of_task
     from ntagen.experiment.pictures import sensitivity
-    from ntagen.nsl import load_task
     from ntagen.plot.save import save
 
     parameter = quantity_of(over)
-    for warning in load_task(environment).warnings:
-        echo(warning.render(), err=True)
+    load_task(environment)
     experiment = sweep_of_task(
         environment,
         parameter,

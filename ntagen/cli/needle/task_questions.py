@@ -10,15 +10,14 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ntagen.cli.models.evidence import Outputs, Questions
 from ntagen.cli.models.outcomes import Outcome
 from ntagen.cli.models.plan_lists import LINES, ListLimits, Written, counting, stopped, write_pages
-from ntagen.cli.models.questions import Questions
 from ntagen.cli.terminal import echo
 from ntagen.files import write_files
 
 if TYPE_CHECKING:
     from ntagen.checker import Answer, Model, Options
-    from ntagen.cli.models.outputs import Outputs
     from ntagen.cli.models.queries import Asked
     from ntagen.nsl import Task
     from ntagen.plan.against_tissue import Defence

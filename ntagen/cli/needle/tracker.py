@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -15,7 +15,7 @@ from ntagen.cli.terminal import echo
 from ntagen.errors import DeviceError, InputError
 
 if TYPE_CHECKING:
-    from ntagen.drive.device import Device, LiveSensor, Sensor
+    from ntagen.drive.device import Device, Sensor
     from ntagen.hardware import OpenIGTLinkTracker
     from ntagen.scene import Pose
     from ntagen.tracking.frames import Transform
@@ -30,28 +30,20 @@ NO_REGISTRATION: Final = "none"
 Sense = Callable[["Device"], "Sensor"]
 """Gives the sensor for a needle, whose clock it takes."""
 
-_Command = Callable[..., Any]
+tracker_option = click.option(
+    "--tracker",
+    metavar="TRACKER",
+    help="What measures the needle, if not the needle itself: "
+    "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, openigtlink+sim, or "
+    "PLUGIN:ARGUMENT. docs/tracking.md has the options.",
+)
 
-
-def tracker_options(command: _Command) -> _Command:
-    """Adds the options; the command gets them as `tracker` and `registration`."""
-    for option in (
-        click.option(
-            "--registration",
-            metavar="FILE.json|none",
-            help="Where the scene lies for the tracker: a file of `ntagen calibrate`, or none if "
-            "the scene is written in the tracker's frame.",
-        ),
-        click.option(
-            "--tracker",
-            metavar="TRACKER",
-            help="What measures the needle, if not the needle itself: "
-            "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, "
-            "openigtlink+sim, or PLUGIN:ARGUMENT. docs/tracking.md has the options.",
-        ),
-    ):
-        command = option(command)
-    return command
+registration_option = click.option(
+    "--registration",
+    metavar="FILE.json|none",
+    help="Where the scene lies for the tracker: a file of `ntagen calibrate`, or none if the scene "
+    "is written in the tracker's frame.",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,44 +172,6 @@ def opened(tracking: Tracking, entry: Pose, *, watches_force: bool) -> Iterator[
             return Plausible(sensor, entry)
 
         yield sense
-
-
-@contextlib.contextmanager
-def opened_live(
-    tracking: Tracking,
-    entry: Pose,
-    now_s: Callable[[], float],
-    *,
-    watches_force: bool,
-    force_varies: bool,
-) -> Iterator[LiveSensor]:
-    """Connects to the tracker of a real needle until the end of the block.
-
-    Args:
-        tracking: What measures the needle.
-        entry: Where the needle is at the start.
-        now_s: The clock of the actuator.
-        watches_force: Whether the driver relies on a force.
-        force_varies: Whether the force has noise (`Plausible`).
-
-    Raises:
-        InputError: The tracker cannot be used so.
-        DeviceError: It cannot be reached.
-    """
-    from ntagen.tracking import opening
-
-    if tracking.tracker is None:
-        raise AssertionError("a real needle has a tracker (`tracking_of`)")
-    with opening.opened_live(
-        tracking.text,
-        tracking.tracker,
-        tracking.transform,
-        entry,
-        now_s,
-        watches_force=watches_force,
-        force_varies=force_varies,
-    ) as sensor:
-        yield sensor
 
 
 def look_at(text: str, seconds: float, *, as_json: bool) -> int:

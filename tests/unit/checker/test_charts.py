@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 from ntagen import checker
-from ntagen.checker.charts import MOST_STEPS, moments_of, stays_of
 from ntagen.checker.picture.gantt import Stay, ticks
-from ntagen.checker.runs import Run
+from ntagen.checker.runs import MOST_STEPS, Run, moments_of, stays_of
 from ntagen.cli import main
 from ntagen.errors import InputError
 

@@ -13,11 +13,9 @@ import pytest
 from ntagen import checker, system
 from ntagen.cli import main
 from ntagen.cli.guard import Guard, resident_bytes
-from ntagen.cli.models.evidence import backed
+from ntagen.cli.models.evidence import Outputs, Questions, backed
 from ntagen.cli.models.outcomes import Outcome
-from ntagen.cli.models.outputs import Outputs
 from ntagen.cli.models.queries import Asked
-from ntagen.cli.models.questions import Questions
 from ntagen.cli.signals import Ending, Limit, LimitReached, Terminated, handled
 from ntagen.errors import LimitError
 from ntagen.files import GrowingFile, abandon, write_files

@@ -14,8 +14,8 @@ import pytest
 
 from ntagen import checker
 from ntagen.cli import main
-from ntagen.cli.models.run_progress import so_far
-from ntagen.cli.models.run_rows import bars
+from ntagen.cli.models.answer_rows import bars
+from ntagen.cli.progress import so_far
 
 MODEL = """
 clock x; int n;

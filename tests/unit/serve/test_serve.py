@@ -23,8 +23,7 @@ import pytest
 from ntagen.cli import main
 from ntagen.errors import InputError
 from ntagen.serve import jobs
-from ntagen.serve.jobs import File, Workshop, arguments_for
-from ntagen.serve.limits import Limits, Refusal
+from ntagen.serve.jobs import File, Limits, Refusal, Workshop, arguments_for
 from ntagen.serve.server import Server
 
 ROOT = Path(__file__).parents[3]

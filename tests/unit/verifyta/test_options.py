@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from ntagen.errors import InputError
-from ntagen.verifyta.options import OPTIONS, parse
+from ntagen.verifyta.options import OPTIONS, parse, statistical
 from ntagen.verifyta.output import help_text
-from ntagen.verifyta.statistical import statistical
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,7 @@ from ntagen.checker import Answer, Model
 from ntagen.checker.edges import EngineStep
 from ntagen.checker.states import Simulation
 from ntagen.verifyta.compiled import compiled_text
-from ntagen.verifyta.network import network_of
-from ntagen.verifyta.trace import trace_of
+from ntagen.verifyta.trace import network_of, trace_of
 from ntagen.verifyta.trace_xml import trace_xml_text
 from ntagen.verifyta.xtr import fewest_constraints, xtr_text
 from tests.oracles.xtr import (

@@ -1,5 +1,6 @@
-"""What `ntagen info` says of regions: shape, volume, bounds, distance to the straight way.
+"""What `ntagen info` says of a task: its regions, the precision of its model, its settings.
 
+Of regions it says shape, volume, bounds, and the distance to the straight way.
 The straight way leads from the tip to the middle of the last target. A needle bends, so a plan may
 come nearer or stay away; but what lies on the straight way is what plans must get around.
 """
@@ -10,9 +11,14 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from ntagen.cli.terminal import aligned
+from ntagen.drive.configure import configure
 from ntagen.motion import Motion
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.nearest import nearest_to
+from ntagen.nsl import Task
+from ntagen.parameters import PARAMETERS
+from ntagen.rounding import MOST_ERROR_MM, least_margin, precision_of
 from ntagen.scene import Pose, Region, Scene
 from ntagen.shapes import Field, Vector
 from ntagen.units import deg_from_rad
@@ -20,7 +26,71 @@ from ntagen.units import deg_from_rad
 _MM3_PER_CM3: Final = 1000.0
 
 
-def region_facts(scene: Scene) -> list[dict[str, object]]:
+def task_facts(task: Task) -> dict[str, object]:
+    """The entries for JSON; what is infinite is null."""
+    configuration = configure(task.given, task.scene)
+    return {
+        **_precision_facts(task.scene),
+        "spins": list(task.scene.limits.spins),
+        "settings": {
+            parameter.words: {
+                "field": parameter.field,
+                "value": configuration.value(parameter),
+                "shown": parameter.shown(configuration.value(parameter)),
+                "origin": configuration.origin(parameter),
+            }
+            for parameter in PARAMETERS
+        },
+        "regions": _region_facts(task.scene),
+    }
+
+
+def task_lines(task: Task, most: int) -> Iterator[str]:
+    """Regions, precision and devices of a task for people; at most so many regions."""
+    kinds = [region.kind for region in task.scene.regions]
+    counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
+    yield f"\nregions: {', '.join(counts)}"
+    yield from (f"  {row}" for row in _region_rows(task.scene, most))
+    yield _precision_line(task.scene)
+    if task.scene.limits.spins:
+        yield _spins_line(task.scene)
+    yield from (str(device) for device in (task.device, task.tracker) if device is not None)
+
+
+def _precision_facts(scene: Scene) -> dict[str, object]:
+    """The entries for JSON; what is infinite is null."""
+    found = precision_of(scene)
+    return {
+        "resolution_per_mm": found.per_mm,
+        "resolution_origin": "chosen" if scene.resolution_per_mm is None else "file",
+        "path_error_mm": _finite(found.path_error_mm),
+        "depth_mm": found.depth_mm,
+        "circle_error_mm": _finite(found.circle_error_mm),
+        "least_margin_mm": _finite(least_margin(scene)[0]),
+    }
+
+
+def _precision_line(scene: Scene) -> str:
+    """The line for people."""
+    found, is_chosen = precision_of(scene), scene.resolution_per_mm is None
+    origin = "written in the file"
+    if is_chosen:
+        is_fine = found.path_error_mm <= MOST_ERROR_MM
+        origin = "chosen" if is_fine else "the best one that fits into the model's integers"
+    depth = f"down to {found.depth_mm:g} mm"
+    return f"resolution: {found.per_mm} per mm, {origin}: {found.bound}, {depth}"
+
+
+def _spins_line(scene: Scene) -> str:
+    """The spins with their radii, for people."""
+    circles = (
+        f"{100.0 * spin:g} % (radius {scene.needle.radius_mm / (1.0 - spin):.4g} mm)"
+        for spin in scene.limits.spins
+    )
+    return f"the needle may spin for {', '.join(circles)} of a push"
+
+
+def _region_facts(scene: Scene) -> list[dict[str, object]]:
     """The regions for JSON; what is infinite is null. Lengths are in mm, volumes in mm^3."""
     way = _straight_way(scene)
     return [
@@ -39,7 +109,7 @@ def region_facts(scene: Scene) -> list[dict[str, object]]:
     ]
 
 
-def region_rows(scene: Scene, most: int) -> Iterator[str]:
+def _region_rows(scene: Scene, most: int) -> Iterator[str]:
     """The first regions as lines of a table with aligned columns, `most` of them at most."""
     regions = scene.regions[:most]
     way = _straight_way(scene)
@@ -55,9 +125,7 @@ def region_rows(scene: Scene, most: int) -> Iterator[str]:
         ]
         for region in regions
     ]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(f"{cell:<{w}}" for cell, w in zip(row, widths, strict=True)).rstrip()
+    yield from aligned(rows)
     for region in regions:
         if isinstance(region.shape, Field):
             yield f"{' '.join(region.name.split())}: {_exactness(region.shape)}"
