@@ -227,17 +227,11 @@ class _Builder:
         placed = self._draft.vectors.get(keyword)
         if placed is None:
             return default if keyword not in self._draft.seen else None
-        if placed.value is None:
-            return None
-        if max(map(abs, placed.value)) == 0.0:
-            self._report(
-                "direction-zero",
-                placed.span,
-                f"the {keyword} has no direction",
-                hint=f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`",
-            )
-            return None
-        return unit(placed.value)
+        hint = f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`"
+        value = placed.obeying(
+            lambda value: rules.direction(value, f"the {keyword}", hint), self._reporter
+        )
+        return None if value is None else unit(value)
 
     def _report_skew(self, heading: Vector, bevel: Vector, breach: rules.Breach) -> None:
         """Reports a bevel that is not at right angles to the heading, and proposes the nearest."""

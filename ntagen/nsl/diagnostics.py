@@ -10,7 +10,7 @@ fix it. After an error no scene is made; after a warning it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Final, Literal
 
@@ -330,6 +330,24 @@ class Reporter:
         if breach is not None:
             self.report(breach.rule, span, breach.message, hint=breach.hint)
         return breach is None
+
+    def repeated(self, span: Span, what: str, *notes: str) -> None:
+        """Reports what is written a second time, with notes about the first."""
+        message = f"`{what}` is written a second time"
+        self.report("statement-repeated", span, message, hint="remove one of the two", notes=notes)
+
+    def taken(self, span: Span, what: str, first: Span, other: str = "another name") -> None:
+        """Reports a name that is that of something before it; `other` is what to choose."""
+        note = f"the first is at {first.place}"
+        message = f"there is {what} already"
+        self.report("duplicate-name", span, message, hint=f"choose {other}", notes=(note,))
+
+    def chooses(self, text: str, span: Span, known: Sequence[str], message: str) -> bool:
+        """Whether a word is one of the known ones; if not, reports that with a message."""
+        if text not in known:
+            near = did_you_mean(text, known) or f"write {' or '.join(f'`{w}`' for w in known)}"
+            self.report("unknown-choice", span, message, hint=near)
+        return text in known
 
     def report_file(self, name: str, path: str, message: str, *, hint: str | None = None) -> None:
         """Adds a diagnostic about a file as a whole."""

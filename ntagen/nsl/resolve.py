@@ -173,13 +173,7 @@ class _Resolver:
         first = self._draft.seen.setdefault(key, statement.span)
         if first is statement.span:
             return False
-        self._reporter.report(
-            "statement-repeated",
-            statement.span,
-            f"`{statement.keyword}` is written a second time",
-            hint="remove one of the two",
-            notes=(f"the first is at {first.place}",),
-        )
+        self._reporter.repeated(statement.span, statement.keyword, f"the first is at {first.place}")
         return True
 
     # ------------------------------------------------------------------------------- composition
@@ -250,8 +244,8 @@ class _Resolver:
 
     def _loop(self, statement: tree.Loop, scope: Scope) -> None:
         """Resolves the body once for each number from the first to the last."""
-        first = self._evaluator.whole(statement.first, scope, "the first number of a loop")
-        last = self._evaluator.whole(statement.last, scope, "the last number of a loop")
+        first = self._evaluator.whole(statement.first, scope, "the first number of a loop").value
+        last = self._evaluator.whole(statement.last, scope, "the last number of a loop").value
         is_free = self._is_name_free(statement.variable, scope)
         if first is not None and last is not None and first > last:
             self._reporter.report(
