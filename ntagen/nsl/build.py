@@ -14,16 +14,14 @@ from dataclasses import replace
 from typing import Any, Final, Literal, cast
 
 from ntagen import rules
-from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
 from ntagen.motion import Breath
-from ntagen.nsl import build_devices
+from ntagen.nsl import Task, build_devices
 from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft
 from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
-from ntagen.parameters import Given
 from ntagen.rounding import (
     COARSEST_PER_MM,
     USUAL_PER_MM,
@@ -47,7 +45,6 @@ from ntagen.scene import (
 )
 from ntagen.shapes import HalfSpace
 from ntagen.units import deg_from_rad, rad_from_deg
-from ntagen.values import dataclass
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
 DEFAULT_HEADING: Final[Vector] = (0.0, -1.0, 0.0)
@@ -63,29 +60,12 @@ DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
 _ABSURD_MM: Final = 1e100
 
 
-@dataclass(frozen=True, slots=True)
-class Built:
-    """What a draft describes.
-
-    Attributes:
-        scene: The scene.
-        given: The settings of the driver, in the order written.
-        device: The device that moves the needle.
-        tracker: What measures it.
-    """
-
-    scene: Scene
-    given: tuple[Given, ...] = ()
-    device: GrblDevice | None = None
-    tracker: OpenIGTLinkTracker | None = None
-
-
-def build(draft: Draft, reporter: Reporter) -> Built | None:
+def build(draft: Draft, reporter: Reporter) -> Task | None:
     """What the draft describes, or None after an error, which is reported."""
     device = build_devices.grbl_device(draft, reporter)
     tracker = build_devices.tracker(draft, reporter)
     scene = _Builder(draft, reporter).scene()
-    return None if scene is None else Built(scene, tuple(draft.given), device, tracker)
+    return None if scene is None else Task(scene, tuple(draft.given), device, tracker)
 
 
 _TISSUE_RULES: Final[dict[str, tuple[str, Callable[[float], rules.Breach | None]]]] = {

@@ -21,7 +21,7 @@ from ntagen.nsl.driving import CHOICES, DriverResolver
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Definition, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import Quantity, is_unit, scalar
-from ntagen.nsl.reading import is_below, read_source
+from ntagen.nsl.reading import located, read_source
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
 from ntagen.parameters import BY_WORDS
@@ -196,15 +196,10 @@ class _Resolver:
     def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
         """Resolves the statements of another file as if they stood here; a file counts once."""
         span = statement.path.span
-        source_path = span.source.path
-        path = os.path.join(os.path.dirname(source_path), statement.path.text)
-        try:
-            key = os.path.realpath(path)
-        except ValueError as error:
-            # No file can have such a name, but a text that is not from a file may contain it.
-            reason = str(error)
-            self._reporter.report("file-unreadable", span, f"cannot include `{path}`: {reason}")
+        found = located(statement.path.text, span, self._folders, self._reporter, "include")
+        if found is None:
             return
+        path, key = found
         if key in self._open_files:
             chain = [os.path.basename(p) for p in self._open_files[self._open_files.index(key) :]]
             self._reporter.report(
@@ -220,14 +215,6 @@ class _Resolver:
         if len(self._open_files) > MAX_DEPTH:
             self._reporter.report(
                 "nesting-too-deep", span, f"includes are nested deeper than {MAX_DEPTH}"
-            )
-            return
-        if not any(is_below(key, folder) for folder in self._folders):
-            self._reporter.report(
-                "include-outside",
-                span,
-                f"`{path}` is not below the folder of the first file",
-                hint=f"allow it with `--include {os.path.dirname(key)}`",
             )
             return
         self._included.add(key)
