@@ -22,7 +22,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import spun
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
-from ntagen.needle.answering import Answers, Between, Corners, Drawn, Given
+from ntagen.needle.answering import Answers, between, corners, drawn, given
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -92,18 +92,13 @@ def answering(errors: Errors, scene: Scene, kind: str, tree: Segment | None = No
             "hint: use --tissue corners"
         )
 
+    picked = {"corners": corners, "between": between, "drawn": drawn}
+
     def answers(seed: int) -> Answers:
-        match kind:
-            case "corners":
-                return Corners(scene.tissue, seed)
-            case "between":
-                return Between(scene.tissue, seed)
-            case "drawn":
-                return Drawn(scene.tissue, seed)
-            case "worst" if tree is not None:
-                way = worst_path(tree, scene)
-                return Given([(one.branch.factor, one.branch.roll_error_rad) for one in way])
-        return Given()
+        if kind in picked:
+            return picked[kind](scene.tissue, seed)
+        way = worst_path(tree, scene) if kind == "worst" and tree is not None else ()
+        return given((one.branch.factor, one.branch.roll_error_rad) for one in way)
 
     return lambda needle, obstacles, seed: VirtualNeedle(
         needle,
