@@ -22,6 +22,7 @@ from ntagen.drive import records
 from ntagen.drive.records import Record
 
 PACKAGE: Final = "ntagen"
+_FILE: Final = "ntagen/records.proto"
 SEQUENCE: Final = "sequence"
 """The field with a record's position in the run, from 0: it gives the order if times are equal."""
 
@@ -83,7 +84,7 @@ _LENGTHS: Final = {kind: _lengths(kind) for kind in KINDS}
 
 def message_class(kind: type[Record]) -> type[Message]:
     """The protobuf class for a kind of record."""
-    return _classes()[kind.__name__]
+    return _classes()[f"{PACKAGE}.{kind.__name__}"]
 
 
 def encode(record: Record, sequence: int) -> bytes:
@@ -125,21 +126,12 @@ def decode(name: str, data: bytes) -> tuple[int, Record]:
 
 @cache
 def _classes() -> dict[str, type[Message]]:
-    """The protobuf classes by the names of the kinds."""
-    pool = _pool()
-    descriptors = {
-        kind.__name__: pool.FindMessageTypeByName(f"{PACKAGE}.{kind.__name__}") for kind in KINDS
-    }
-    return {
-        name: message_factory.GetMessageClass(descriptor)
-        for name, descriptor in descriptors.items()
-    }
+    """The protobuf classes by the names of their types."""
+    return message_factory.GetMessageClassesForFiles([_FILE], _pool())
 
 
 def _pool() -> descriptor_pool.DescriptorPool:
-    file = descriptor_pb2.FileDescriptorProto(
-        name="ntagen/records.proto", package=PACKAGE, syntax="proto3"
-    )
+    file = descriptor_pb2.FileDescriptorProto(name=_FILE, package=PACKAGE, syntax="proto3")
     for kind in KINDS:
         message = file.message_type.add(name=kind.__name__)
         message.field.add(

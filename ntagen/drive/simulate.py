@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Actuator, Assembly, Device, Sensor, Waiting
-from ntagen.drive.engine import engine_for
+from ntagen.drive.device import Assembly, Device, Sensor, Waiting
 from ntagen.drive.following import Course
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
-from ntagen.drive.settings import Settings
-from ntagen.drive.spinning import spun
-from ntagen.drive.torsion import Compensated, Lag
+from ntagen.drive.settings import Settings, engine_for
+from ntagen.drive.spinning import steered
 from ntagen.errors import InputError
 from ntagen.needle.answering import Answers, between, corners, drawn, given
 from ntagen.needle.kinematics import Arc
@@ -177,10 +175,7 @@ def simulate(
             "hint: use --needle virtual or --needle phantom"
         )
     sensor = needle if sense is None else sense(needle)
-    actuator: Actuator = needle
-    if settings.compensated_lag_rad > 0.0:
-        actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
-    device = Assembly(spun(actuator, scene), sensor)
+    device = Assembly(steered(needle, scene, settings.compensated_lag_rad), sensor)
     witness = Witness(needle, journal)
     counter = SynthesisCounter()
     controller = Controller(

@@ -184,10 +184,7 @@ def places_on(arcs: Sequence[Arc], owners: NDArray[np.intp], along: _Array) -> _
     """The places at some lengths along their arcs, as in `ntagen.needle.kinematics.push`."""
     import numpy as np
 
-    starts = np.array([arc.start.position_mm for arc in arcs])[owners]
-    headings = np.array([arc.start.heading for arc in arcs])[owners]
-    bevels = np.array([arc.start.bevel for arc in arcs])[owners]
-    half_turns = 0.5 * along / np.array([arc.radius_mm for arc in arcs])[owners]
-    chords = along * np.sinc(half_turns / math.pi)
-    ahead, aside = chords * np.cos(half_turns), chords * np.sin(half_turns)
-    return np.asarray(starts + ahead[:, None] * headings - aside[:, None] * bevels)
+    from ntagen.needle.poses import Poses
+
+    radii = np.array([arc.radius_mm for arc in arcs])[owners]
+    return Poses.of(arc.start for arc in arcs).at(owners).places(radii, along)
