@@ -153,26 +153,21 @@ class Regions:
         if draft.solid is not None:
             shape = self._solids.shape(draft, draft.solid)
             return None if shape is None else Region(draft.name, draft.kind, shape)
-        radius = draft.radius.obeying(
-            lambda value: rules.positive(value, f"the radius of `{draft.name}`"), self._reporter
-        )
+        role = f"the radius of `{draft.name}`"
+        radius = draft.radius.obeying(self._reporter, rules.positive, role)
         if radius is None or draft.center is None or draft.center.value is None:
             return None
         return Region.ball(draft.name, draft.kind, draft.center.value, radius)
 
     def _around(self, draft: DraftRegion) -> Region | None:
         """A detection region around a critical one."""
-        margin = draft.margin.value
-        if margin is not None and not self._reporter.obeys(
-            rules.not_negative(margin, f"the margin of `{draft.name}`", "margin-negative"),
-            draft.margin.span,
-        ):
-            margin = None
-        elif margin == 0.0:
+        role = f"the margin of `{draft.name}`"
+        margin = draft.margin.obeying(self._reporter, rules.not_negative, role, "margin-negative")
+        if margin == 0.0:
             self._report(
                 "margin-zero",
                 draft.margin.span,
-                f"the margin of `{draft.name}` is 0: nearness is never noticed before contact",
+                f"{role} is 0: nearness is never noticed before contact",
                 hint="write for example `margin 3 mm`",
             )
         inner = self._critical_inside(draft)
@@ -180,13 +175,9 @@ class Regions:
         if region is None or margin is None:
             return None
         shape = region.shape.grown(margin)
-        if not self._reporter.obeys(
-            rules.finite(
-                [number for _, numbers, _ in shape.parts() for number in numbers],
-                f"the radius of `{draft.name}`",
-            ),
-            draft.margin.span,
-        ):
+        numbers = [number for _, numbers, _ in shape.parts() for number in numbers]
+        breach = rules.finite(numbers, f"the radius of `{draft.name}`")
+        if not self._reporter.obeys(breach, draft.margin.span):
             return None
         # A shell moves with what it lies around.
         motion = region.motion if draft.moves is None else self._motions.motion(draft)

@@ -13,7 +13,7 @@ from ntagen import rules
 from ntagen.motion import Breath, Gate, Motion
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter
-from ntagen.nsl.draft import Draft, DraftMoves, DraftRegion, Placed
+from ntagen.nsl.draft import Draft, DraftMoves, DraftRegion, Placed, kept
 from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, TIME
 from ntagen.nsl.source import Span
@@ -178,14 +178,13 @@ class MotionBuilder:
         phase_rad = 0.0 if moves.phase is None else moves.phase.value
         if way is None or towards is None or phase_rad is None:
             return None
-        if way.value is None or towards.value is None:
+        if way.value is None:
             return None
-        breach = rules.direction(
-            towards.value, f"the way of `{draft.name}`", "write for example `along +z`"
-        )
-        if not self.reporter.obeys(breach, towards.span):
+        what, hint = f"the way of `{draft.name}`", "write for example `along +z`"
+        direction = towards.obeying(self.reporter, rules.direction, what, hint)
+        if direction is None:
             return None
-        return Motion(period_s, times(way.value, unit(towards.value)), phase_rad % _TURN_RAD)
+        return Motion(period_s, times(way.value, unit(direction)), phase_rad % _TURN_RAD)
 
     def _is_that_of_others(self, name: str, period_s: float, span: Span) -> bool:
         if self.period_s is None or self.period_span is None:
@@ -259,19 +258,10 @@ class MotionBuilder:
                     hint="add for example `moves 12 mm along +z every 4 s` to a region",
                 )
             return None
-        wait_s = limits.step_s if draft.wait is None else draft.wait.value
-        pauses = DEFAULT_PAUSES if draft.max_pauses is None else draft.max_pauses.value
-        if wait_s is None or pauses is None:
-            return None
-        if draft.wait is not None and not self.reporter.obeys(
-            rules.positive(wait_s, "a wait", "wait-wrong"), draft.wait.span
-        ):
-            return None
-        if draft.max_pauses is not None and not self.reporter.obeys(
-            rules.pause_count(pauses), draft.max_pauses.span
-        ):
-            return None
-        if not self._has_common_time(wait_s, limits):
+        reporter, role = self.reporter, "a wait"
+        wait_s = kept(draft.wait, limits.step_s, reporter, rules.positive, role, "wait-wrong")
+        pauses = kept(draft.max_pauses, DEFAULT_PAUSES, reporter, rules.pause_count)
+        if wait_s is None or pauses is None or not self._has_common_time(wait_s, limits):
             return None
         breath = Breath(self.period_s, wait_s, pauses, self._gate())
         return breath if self._opens(breath, limits) else None

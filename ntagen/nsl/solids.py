@@ -100,10 +100,8 @@ class SolidBuilder:
                 return self._halfspace(draft, solid, first)
 
     def _is_positive(self, draft: DraftRegion, placed: Placed[float], role: str) -> bool:
-        value = 0.0 if placed.value is None else placed.value
-        return self._reporter.obeys(
-            rules.positive(value, f"the {role} of `{draft.name}`"), placed.span
-        )
+        what = f"the {role} of `{draft.name}`"
+        return placed.obeying(self._reporter, rules.positive, what) is not None
 
     def _axes(self, draft: DraftRegion, solid: DraftSolid, role: str) -> Axes | None:
         """The axes of a box or an ellipsoid, whose extents are checked, too."""
@@ -122,7 +120,7 @@ class SolidBuilder:
     def _direction(self, draft: DraftRegion, placed: Placed[Vector], role: str) -> Vector | None:
         """A direction of length 1."""
         what, hint = f"the {role} of `{draft.name}`", "write for example `-y` or `(0, -1, 0)`"
-        value = placed.obeying(lambda value: rules.direction(value, what, hint), self._reporter)
+        value = placed.obeying(self._reporter, rules.direction, what, hint)
         return None if value is None else unit(value)
 
     def _cylinder(
