@@ -90,6 +90,11 @@ class Region:
             raise TypeError(f"`{self.name}` is no sphere, so it has no radius")
         return self.shape.radius_mm
 
+    @property
+    def moved_mm(self) -> float:
+        """How far it moves from its place at rest; 0 if it keeps still."""
+        return 0.0 if self.motion is None else self.motion.reach_mm
+
     def distance_mm(self, point_mm: Vector) -> float:
         """The signed distance of a point to the surface; negative inside."""
         return self.shape.distance_at_mm(point_mm)

@@ -26,28 +26,12 @@ _FILE: Final = "ntagen/records.proto"
 SEQUENCE: Final = "sequence"
 """The field with a record's position in the run, from 0: it gives the order if times are equal."""
 
-KINDS: Final[tuple[type[Record], ...]] = (
-    records.Transition,
-    records.Command,
-    records.Measured,
-    records.Predicted,
-    records.Estimated,
-    records.Synthesised,
-    records.Timed,
-    records.Learned,
-    records.Visited,
-    records.Ended,
-    records.Truth,
-    records.Relied,
-    records.Forgotten,
-    records.CutShort,
-    records.Breathed,
-    records.Followed,
-    records.Guaranteed,
-    records.Foreseen,
-    records.Promised,
+KINDS: Final[tuple[type[Record], ...]] = tuple(
+    one
+    for one in vars(records).values()
+    if isinstance(one, type) and issubclass(one, Record) and one is not Record
 )
-"""All kinds of records, in the order of the file of descriptors."""
+"""All kinds of records, in the order of the file of descriptors, which is that of their module."""
 
 _FIELDS: Final = {kind: tuple(f.name for f in dataclasses.fields(kind)) for kind in KINDS}
 _SOMETIMES: Final = frozenset({"heading", "bevel"})

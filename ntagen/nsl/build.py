@@ -26,6 +26,7 @@ from ntagen.rounding import (
     COARSEST_PER_MM,
     USUAL_PER_MM,
     chosen,
+    farthest_mm,
     least_margin,
     precision_of,
     units_per_mm,
@@ -43,7 +44,6 @@ from ntagen.scene import (
     Tissue,
     Vector,
 )
-from ntagen.shapes import HalfSpace
 from ntagen.units import deg_from_rad, rad_from_deg
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
@@ -439,14 +439,8 @@ class _Builder:
             )
         start = DEFAULT_TIP_MM if tip is None else tip.position_mm
         for sphere in spheres:
-            region = sphere.region
-            # The model also contains the distance from the tip to the centre.
-            reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
-            # A half-space has no end; only its point is in the model.
-            extent = 0.0 if isinstance(region.shape, HalfSpace) else region.shape.reach_mm()
-            if region.motion is not None:
-                extent += region.motion.reach_mm
-            yield f"`{region.name}`", reach + extent, sphere.place
+            length_mm = farthest_mm(sphere.region, start)
+            yield f"`{sphere.region.name}`", length_mm, sphere.place
 
 
 def _units_per_mm(scene: Scene | None, written: int | None) -> int:

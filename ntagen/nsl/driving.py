@@ -10,33 +10,15 @@ from ntagen.nsl.diagnostics import Reporter, SourceError, did_you_mean
 from ntagen.nsl.draft import Draft, DraftDevice, Placed
 from ntagen.nsl.evaluate import CONSTANTS, Evaluator, Scope
 from ntagen.nsl.parser import parse
-from ntagen.nsl.quantity import (
-    ANGLE,
-    DATA,
-    FORCE,
-    FORCE_PER_LENGTH,
-    LENGTH,
-    NUMBER,
-    STEPS_PER_ANGLE,
-    STEPS_PER_LENGTH,
-    TIME,
-    TURNING,
-    Dimension,
-)
+from ntagen.nsl.quantity import NUMBER, STEPS_PER_ANGLE, STEPS_PER_LENGTH, Dimension, quotient
 from ntagen.nsl.source import Source
 from ntagen.parameters import BY_WORDS, MEASURES, Given, Kind, Parameter, Value
 from ntagen.units import RAD_PER
 
 _DIMENSIONS: Final[dict[Kind, Dimension]] = {
-    "length": LENGTH,
-    "angle": ANGLE,
-    "time": TIME,
-    "force": FORCE,
-    "force per length": FORCE_PER_LENGTH,
-    "angle per time": TURNING,
-    "data": DATA,
-    "ratio": NUMBER,
-    "percentage": NUMBER,
+    kind: quotient(tuple(measure.unit.split("/")))[1] if measure.unit else NUMBER
+    for kind, measure in MEASURES.items()
+    if measure.units and kind != "count"
 }
 
 CHOICES: Final = {

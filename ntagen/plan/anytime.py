@@ -79,8 +79,7 @@ def _least_length_mm(scene: Scene) -> float:
     """The straight way to the ball around the last target."""
     last = scene.targets[-1]
     away_mm = distance(scene.needle.tip.position_mm, last.center_mm)
-    moved_mm = 0.0 if last.motion is None else last.motion.reach_mm
-    return max(0.0, away_mm - last.shape.reach_mm() - moved_mm)
+    return max(0.0, away_mm - last.shape.reach_mm() - last.moved_mm)
 
 
 QUESTIONS: Final = {
