@@ -11,6 +11,7 @@ fix it. After an error no scene is made; after a warning it is.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Literal
 
@@ -266,6 +267,14 @@ class SourceError(InputError):
         super().__init__("\n".join(diagnostic.render() for diagnostic in self.diagnostics))
 
 
+def _of_file(
+    name: str, path: str, message: str, hint: str | None = None, notes: tuple[str, ...] = ()
+) -> Diagnostic:
+    """A diagnostic of the kind `name` about a file as a whole."""
+    kind = KINDS[name]
+    return Diagnostic(kind.code, kind.severity, path, 0, 0, 1, message, "", notes, hint)
+
+
 class Reporter:
     """Collects diagnostics; reports a mistake at a place once, even if a loop repeats it."""
 
@@ -283,23 +292,12 @@ class Reporter:
         notes: tuple[str, ...] = (),
     ) -> None:
         """Adds a diagnostic of the kind `name` at a place."""
-        kind, source = KINDS[name], span.source
+        source = span.source
         line, column = source.position(span.start)
         source_line = source.line(line)
         length = max(1, min(span.end - span.start, len(source_line) - column + 1))
-        diagnostic = Diagnostic(
-            kind.code,
-            kind.severity,
-            source.path,
-            line,
-            column,
-            length,
-            message,
-            source_line,
-            notes,
-            hint,
-        )
-        self._add(diagnostic)
+        whole = _of_file(name, source.path, message, hint, notes)
+        self._add(replace(whole, line=line, column=column, length=length, source_line=source_line))
 
     def obeys(self, breach: Breach | None, span: Span) -> bool:
         """Whether a value at a place obeys a rule; if not, reports it."""
@@ -327,8 +325,7 @@ class Reporter:
 
     def report_file(self, name: str, path: str, message: str, *, hint: str | None = None) -> None:
         """Adds a diagnostic about a file as a whole."""
-        kind = KINDS[name]
-        self._add(Diagnostic(kind.code, kind.severity, path, 0, 0, 1, message, "", (), hint))
+        self._add(_of_file(name, path, message, hint))
 
     def enter(self, path: str) -> None:
         """Adds a file to the order in which files are reported."""
@@ -338,9 +335,8 @@ class Reporter:
         """Adds a diagnostic, unless the same kind has been reported at the same place."""
         order = self._file_order.setdefault(diagnostic.path, len(self._file_order))
         if len(self._found) == MAX_DIAGNOSTICS:
-            kind = KINDS["too-many-mistakes"]
             message = f"there are more than {MAX_DIAGNOSTICS:,} mistakes; these are the first ones"
-            diagnostic = Diagnostic(kind.code, kind.severity, diagnostic.path, 0, 0, 1, message, "")
+            diagnostic = _of_file("too-many-mistakes", diagnostic.path, message)
         elif len(self._found) > MAX_DIAGNOSTICS:
             return
         key = (diagnostic.code, diagnostic.path, diagnostic.line, diagnostic.column)
