@@ -45,23 +45,20 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Answer": "ntagen.checker",
-    "InputError": "ntagen.errors",
-    "Model": "ntagen.checker",
-    "ModelError": "ntagen.errors",
-    "NtagenError": "ntagen.errors",
-    "RejectedError": "ntagen.checker",
-    "Strategy": "ntagen.checker.strategy",
-    "Task": "ntagen.nsl",
-    "UndecidedError": "ntagen.errors",
-    "animate": "ntagen.plot.face",
-    "build": "ntagen.build",
-    "campaign": "ntagen.experiment.scripting",
-    "load": "ntagen.loading",
-    "load_strategy": "ntagen.loading",
-    "match": "ntagen.traces.face",
-    "read_log": "ntagen.drive.reading",
-    "view": "ntagen.plot.face",
+    name: home
+    for home, names in {
+        "ntagen.build": ("build",),
+        "ntagen.checker": ("Answer", "Model", "RejectedError"),
+        "ntagen.checker.strategy": ("Strategy",),
+        "ntagen.drive.reading": ("read_log",),
+        "ntagen.errors": ("InputError", "ModelError", "NtagenError", "UndecidedError"),
+        "ntagen.experiment.scripting": ("campaign",),
+        "ntagen.loading": ("load", "load_strategy"),
+        "ntagen.nsl": ("Task",),
+        "ntagen.plot.face": ("animate", "view"),
+        "ntagen.traces.face": ("match",),
+    }.items()
+    for name in names
 }
 """The modules of the public names. A name is imported on first use: the command line imports this
 package for every command, and `ntagen --help` must not wait for the engine."""

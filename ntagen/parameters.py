@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from ntagen.rules import Breach
 from ntagen.units import BYTES_PER, MM_PER, N_PER, N_PER_MM, RAD_PER, RAD_PER_S, S_PER
@@ -243,321 +243,247 @@ PARTS: Final = {
 }
 """The parts of the settings, with their headings in a list."""
 
+_KINDS: Final[dict[str, Kind]] = {
+    "_n_per_mm": "force per length",
+    "_rad_per_s": "angle per time",
+    "_mm": "length",
+    "_rad": "angle",
+    "_n": "force",
+    "_s": "time",
+    "_bytes": "data",
+    "_ratio": "ratio",
+}
+"""The kinds of values by the unit at the end of a field; the longer ones come first."""
+
+
+def _setting(
+    field: str,
+    meaning: str,
+    least: float = 0.0,
+    *,
+    words: str = "",
+    kind: Kind | None = None,
+    **rest: Any,  # noqa: ANN401  the other fields of `Parameter`
+) -> Parameter:
+    """A setting: its kind follows from the unit in its field, and its words from the rest of it."""
+    part, _, name = field.rpartition(".")
+    unit = next((unit for unit in _KINDS if name.endswith(unit)), "")
+    stem = name.removesuffix(unit).replace("_", " ")
+    kind = kind or _KINDS[unit]
+    words = words or (f"prior {stem}" if part == "priors" else stem)
+    if kind == "switch":
+        rest["choices"] = ("on", "off")
+    return Parameter(field, words, kind, meaning, least, **rest)
+
+
 PARAMETERS: Final = (
-    Parameter("pull_mm", "pull", "length", "How far the needle is pulled back to readjust."),
-    Parameter(
-        "push_mm", "push", "length", "The push before the next estimate; less than the pull."
-    ),
-    Parameter("initial_push_mm", "initial push", "length", "The length of the first push."),
-    Parameter("spacing_mm", "spacing", "length", "A push is made in pieces of this length.", 0.01),
-    Parameter(
+    _setting("pull_mm", "How far the needle is pulled back to readjust."),
+    _setting("push_mm", "The push before the next estimate; less than the pull."),
+    _setting("initial_push_mm", "The length of the first push."),
+    _setting("spacing_mm", "A push is made in pieces of this length.", 0.01),
+    _setting(
         "review_mm",
-        "review",
-        "length",
         "After this much insertion, the rest of the plan is certified again for the newest "
         "estimate.",
         1e-3,
     ),
-    Parameter(
-        "deviation_mm",
-        "deviation",
-        "length",
-        "How far the tip may be off the plan, in the mean of the last measurements.",
+    _setting(
+        "deviation_mm", "How far the tip may be off the plan, in the mean of the last measurements."
     ),
-    Parameter(
-        "deviation_count",
-        "deviation count",
-        "count",
-        "The least number of measurements whose mean counts.",
-        1,
+    _setting(
+        "deviation_count", "The least number of measurements whose mean counts.", 1, kind="count"
     ),
-    Parameter("force_n", "force", "force", "The rise of the force that is an alarm.", 1e-6),
-    Parameter(
+    _setting("force_n", "The rise of the force that is an alarm.", 1e-6),
+    _setting(
         "halt_force_n",
-        "halt force",
-        "force",
         "While the needle moves, the force may be this much more than expected.",
         1e-6,
     ),
-    Parameter(
-        "force_noise_n",
-        "force noise",
-        "force",
-        "The standard deviation of a measured force.",
+    _setting("force_noise_n", "The standard deviation of a measured force."),
+    _setting(
+        "force_rise_n_per_mm", "The least rise of the force on the way towards a region.", 1e-6
     ),
-    Parameter(
-        "force_rise_n_per_mm",
-        "force rise",
-        "force per length",
-        "The least rise of the force on the way towards a region.",
-        1e-6,
-    ),
-    Parameter(
+    _setting(
         "felt_clearance_mm",
-        "felt clearance",
-        "length",
         "A needle that feels a region goes on while the force says that it is farther away.",
     ),
-    Parameter(
+    _setting(
         "false_alarm",
-        "false alarm",
-        "ratio",
         "The probability that noise alone stops a run, for force and deviation each.",
         1e-9,
+        kind="ratio",
     ),
-    Parameter(
-        "overrun_mm",
-        "overrun",
-        "length",
-        "How far the needle moves on after it was told to stop.",
-    ),
-    Parameter(
+    _setting("overrun_mm", "How far the needle moves on after it was told to stop."),
+    _setting(
         "force_sensing",
-        "force sensing",
-        "switch",
         "Whether the force is watched. If it is off, plans keep more clearance.",
-        choices=("on", "off"),
+        kind="switch",
     ),
-    Parameter(
-        "margins.clearance_mm",
-        "clearance",
-        "length",
-        "A plan stays farther than this from critical regions.",
-    ),
-    Parameter(
+    _setting("margins.clearance_mm", "A plan stays farther than this from critical regions."),
+    _setting(
         "margins.detection_mm",
-        "detection clearance",
-        "length",
         "A plan stays farther than this from detection regions.",
+        words="detection clearance",
     ),
-    Parameter(
+    _setting(
         "margins.depth_mm",
-        "depth in target",
-        "length",
         "A plan ends at least this deep in the last target.",
+        words="depth in target",
     ),
-    Parameter(
-        "sensing_margin_mm",
-        "sensing margin",
-        "length",
-        "The distance from an unknown region at which the force rises.",
-    ),
-    Parameter(
-        "learned_radius_mm",
-        "learned radius",
-        "length",
-        "The radius of a critical region that is learned.",
-        0.01,
-    ),
-    Parameter(
+    _setting("sensing_margin_mm", "The distance from an unknown region at which the force rises."),
+    _setting("learned_radius_mm", "The radius of a critical region that is learned.", 0.01),
+    _setting(
         "priors.position_mm",
-        "prior position",
-        "length",
         "Assumed standard deviation of each coordinate of the entry point.",
         is_above=True,
     ),
-    Parameter(
+    _setting(
         "priors.heading_rad",
-        "prior heading",
-        "angle",
         "Assumed standard deviation of the heading at the entry.",
         is_above=True,
     ),
-    Parameter(
+    _setting(
         "priors.bevel_rad",
-        "prior bevel",
-        "angle",
         "Assumed standard deviation of the bevel's angle at the entry.",
         is_above=True,
     ),
-    Parameter(
+    _setting(
         "priors.curvature_ratio",
-        "prior curvature",
-        "ratio",
         "Assumed standard deviation of the curvature, relative to the expected one.",
         is_above=True,
     ),
-    Parameter(
-        "priors.roll_rad",
-        "prior roll",
-        "angle",
-        "Assumed standard deviation of the error of each roll.",
-        is_above=True,
+    _setting(
+        "priors.roll_rad", "Assumed standard deviation of the error of each roll.", is_above=True
     ),
-    Parameter(
-        "priors.noise_mm",
-        "prior noise",
-        "length",
-        "Assumed standard deviation of each measured coordinate.",
-        is_above=True,
+    _setting(
+        "priors.noise_mm", "Assumed standard deviation of each measured coordinate.", is_above=True
     ),
-    Parameter(
-        "priors.direction_rad",
-        "prior direction",
-        "angle",
-        "Assumed standard deviation of a measured direction.",
-        is_above=True,
+    _setting(
+        "priors.direction_rad", "Assumed standard deviation of a measured direction.", is_above=True
     ),
-    Parameter(
+    _setting(
         "priors.curvature_drift",
-        "prior curvature drift",
-        "ratio",
         "Assumed change of the curvature over 10 mm, as a ratio; 0 if it stays the same.",
+        kind="ratio",
     ),
-    Parameter(
-        "priors.turn_drift_rad",
-        "prior turn drift",
-        "angle",
-        "Assumed turn of the bend plane over 10 mm without a roll.",
-    ),
-    Parameter(
+    _setting("priors.turn_drift_rad", "Assumed turn of the bend plane over 10 mm without a roll."),
+    _setting(
         "priors.lag_rad",
-        "prior lag",
-        "angle",
         "Assumed further error of each roll at a depth of 100 mm, as friction holds the shaft.",
     ),
-    Parameter(
+    _setting(
         "priors.distortion_mm",
-        "prior distortion",
-        "length",
         "Assumed further error of each measured coordinate, about the same over 10 mm of a path.",
     ),
-    Parameter(
+    _setting(
         "priors.first_ratio",
-        "prior first curvature",
-        "ratio",
         "By how much more the needle bends on its first 10 mm, as a ratio.",
+        words="prior first curvature",
     ),
-    Parameter(
+    _setting(
         "priors.bite_mm",
-        "prior bite",
-        "length",
         "Length that seems straight at the beginning of a channel that leaves another one.",
     ),
-    Parameter(
+    _setting(
         "compensated_lag_rad",
-        "lag compensation",
-        "angle",
         "The tip's lag at a depth of 100 mm, by which rolls go too far and come back; 0 for none.",
+        words="lag compensation",
     ),
-    Parameter(
+    _setting(
         "ranking",
-        "ranking",
-        "words",
         "How plans are ranked, the most important criterion first: clearance, reserve, rolls, "
         "length, target.",
+        kind="words",
         choices=("clearance", "reserve", "rolls", "length", "target"),
     ),
-    Parameter(
+    _setting(
         "pull_speed_ratio",
-        "pull speed ratio",
-        "ratio",
         "Pulling is faster than insertion by this factor.",
         0.01,
+        words="pull speed ratio",
     ),
-    Parameter(
+    _setting(
         "roll_rad_per_s",
-        "roll speed",
-        "angle per time",
         "The speed of rolls, to know how long a plan takes.",
         1e-3,
+        words="roll speed",
     ),
-    Parameter("max_plans", "max plans", "count", "A synthesis lists at most this many plans.", 1),
-    Parameter(
-        "engine_time_s",
-        "engine time",
-        "time",
-        "A synthesis ends the run if the engine takes longer.",
-        is_above=True,
+    _setting("max_plans", "A synthesis lists at most this many plans.", 1, kind="count"),
+    _setting(
+        "engine_time_s", "A synthesis ends the run if the engine takes longer.", is_above=True
     ),
-    Parameter(
-        "engine_memory_bytes",
-        "engine memory",
-        "data",
-        "A synthesis ends the run if the engine's states take more.",
-        1.0,
+    _setting(
+        "engine_memory_bytes", "A synthesis ends the run if the engine's states take more.", 1.0
     ),
-    Parameter(
+    _setting(
         "guarantee",
-        "guarantee",
-        "switch",
         "Whether a strategy is followed as soon as one wins against all that the estimate leaves "
         "open.",
-        choices=("on", "off"),
+        kind="switch",
     ),
-    Parameter(
+    _setting(
         "accept",
-        "accept",
-        "ratio",
         "The least confidence with which a push stays clear of critical regions until it is looked "
         "at, and the tip is in the target.",
+        kind="ratio",
         is_above=True,
         most=1.0,
         sample="0.98",
     ),
-    Parameter(
+    _setting(
         "timeout_s",
-        "time limit",
-        "time",
         "Stop the run after this time on the needle's clock; if it is not given, after three "
         "straight insertions to the last target, but not before 120 s.",
+        words="time limit",
         is_above=True,
         option="--timeout",
     ),
-    Parameter(
+    _setting(
         "needle.noise_mm",
-        "noise",
-        "length",
         "Simulated needle: standard deviation of each measured coordinate.",
         option="--noise",
     ),
-    Parameter(
+    _setting(
         "needle.roll_rad",
-        "roll error",
-        "angle",
         "Virtual needle: standard deviation of the angle of each roll.",
+        words="roll error",
     ),
-    Parameter(
+    _setting(
         "needle.radius_mm",
-        "true radius",
-        "length",
         "Simulated needle: the true radius of the motion circle, if the scene's is wrong.",
+        words="true radius",
         is_above=True,
     ),
-    Parameter(
+    _setting(
         "needle.radius_ratio",
-        "radius error",
-        "percentage",
         "Simulated needle: by how much its true radius is greater than the scene's.",
         -1.0,
+        words="radius error",
+        kind="percentage",
         is_above=True,
     ),
-    Parameter(
+    _setting(
         "needle.bevel_rad",
-        "true bevel",
-        "angle",
         "Simulated needle: by which angle about the heading the true bevel differs from the "
         "scene's.",
         -math.pi,
+        words="true bevel",
     ),
-    Parameter(
+    _setting(
         "needle.lag_rad",
-        "roll lag",
-        "angle",
         "Phantom needle: the true lag of its tip at a depth of 100 mm, as friction holds the "
         "shaft; rolls make up for `lag compensation` only.",
+        words="roll lag",
     ),
-    Parameter(
+    _setting(
         "needle.latency_s",
-        "delay",
-        "time",
         "Phantom needle: a measurement shows position and force as they were this long ago.",
+        words="delay",
     ),
-    Parameter(
+    _setting(
         "needle.seed",
-        "seed",
-        "count",
         "Simulated needle: for all that is random in it; the same seed gives the same errors.",
+        kind="count",
         option="--seed",
     ),
 )

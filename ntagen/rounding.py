@@ -137,18 +137,21 @@ def _largest_mm(scene: Scene) -> float:
         needle.length_mm,
         needle.speed_mm_per_s * limits.step_s,
         limits.min_roll_distance_mm,
-        *(
-            max(math.dist(start, r.center_mm), math.hypot(*r.center_mm)) + _extent_mm(r)
-            for r in scene.regions
-        ),
+        *(farthest_mm(region, start) for region in scene.regions),
     )
     return largest + scene.tissue.tip_mm
+
+
+def farthest_mm(region: Region, start_mm: Vector) -> float:
+    """The greatest length of a region in the model, in mm: from its origin, or from the start."""
+    center_mm = region.center_mm
+    return max(math.dist(start_mm, center_mm), math.hypot(*center_mm)) + _extent_mm(region)
 
 
 def _extent_mm(region: Region) -> float:
     # A half-space has no end; only its point is in the model.
     extent_mm = 0.0 if isinstance(region.shape, HalfSpace) else region.shape.reach_mm()
-    return extent_mm + (0.0 if region.motion is None else region.motion.reach_mm)
+    return extent_mm + region.moved_mm
 
 
 # -------------------------------------------------------------------------------------- the bound

@@ -113,6 +113,11 @@ def unit_vector(vector: Sequence[float], what: str) -> Breach | None:
     )
 
 
+def direction(vector: Sequence[float], what: str, hint: str) -> Breach | None:
+    """A direction is not the zero vector."""
+    return None if any(vector) else Breach("direction-zero", f"{what} has no direction", hint)
+
+
 def right_angle(heading: Sequence[float], bevel: Sequence[float]) -> Breach | None:
     """Two directions of length 1 are at right angles."""
     cosine = math.fsum(a * b for a, b in zip(heading, bevel, strict=True))

@@ -90,6 +90,11 @@ class Region:
             raise TypeError(f"`{self.name}` is no sphere, so it has no radius")
         return self.shape.radius_mm
 
+    @property
+    def moved_mm(self) -> float:
+        """How far it moves from its place at rest; 0 if it keeps still."""
+        return 0.0 if self.motion is None else self.motion.reach_mm
+
     def distance_mm(self, point_mm: Vector) -> float:
         """The signed distance of a point to the surface; negative inside."""
         return self.shape.distance_at_mm(point_mm)
@@ -115,7 +120,7 @@ class Region:
     def __post_init__(self) -> None:
         if self.kind not in _KINDS:
             raise InputError(f"`{self.name}` is a {self.kind} region\nhint: one of {_KINDS}")
-        _require(*self._breaches())
+        require(*self._breaches())
         if self.around is not None and self.kind != "detection":
             raise InputError(
                 f"`{self.name}` is a {self.kind} region, and only a detection region has `around`"
@@ -164,7 +169,7 @@ class Needle:
         radius, speed = "the radius of the motion circle", "the insertion speed"
         length = "the needle's length"
         tip = self.tip
-        _require(
+        require(
             rules.finite(tip.position_mm, "the tip's position"),
             rules.finite(tip.heading, "the heading")
             or rules.unit_vector(tip.heading, "the heading"),
@@ -176,7 +181,7 @@ class Needle:
             rules.finite([self.length_mm], length)
             or rules.not_negative(self.length_mm, length, "length-not-positive"),
         )
-        _require(rules.right_angle(tip.heading, tip.bevel))
+        require(rules.right_angle(tip.heading, tip.bevel))
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +208,7 @@ class Limits:
 
     def __post_init__(self) -> None:
         step, distance = "the step", "the distance between rolls"
-        _require(
+        require(
             rules.finite([self.step_s], step)
             or rules.positive(self.step_s, step, "step-not-positive"),
             *(rules.finite([a], "a roll") or rules.roll(a) for a in self.roll_angles_rad),
@@ -247,7 +252,7 @@ class Tissue:
 
     def __post_init__(self) -> None:
         curvature, roll, tip = "the curvature error", "the roll error", "the tip error"
-        _require(
+        require(
             rules.finite([self.curvature_ratio], curvature)
             or rules.part(self.curvature_ratio, curvature),
             rules.finite([self.roll_rad], roll) or rules.roll_error(self.roll_rad),
@@ -327,7 +332,7 @@ class Scene:
     shaft_mm: tuple[Vector, ...] = ()
 
     def __post_init__(self) -> None:
-        _require(
+        require(
             rules.finite(self.axis, "the axis") or rules.unit_vector(self.axis, "the axis"),
             None
             if self.resolution_per_mm is None
@@ -355,7 +360,7 @@ class Scene:
                 raise InputError(f"`{region.name}` does not move with the period of the breath")
 
         if self.limits.spins:
-            _require(rules.spin_possible(self.tissue.kind, is_moving=self.breath is not None))
+            require(rules.spin_possible(self.tissue.kind, is_moving=self.breath is not None))
 
     @property
     def regions(self) -> tuple[Region, ...]:
@@ -448,8 +453,8 @@ class Scene:
         )
 
 
-def _require(*breaches: rules.Breach | None) -> None:
-    """Refuses a value that breaks a rule.
+def require(*breaches: rules.Breach | None) -> None:
+    """Refuses values that break rules.
 
     Raises:
         InputError: It breaks at least one rule; the message names all of them.

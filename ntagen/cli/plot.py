@@ -231,7 +231,7 @@ def _of_scene(
     memory_bytes: int | None,
 ) -> Picture:
     from ntagen.drive.configure import configure
-    from ntagen.drive.engine import engine_for
+    from ntagen.drive.settings import engine_for
     from ntagen.plot.face import picture_with_plans
     from ntagen.plot.run import picture_of_plans
 

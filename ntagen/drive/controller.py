@@ -39,8 +39,7 @@ from ntagen.drive.device import Device
 from ntagen.drive.following import Course
 from ntagen.drive.guide import Guide
 from ntagen.drive.learning import Learner
-from ntagen.drive.pace import Pace
-from ntagen.drive.pieces import Moves, pieces
+from ntagen.drive.pieces import Moves, Pace, pieces
 from ntagen.drive.planning import Lack, Planner, is_free
 from ntagen.drive.posterior import promise_of
 from ntagen.drive.prospect import is_enough, is_surely_in

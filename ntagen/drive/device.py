@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final, Protocol, runtime_checkable
 
 from ntagen.errors import DeviceError
@@ -202,53 +201,60 @@ class Device(Actuator, Sensor, Protocol):
     """A needle that can be moved, with its sensor."""
 
 
-@dataclass(frozen=True, slots=True)
-class Assembly:
-    """A device of two parts: what moves the needle, and what measures it.
+class Forwarding:
+    """An actuator that is moved through this one; what a subclass does not change goes on to it."""
 
-    Attributes:
-        actuator: Moves the needle.
-        sensor: Measures it.
-    """
-
-    actuator: Actuator
-    sensor: Sensor
+    def __init__(self, actuator: Actuator) -> None:
+        self._actuator = actuator
 
     def now_s(self) -> float:
         """The time on the actuator's clock."""
-        return self.actuator.now_s()
+        return self._actuator.now_s()
 
     def push(self, length_mm: float) -> None:
         """See `Actuator.push`."""
-        self.actuator.push(length_mm)
+        self._actuator.push(length_mm)
 
     def roll(self, angle_rad: float) -> None:
         """See `Actuator.roll`."""
-        self.actuator.roll(angle_rad)
-
-    def spin(self, length_mm: float, fraction: float) -> None:
-        """See `Spinning.spin`."""
-        spin_on(self.actuator, length_mm, fraction)
-
-    def settle(self) -> None:
-        """See `Spinning.settle`."""
-        settle(self.actuator)
+        self._actuator.roll(angle_rad)
 
     def pull(self, length_mm: float) -> None:
         """See `Actuator.pull`."""
-        self.actuator.pull(length_mm)
+        self._actuator.pull(length_mm)
 
     def wait(self, seconds: float) -> None:
         """See `rest`."""
-        rest(self.actuator, seconds)
+        rest(self._actuator, seconds)
 
     def stop(self) -> None:
         """See `Actuator.stop`."""
-        self.actuator.stop()
+        self._actuator.stop()
+
+
+class Assembly(Forwarding):
+    """A device of two parts: what moves the needle, and what measures it.
+
+    Args:
+        actuator: What moves the needle.
+        sensor: What measures it.
+    """
+
+    def __init__(self, actuator: Actuator, sensor: Sensor) -> None:
+        super().__init__(actuator)
+        self._sensor = sensor
+
+    def spin(self, length_mm: float, fraction: float) -> None:
+        """See `Spinning.spin`."""
+        spin_on(self._actuator, length_mm, fraction)
+
+    def settle(self) -> None:
+        """See `Spinning.settle`."""
+        settle(self._actuator)
 
     def measure(self) -> Measurement:
         """See `Sensor.measure`."""
-        return self.sensor.measure()
+        return self._sensor.measure()
 
 
 def require_finite(measurement: Measurement) -> None:

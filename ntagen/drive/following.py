@@ -31,6 +31,7 @@ from ntagen.drive.settings import Settings
 from ntagen.needle.kinematics import Arc, orthonormal, roll
 from ntagen.needle.measurement import squared_length_bound
 from ntagen.needle.path import Path
+from ntagen.needle.poses import Poses
 from ntagen.plan.actions import Action, Push, Roll
 from ntagen.plan.branches import arc_of
 from ntagen.plan.closed_loop import Branch, Segment
@@ -109,11 +110,8 @@ class _Candidates:
                 self.branches.append(branch)
                 self.arcs.append(arc_of(pose, node.segment, branch, radius_mm))
                 self._paths.append(node.path)
-        starts = [arc.start for arc in self.arcs]
-        self._positions = np.array([pose.position_mm for pose in starts])
-        self._headings = np.array([pose.heading for pose in starts])
-        self._bevels = np.array([pose.bevel for pose in starts])
-        self._curvatures = np.array([1.0 / arc.radius_mm for arc in self.arcs])
+        self._starts = Poses.of(arc.start for arc in self.arcs)
+        self._radii_mm = np.array([arc.radius_mm for arc in self.arcs])
         self.lengths_mm = np.array([branch.length_mm for branch in self.branches])
         # With nothing seen, the needle does what is expected.
         self._surprise = np.array(
@@ -124,11 +122,7 @@ class _Candidates:
 
     def note(self, offset_mm: float, position_mm: Vector) -> None:
         """Takes a reading after so much of the segment."""
-        half_rad = 0.5 * self._curvatures * offset_mm
-        chord_mm = (offset_mm * np.sinc(half_rad / math.pi))[:, None]
-        along = np.cos(half_rad)[:, None] * self._headings
-        aside = np.sin(half_rad)[:, None] * self._bevels
-        expected_mm = self._positions + chord_mm * (along - aside)
+        expected_mm = self._starts.places(self._radii_mm, offset_mm)
         self._offsets_mm.append(offset_mm)
         self._differences.append(np.array(position_mm) - expected_mm)
 

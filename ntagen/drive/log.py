@@ -45,6 +45,7 @@ from ntagen.drive.states import ABORTS, Event
 from ntagen.drive.viewing import (
     TOPICS,
     Shaft,
+    Shown,
     show_hidden,
     show_plan,
     show_record,
@@ -139,11 +140,9 @@ class Log:
         text = scene_to_json(scene)
         self._samples = samples_in(text)
         self._attach(SCENE, text.encode())
-        for topic, message in show_scene(scene):
-            self._show(topic, message)
+        self._show(show_scene(scene))
         if self._actual is not None:
-            for topic, message in show_hidden(self._actual, scene):
-                self._show(topic, message)
+            self._show(show_hidden(self._actual, scene))
         self._shaft = Shaft(scene.needle.tip.position_mm)
         self._acknowledge(to_disk=True)
 
@@ -172,8 +171,7 @@ class Log:
             # The strategy of the paper's task is 0.6 MB of JSON, and 40 KB packed.
             packed = gzip.compress(synthesis.strategy_json.encode(), compresslevel=1, mtime=0)
             self._attach(f"{folder}/{STRATEGY}", packed, "application/gzip")
-        for topic, message in show_plan(synthesis, self._time_ns / 1e9):
-            self._show(topic, message)
+        self._show(show_plan(synthesis, self._time_ns / 1e9))
         self._keep(to_disk=False)
 
     def record(self, record: Record) -> None:
@@ -189,11 +187,9 @@ class Log:
         self._sequence += 1
         is_due = self._is_due(record)
         if is_due:
-            for topic, message in show_record(record):
-                self._show(topic, message)
+            self._show(show_record(record))
         if self._shaft is not None:
-            for topic, message in self._shaft.show(record, is_due=is_due):
-                self._show(topic, message)
+            self._show(self._shaft.show(record, is_due=is_due))
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
         self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))
 
@@ -226,8 +222,9 @@ class Log:
         self._seen_s[type(record)] = record.time_s
         return True
 
-    def _show(self, topic: str, message: Message) -> None:
-        self._add(self._views[topic], message.SerializeToString())
+    def _show(self, shown: Shown) -> None:
+        for topic, message in shown:
+            self._add(self._views[topic], message.SerializeToString())
 
     def _add(self, channel: int, data: bytes) -> None:
         self._writer.add_message(

@@ -22,31 +22,16 @@ from ntagen.drive import records
 from ntagen.drive.records import Record
 
 PACKAGE: Final = "ntagen"
+_FILE: Final = "ntagen/records.proto"
 SEQUENCE: Final = "sequence"
 """The field with a record's position in the run, from 0: it gives the order if times are equal."""
 
-KINDS: Final[tuple[type[Record], ...]] = (
-    records.Transition,
-    records.Command,
-    records.Measured,
-    records.Predicted,
-    records.Estimated,
-    records.Synthesised,
-    records.Timed,
-    records.Learned,
-    records.Visited,
-    records.Ended,
-    records.Truth,
-    records.Relied,
-    records.Forgotten,
-    records.CutShort,
-    records.Breathed,
-    records.Followed,
-    records.Guaranteed,
-    records.Foreseen,
-    records.Promised,
+KINDS: Final[tuple[type[Record], ...]] = tuple(
+    one
+    for one in vars(records).values()
+    if isinstance(one, type) and issubclass(one, Record) and one is not Record
 )
-"""All kinds of records, in the order of the file of descriptors."""
+"""All kinds of records, in the order of the file of descriptors, which is that of their module."""
 
 _FIELDS: Final = {kind: tuple(f.name for f in dataclasses.fields(kind)) for kind in KINDS}
 _SOMETIMES: Final = frozenset({"heading", "bevel"})
@@ -83,7 +68,7 @@ _LENGTHS: Final = {kind: _lengths(kind) for kind in KINDS}
 
 def message_class(kind: type[Record]) -> type[Message]:
     """The protobuf class for a kind of record."""
-    return _classes()[kind.__name__]
+    return _classes()[f"{PACKAGE}.{kind.__name__}"]
 
 
 def encode(record: Record, sequence: int) -> bytes:
@@ -125,21 +110,12 @@ def decode(name: str, data: bytes) -> tuple[int, Record]:
 
 @cache
 def _classes() -> dict[str, type[Message]]:
-    """The protobuf classes by the names of the kinds."""
-    pool = _pool()
-    descriptors = {
-        kind.__name__: pool.FindMessageTypeByName(f"{PACKAGE}.{kind.__name__}") for kind in KINDS
-    }
-    return {
-        name: message_factory.GetMessageClass(descriptor)
-        for name, descriptor in descriptors.items()
-    }
+    """The protobuf classes by the names of their types."""
+    return message_factory.GetMessageClassesForFiles([_FILE], _pool())
 
 
 def _pool() -> descriptor_pool.DescriptorPool:
-    file = descriptor_pb2.FileDescriptorProto(
-        name="ntagen/records.proto", package=PACKAGE, syntax="proto3"
-    )
+    file = descriptor_pb2.FileDescriptorProto(name=_FILE, package=PACKAGE, syntax="proto3")
     for kind in KINDS:
         message = file.message_type.add(name=kind.__name__)
         message.field.add(

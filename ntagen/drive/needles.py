@@ -131,9 +131,7 @@ class Chosen:
                 roll_rad_per_s=_REAL_ROLL_RAD_PER_S,
                 ranking=ROBUST_RANKING,
             )
-        if self.is_real:
-            return settings
-        if self.parameters is None:
+        if self.is_real or self.parameters is None:
             return settings
         # Half of the rise to be detected is slack: layers never add to the sum of the test.
         layers_n = self.parameters.forces.layers_n(_LAYER_SIGMAS)
@@ -178,19 +176,15 @@ def choose(name: str, errors: Errors) -> Chosen:
         InputError: There is no needle of this name.
     """
     kind, _, _ = name.partition(":")
-    if kind == REAL:
-        return Chosen(name, errors)
-    if name not in (*NAMES, LAB):
-        if kind in names(DEVICES):
-            return Chosen(name, errors)
-        raise InputError(
-            f"there is no needle '{name}'\n"
-            f"hint: choose from {', '.join(sorted(NAMES))}, grbl:PORT; installed plugins: "
-            f"{described(DEVICES)}"
-        )
-    if name != "virtual":
+    if name in (*NAMES, LAB) and name != "virtual":
         return Chosen(name, errors, errors.true_phantom(_usual_phantom()))
-    return Chosen(name, errors)
+    if name == "virtual" or kind == REAL or kind in names(DEVICES):
+        return Chosen(name, errors)
+    raise InputError(
+        f"there is no needle '{name}'\n"
+        f"hint: choose from {', '.join(sorted(NAMES))}, grbl:PORT; installed plugins: "
+        f"{described(DEVICES)}"
+    )
 
 
 def _usual_phantom() -> PhantomParameters:

@@ -6,12 +6,13 @@ import struct
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import IO, Final
 
 from mcap.opcode import Opcode
 
 from ntagen.errors import InputError
 
+_START_BYTES: Final = 16
 MAGIC: Final = b"\x89MCAP"
 HEAD: Final = struct.Struct("<BQ")
 """The start of a record: its kind, and the length of the rest."""
@@ -44,24 +45,26 @@ class Contents:
     Attributes:
         profile: The profile in the header of the file, such as ``ros2``.
         topics: The topics of its messages, in order, and their encodings.
-        records: How many records of a run it has.
     """
 
     profile: str = ""
     topics: dict[str, str] = field(default_factory=dict)
-    records: int = 0
 
 
-def no_log(path: Path, start: bytes, found: Contents, torn: bytes | None, at: int) -> InputError:
+def no_log(
+    path: Path, file: IO[bytes], found: Contents, records: int, torn_at: int | None
+) -> InputError:
     """The error about a file without the metadata of a run.
 
     Args:
         path: The file.
-        start: Its first bytes.
+        file: The same, open.
         found: What was read.
-        torn: The bytes at which it becomes unreadable; None if it is whole.
-        at: The number of the first of them.
+        records: How many records of a run it has.
+        torn_at: The byte at which it becomes unreadable; None if it is whole.
     """
+    file.seek(0)
+    start = file.read(_START_BYTES)
     what = f"{path}: not the log of a run"
     if not start.startswith(MAGIC):
         is_other = (words for begin, words in _OTHER_FILES.items() if start.startswith(begin))
@@ -71,17 +74,19 @@ def no_log(path: Path, start: bytes, found: Contents, torn: bytes | None, at: in
     if found.profile.startswith("ros") or _ROS_ENCODINGS & set(found.topics.values()):
         topics = f" with the topics {_shown(found.topics)}" if found.topics else ""
         return InputError(f"{what}: it is a bag of ROS{topics}\n{_TABLE}")
-    if found.records:
+    if records:
         return InputError(
-            f"{what}: it has {found.records} records of a run, but the metadata `ntagen` with the "
+            f"{what}: it has {records} records of a run, but the metadata `ntagen` with the "
             f"settings of the run are missing\n{_FILTERED}"
         )
-    if torn is not None:
+    if torn_at is not None:
+        file.seek(torn_at)
+        torn = file.read(HEAD.size)
         kind = HEAD.unpack_from(torn)[0] if len(torn) >= HEAD.size else None
         inside = "within its first chunk of packed data" if kind == Opcode.CHUNK else "or damaged"
         return InputError(
-            f"{what} that can be read: it is cut off at byte {at}, {inside}, and nothing of a run "
-            f"comes before\n{_GIVE}"
+            f"{what} that can be read: it is cut off at byte {torn_at}, {inside}, and nothing of a "
+            f"run comes before\n{_GIVE}"
         )
     topics = f"it has the topics {_shown(found.topics)}" if found.topics else "it has no topics"
     return InputError(f"{what}: {topics}, and none of a run\n{_GIVE}")

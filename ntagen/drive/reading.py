@@ -12,7 +12,7 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any, Final, cast
 
@@ -54,7 +54,6 @@ also as rows."""
 
 _PIECE_BYTES: Final = 2**16
 
-_START_BYTES: Final = 16
 
 _LISTS: Final = frozenset({"way", "length_mm", "std_mm", "x_mm", "y_mm", "z_mm"})
 """The fields of records that are lists; other tuples are vectors."""
@@ -203,7 +202,8 @@ def read_log(path: str | Path) -> RunLog:
         collected = _Collected()
         torn_at_byte = _read(file, collected, _Budget(path, file_bytes))
         if METADATA not in collected.metadata:
-            raise _no_log(path, file, collected, torn_at_byte)
+            count = len(collected.records)
+            raise no_log(path, file, collected.contents, count, torn_at_byte)
     metadata = collected.metadata[METADATA]
     if metadata.get("format_version") != str(FORMAT_VERSION):
         raise InputError(
@@ -212,16 +212,6 @@ def read_log(path: str | Path) -> RunLog:
         )
     records = tuple(record for _, record in sorted(collected.records, key=lambda item: item[0]))
     return RunLog(records, metadata, collected.attachments, torn_at_byte, path)
-
-
-def _no_log(path: Path, file: IO[bytes], collected: _Collected, torn: int | None) -> InputError:
-    """The error about a file without the metadata of a run."""
-    file.seek(0)
-    start = file.read(_START_BYTES)
-    file.seek(torn or 0)
-    at = None if torn is None else file.read(HEAD.size)
-    contents = replace(collected.contents, records=len(collected.records))
-    return no_log(path, start, contents, at, torn or 0)
 
 
 class _Collected:

@@ -10,15 +10,14 @@ from collections.abc import Callable
 from typing import Final
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Actuator, Assembly, LiveSensor, WatchedActuator
+from ntagen.drive.device import Assembly, LiveSensor, WatchedActuator
 from ntagen.drive.following import Course
 from ntagen.drive.knowledge import told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Journal, Journals
 from ntagen.drive.settings import Settings
-from ntagen.drive.spinning import spun
+from ntagen.drive.spinning import steered
 from ntagen.drive.supervisor import Supervisor
-from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import InputError
 from ntagen.plan.synthesise import Synthesiser
 from ntagen.scene import Scene
@@ -70,13 +69,10 @@ def drive(
     """
     supervisor = Supervisor(sensor, listen)
     actuator.watch = supervisor.watch
-    mover: Actuator = actuator
-    if settings.compensated_lag_rad > 0.0:
-        mover = Compensated(actuator, Lag(settings.compensated_lag_rad))
     counter = SynthesisCounter()
     controller = Controller(
         told(scene, known),
-        Assembly(spun(mover, scene), sensor),
+        Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor),
         synthesise,
         settings,
         Journals(journal, counter),

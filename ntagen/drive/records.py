@@ -215,18 +215,18 @@ class Truth(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Relied(Record):
+    """What the driver relies on, in words; the first record of a run."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Forgotten(Record):
     """A learned region is no more: a larger one takes its place."""
 
     name: str
     kind: str
-
-
-@dataclass(frozen=True, slots=True)
-class Relied(Record):
-    """What the driver relies on, in words; the first record of a run."""
-
-    text: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from typing import Any, Final
 
@@ -19,7 +19,7 @@ from ntagen.errors import InputError
 from ntagen.needle.priors import Priors
 from ntagen.parameters import NEEDLE, PARAMETERS, Value
 from ntagen.plan.rank import DEFAULT_RANKING, parse_ranking
-from ntagen.plan.synthesise import Margins
+from ntagen.plan.synthesise import EngineSynthesiser, Margins
 from ntagen.values import dataclass
 
 
@@ -187,3 +187,21 @@ def with_values(settings: Settings, values: Mapping[str, Value]) -> Settings:
         else:
             changes[inner] = value
     return replace(settings, **changes)
+
+
+def engine_for(
+    settings: Settings,
+    listen: Callable[[], None] = lambda: None,
+    *,
+    keeps_strategy: bool = False,
+) -> EngineSynthesiser:
+    """The synthesiser that lists plans; see `EngineSynthesiser` for the arguments."""
+    return EngineSynthesiser(
+        margins=settings.margins,
+        ranking=settings.ranking,
+        max_plans=settings.max_plans,
+        timeout_s=settings.engine_time_s,
+        memory_bytes=settings.engine_memory_bytes,
+        keeps_strategy=keeps_strategy,
+        listen=listen,
+    )

@@ -12,17 +12,15 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Actuator, Assembly, Device, Sensor, Waiting
-from ntagen.drive.engine import engine_for
+from ntagen.drive.device import Assembly, Device, Sensor, Waiting
 from ntagen.drive.following import Course
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
 from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
-from ntagen.drive.settings import Settings
-from ntagen.drive.spinning import spun
-from ntagen.drive.torsion import Compensated, Lag
+from ntagen.drive.settings import Settings, engine_for
+from ntagen.drive.spinning import steered
 from ntagen.errors import InputError
-from ntagen.needle.answering import Answers, Between, Corners, Drawn, Given
+from ntagen.needle.answering import Answers, between, corners, drawn, given
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.phantom_parameters import PhantomParameters
@@ -92,18 +90,13 @@ def answering(errors: Errors, scene: Scene, kind: str, tree: Segment | None = No
             "hint: use --tissue corners"
         )
 
+    picked = {"corners": corners, "between": between, "drawn": drawn}
+
     def answers(seed: int) -> Answers:
-        match kind:
-            case "corners":
-                return Corners(scene.tissue, seed)
-            case "between":
-                return Between(scene.tissue, seed)
-            case "drawn":
-                return Drawn(scene.tissue, seed)
-            case "worst" if tree is not None:
-                way = worst_path(tree, scene)
-                return Given([(one.branch.factor, one.branch.roll_error_rad) for one in way])
-        return Given()
+        if kind in picked:
+            return picked[kind](scene.tissue, seed)
+        way = worst_path(tree, scene) if kind == "worst" and tree is not None else ()
+        return given((one.branch.factor, one.branch.roll_error_rad) for one in way)
 
     return lambda needle, obstacles, seed: VirtualNeedle(
         needle,
@@ -182,10 +175,7 @@ def simulate(
             "hint: use --needle virtual or --needle phantom"
         )
     sensor = needle if sense is None else sense(needle)
-    actuator: Actuator = needle
-    if settings.compensated_lag_rad > 0.0:
-        actuator = Compensated(needle, Lag(settings.compensated_lag_rad))
-    device = Assembly(spun(actuator, scene), sensor)
+    device = Assembly(steered(needle, scene, settings.compensated_lag_rad), sensor)
     witness = Witness(needle, journal)
     counter = SynthesisCounter()
     controller = Controller(

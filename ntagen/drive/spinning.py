@@ -18,7 +18,8 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from ntagen.drive.device import CANNOT_SPIN, Actuator, can_screw, rest, screw_on
+from ntagen.drive.device import CANNOT_SPIN, Actuator, Forwarding, can_screw, screw_on
+from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import DeviceError, Halted, InputError
 from ntagen.needle.screws import TURN_RAD
 from ntagen.plan.actions import Push
@@ -56,12 +57,19 @@ def push_seconds(push: Push, speed_mm_per_s: float, roll_rad_per_s: float, lag_r
     return (1.0 - push.spin) * seconds + spun_s + cycles * 2.0 * lag_rad / roll_rad_per_s
 
 
-def spun(actuator: Actuator, scene: Scene) -> Actuator:
-    """An actuator that can spin the needle, if plans of the scene may do that.
+def steered(actuator: Actuator, scene: Scene, lag_rad: float) -> Actuator:
+    """An actuator whose rolls reach the tip, and that spins the needle if plans may do that.
+
+    Args:
+        actuator: What moves the needle.
+        scene: Its limits say whether plans may spin the needle.
+        lag_rad: The lag that rolls make up for, in rad; see `Settings.compensated_lag_rad`.
 
     Raises:
         InputError: They may, and the actuator cannot.
     """
+    if lag_rad > 0.0:
+        actuator = Compensated(actuator, Lag(lag_rad))
     if not scene.limits.spins:
         return actuator
     if not can_screw(actuator):
@@ -69,7 +77,7 @@ def spun(actuator: Actuator, scene: Scene) -> Actuator:
     return Spun(actuator)
 
 
-class Spun:
+class Spun(Forwarding):
     """An actuator that makes the cycles of a needle that spins.
 
     Args:
@@ -77,14 +85,10 @@ class Spun:
     """
 
     def __init__(self, actuator: Actuator) -> None:
-        self._actuator = actuator
+        super().__init__(actuator)
         self._is_wound = False
         # The rest of a turn that was ended early, and whether the shaft is wound up after it.
         self._rest: tuple[float, bool] | None = None
-
-    def now_s(self) -> float:
-        """See `Actuator.now_s`."""
-        return self._actuator.now_s()
 
     def spin(self, length_mm: float, fraction: float) -> None:
         """Inserts the needle by a length, and spins it in a fraction of that.
@@ -150,11 +154,3 @@ class Spun:
         """See `Actuator.pull`."""
         self.settle()
         self._actuator.pull(length_mm)
-
-    def wait(self, seconds: float) -> None:
-        """See `ntagen.drive.device.rest`."""
-        rest(self._actuator, seconds)
-
-    def stop(self) -> None:
-        """See `Actuator.stop`."""
-        self._actuator.stop()

@@ -94,20 +94,6 @@ class Event(Enum):
     INTERRUPT = "interrupt"
 
 
-ENDS: Final = frozenset(
-    {
-        State.TARGET_REACHED,
-        State.NO_STRATEGY,
-        State.NONE_HOLDS,
-        State.NO_TIME_LEFT,
-        State.NOT_GUARANTEED,
-        State.TIMED_OUT,
-        State.FAULTED,
-        State.INTERRUPTED,
-    }
-)
-"""The states in which the run is over."""
-
 ABORTS: Final = {
     Event.TIMED_OUT: State.TIMED_OUT,
     Event.FAULT: State.FAULTED,
@@ -147,6 +133,9 @@ _WORKFLOW: Final = {
     (State.PUSH, Event.PUSHED): State.ESTIMATE,
     (State.PUSH, Event.FORCE): State.STOP,
 }
+
+ENDS: Final = frozenset(State) - {state for state, _ in _WORKFLOW}
+"""The states in which the run is over."""
 
 TRANSITIONS: Final = _WORKFLOW | {
     (state, event): end for state in State if state not in ENDS for event, end in ABORTS.items()

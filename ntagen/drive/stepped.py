@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ntagen.drive.device import rest
+from ntagen.drive.device import Forwarding, rest
 from ntagen.drive.plant import NeedlePlant, simulated_axes, simulated_controller
 from ntagen.drive.simulate import Maker, Simulated
 from ntagen.grbl.actuator import GrblActuator
@@ -24,7 +24,7 @@ from ntagen.needle.virtual import Obstacle, require_possible
 from ntagen.scene import Needle, Pose
 
 
-class Stepped:
+class Stepped(Forwarding):
     """A simulated needle behind an emulated controller; a `Simulated`.
 
     Args:
@@ -42,17 +42,10 @@ class Stepped:
         self.emulator = simulated_controller(self._plant, axes)
         self.port = SimulatedPort(self.emulator)
         self.actuator = GrblActuator(self.port, axes)
+        super().__init__(self.actuator)
         self._keeps_time = keeps_time
         # Connecting took time in which the needle did not exist.
-        self._since_s = self.actuator.now_s() - needle.now_s()
-
-    def now_s(self) -> float:
-        """Seconds on the controller's clock."""
-        return self.actuator.now_s()
-
-    def push(self, length_mm: float) -> None:
-        """See `GrblActuator.push`."""
-        self.actuator.push(length_mm)
+        self._since_s = self.now_s() - needle.now_s()
 
     def screw(self, length_mm: float, angle_rad: float) -> None:
         """See `GrblActuator.screw`."""
@@ -61,16 +54,12 @@ class Stepped:
 
     def roll(self, angle_rad: float) -> None:
         """See `GrblActuator.roll`."""
-        self.actuator.roll(angle_rad)
+        super().roll(angle_rad)
         self._plant.finish()
 
     def roll_on(self, angle_rad: float) -> None:
         """See `GrblActuator.roll`; the controller cannot tell the two."""
-        self.actuator.roll(angle_rad)
-
-    def pull(self, length_mm: float) -> None:
-        """See `GrblActuator.pull`."""
-        self.actuator.pull(length_mm)
+        super().roll(angle_rad)
 
     def wait(self, seconds: float) -> None:
         """Lets the controller rest for a time.
@@ -80,10 +69,6 @@ class Stepped:
         """
         require_possible(seconds >= 0.0, "wait", seconds)
         self.emulator.advance(self.now_s() + seconds)
-
-    def stop(self) -> None:
-        """See `GrblActuator.stop`."""
-        self.actuator.stop()
 
     def _settle(self) -> None:
         """Moves the needle as far as its axes went."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ntagen.drive.device import Actuator, Halted, can_screw, rest, screw_on
+from ntagen.drive.device import Actuator, Forwarding, Halted, can_screw, screw_on
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Lag:
         return self.lag_rad * (depth_mm / self.depth_mm) ** 2
 
 
-class Compensated:
+class Compensated(Forwarding):
     """An actuator whose rolls reach the tip.
 
     Args:
@@ -46,15 +46,11 @@ class Compensated:
     """
 
     def __init__(self, actuator: Actuator, lag: Lag) -> None:
-        self._actuator = actuator
+        super().__init__(actuator)
         self._lag = lag
         self._depth_mm = 0.0
         # By how much the base is ahead of the tip, since a motion was ended early.
         self._wound_rad = 0.0
-
-    def now_s(self) -> float:
-        """See `Actuator.now_s`."""
-        return self._actuator.now_s()
 
     def push(self, length_mm: float) -> None:
         """See `Actuator.push`."""
@@ -127,11 +123,3 @@ class Compensated:
         self._unwind()
         self._actuator.pull(length_mm)
         self._depth_mm = max(0.0, self._depth_mm - length_mm)
-
-    def wait(self, seconds: float) -> None:
-        """See `ntagen.drive.device.rest`."""
-        rest(self._actuator, seconds)
-
-    def stop(self) -> None:
-        """See `Actuator.stop`."""
-        self._actuator.stop()

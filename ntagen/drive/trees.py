@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +19,8 @@ from ntagen.drive.scene_json import scene_to_json
 from ntagen.errors import InputError
 from ntagen.files import json_of, read_file
 from ntagen.plan.against_tissue import Defence
-from ntagen.plan.closed_loop import Segment, certify_all
+from ntagen.plan.branches import certify_all
+from ntagen.plan.closed_loop import Segment
 from ntagen.scene import Scene
 
 FORMAT: Final = "ntagen-closed-loop"
@@ -59,7 +61,7 @@ def document_of(found: Defence) -> dict[str, Any]:
         "version": VERSION,
         "task": found.scene.name,
         "scene_sha256": digest_of(found.scene),
-        "tree": found.tree.to_json(),
+        "tree": asdict(found.tree),
         "guarantee": found.guarantee(),
         "holds": found.holds,
     }
@@ -115,7 +117,7 @@ def tree_from_json(document: object) -> Segment:
 def course_to_log(course: Course) -> tuple[str, bytes | None]:
     """How a run goes, as a text for the log, and the file of the strategy that is followed."""
     text = json.dumps({"only_guaranteed": course.only_guaranteed, "lack": course.lack})
-    tree = None if course.tree is None else json.dumps(course.tree.to_json()).encode()
+    tree = None if course.tree is None else json.dumps(asdict(course.tree)).encode()
     return text, tree
 
 

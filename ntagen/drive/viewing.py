@@ -8,7 +8,7 @@ axes are those of the environment file.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any, Final, cast
 
@@ -97,16 +97,9 @@ def show_plan(synthesis: Synthesis, time_s: float) -> Shown:
         yield "/scene", _without("plan", time_s)
         return
     poses = sample_poses(synthesis.best.plan.arcs(synthesis.scene.needle), _PLAN_SPACING_MM)
-    update = SceneUpdate()
-    entity = update.entities.add(id="plan", frame_id=_FRAME, timestamp=_stamp(time_s))
-    line = entity.lines.add(thickness=2.0, scale_invariant=True, color=_colour(_PLAN_COLOUR))
-    line.pose.orientation.w = 1.0
-    message = PosesInFrame(timestamp=_stamp(time_s), frame_id=_FRAME)
-    for pose in poses:
-        x, y, z = (c * _M_PER_MM for c in pose.position_mm)
-        line.points.add(x=x, y=y, z=z)
-        message.poses.append(_pose(pose))
-    yield "/scene", update
+    message = PosesInFrame(timestamp=_stamp(time_s), frame_id=_FRAME, poses=map(_pose, poses))
+    places = [pose.position_mm for pose in poses]
+    yield "/scene", _line("plan", time_s, places, 2.0, _PLAN_COLOUR)
     yield "/needle/plan", message
 
 
@@ -149,15 +142,26 @@ class Shaft:
         if not is_due or self._points == self._shown:
             return
         self._shown = self._points.copy()
-        update = SceneUpdate()
-        stamp = _stamp(record.time_s)
-        entity = update.entities.add(id="shaft", frame_id=_FRAME, timestamp=stamp)
-        drawn = entity.lines.add(thickness=4.0, scale_invariant=True, color=_colour(_SHAFT_COLOUR))
-        drawn.pose.orientation.w = 1.0
-        for _, position_mm in self._points:
-            x, y, z = (c * _M_PER_MM for c in position_mm)
-            drawn.points.add(x=x, y=y, z=z)
-        yield "/scene", update
+        places = [position_mm for _, position_mm in self._points]
+        yield "/scene", _line("shaft", record.time_s, places, 4.0, _SHAFT_COLOUR)
+
+
+def _line(
+    name: str,
+    time_s: float,
+    places_mm: Sequence[Vector],
+    thickness: float,
+    colour: tuple[float, float, float, float],
+) -> SceneUpdate:
+    """A line through places, as an entity with this name."""
+    update = SceneUpdate()
+    entity = update.entities.add(id=name, frame_id=_FRAME, timestamp=_stamp(time_s))
+    line = entity.lines.add(thickness=thickness, scale_invariant=True, color=_colour(colour))
+    line.pose.orientation.w = 1.0
+    for place in places_mm:
+        x, y, z = (c * _M_PER_MM for c in place)
+        line.points.add(x=x, y=y, z=z)
+    return update
 
 
 def show_record(record: Record) -> Shown:

@@ -8,8 +8,9 @@ a factor of the curvature for it, and the error of the roll before it, within th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import Final, Protocol
+from collections.abc import Iterable, Iterator
+from itertools import chain, repeat
+from typing import Final
 
 import numpy as np
 
@@ -18,87 +19,35 @@ from ntagen.scene import Tissue
 Pick = tuple[float, float]
 """A factor of the curvature, and the error of the roll before in rad."""
 
+Answers = Iterator[Pick]
+"""The picks of a tissue, one for each segment."""
+
 EXPECTED: Final[Pick] = (1.0, 0.0)
 
 
-class Answers(Protocol):
-    """Picks of a tissue."""
-
-    def pick(self, *, rolls_err: bool) -> Pick:
-        """The pick for the next segment.
-
-        Args:
-            rolls_err: Whether there was a roll before it that may err.
-        """
+def corners(tissue: Tissue, seed: int) -> Answers:
+    """A tissue that picks corners of its bounds or their middle."""
+    random = np.random.default_rng([seed, 1])
+    while True:
+        yield float(random.choice(tissue.factors)), float(random.choice(tissue.roll_errors_rad))
 
 
-class Corners:
-    """A tissue that picks corners of its bounds or their middle.
-
-    Args:
-        tissue: The bounds.
-        seed: The seed of its choices.
-    """
-
-    def __init__(self, tissue: Tissue, seed: int) -> None:
-        self._tissue = tissue
-        self._random = np.random.default_rng([seed, 1])
-
-    def pick(self, *, rolls_err: bool) -> Pick:
-        """See `Answers`."""
-        factor = float(self._random.choice(self._tissue.factors))
-        error = float(self._random.choice(self._tissue.roll_errors_rad))
-        return factor, error if rolls_err else 0.0
+def between(tissue: Tissue, seed: int) -> Answers:
+    """A tissue that picks any value within its bounds."""
+    random = np.random.default_rng([seed, 2])
+    x, y = tissue.curvature_ratio, tissue.roll_rad
+    while True:
+        yield 1.0 + float(random.uniform(-x, x)), float(random.uniform(-y, y))
 
 
-class Between:
-    """A tissue that picks any value within its bounds.
-
-    Args:
-        tissue: The bounds.
-        seed: The seed of its choices.
-    """
-
-    def __init__(self, tissue: Tissue, seed: int) -> None:
-        self._tissue = tissue
-        self._random = np.random.default_rng([seed, 2])
-
-    def pick(self, *, rolls_err: bool) -> Pick:
-        """See `Answers`."""
-        x, y = self._tissue.curvature_ratio, self._tissue.roll_rad
-        factor = 1.0 + float(self._random.uniform(-x, x))
-        error = float(self._random.uniform(-y, y))
-        return factor, error if rolls_err else 0.0
+def drawn(tissue: Tissue, seed: int) -> Answers:
+    """A tissue with chance: the logarithm of the factor and the error are normal."""
+    random = np.random.default_rng([seed, 3])
+    while True:
+        factor = math.exp(random.normal(0.0, tissue.curvature_ratio))
+        yield factor, float(random.normal(0.0, tissue.roll_rad))
 
 
-class Drawn:
-    """A tissue with chance: the logarithm of the factor and the error are normal.
-
-    The model of a plan draws the same (`templates/uppaal/chance.c.jinja`), with other numbers.
-
-    Args:
-        tissue: Its spreads.
-        seed: The seed of what it draws.
-    """
-
-    def __init__(self, tissue: Tissue, seed: int) -> None:
-        self._tissue = tissue
-        self._random = np.random.default_rng([seed, 3])
-
-    def pick(self, *, rolls_err: bool) -> Pick:
-        """See `Answers`."""
-        factor = math.exp(self._random.normal(0.0, self._tissue.curvature_ratio))
-        error = float(self._random.normal(0.0, self._tissue.roll_rad))
-        return factor, error if rolls_err else 0.0
-
-
-class Given:
+def given(picks: Iterable[Pick] = ()) -> Answers:
     """A tissue whose picks are given, and that does what is expected after them."""
-
-    def __init__(self, picks: Sequence[Pick] = ()) -> None:
-        self._picks: Iterator[Pick] = iter(picks)
-
-    def pick(self, *, rolls_err: bool) -> Pick:
-        """See `Answers`."""
-        factor, error = next(self._picks, EXPECTED)
-        return factor, error if rolls_err else 0.0
+    return chain(picks, repeat(EXPECTED))

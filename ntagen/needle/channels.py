@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.needle.kinematics import bending_axis, push, roll
+from ntagen.needle.poses import Poses
 from ntagen.needle.vectors import add, combine, cross, rotate, scale, subtract
 from ntagen.scene import Pose, Vector
 
@@ -357,7 +358,7 @@ def positions(
     # Derivatives of both parts by the curvature's logarithm.
     ahead_growth = along_mm * np.cos(arcs.turned) - arcs.ahead
     aside_growth = along_mm * np.sin(arcs.turned) - arcs.aside
-    own = ahead_growth[:, None] * arcs.headings - aside_growth[:, None] * arcs.bevels
+    own = ahead_growth[:, None] * arcs.starts.heading - aside_growth[:, None] * arcs.starts.bevel
     slopes = np.stack([part.shift for part in parts])[part_of]
     growth = np.stack([part.growth for part in parts])[part_of]
     rotation = np.stack([part.rotation for part in parts], axis=1)[:, part_of]
@@ -380,16 +381,14 @@ class _Arcs:
     """Arcs from the beginnings of stretches to places; one row for each place.
 
     Attributes:
-        headings: Of the beginnings.
-        bevels: Of the beginnings.
+        starts: The beginnings.
         turned: By how much the heading has turned, in rad.
         ahead: The length of the chord along the heading, in mm.
         aside: Its length against the bevel, in mm.
         places: The ends.
     """
 
-    headings: _Array
-    bevels: _Array
+    starts: Poses
     turned: _Array
     ahead: _Array
     aside: _Array
@@ -398,17 +397,14 @@ class _Arcs:
     @staticmethod
     def of(parts: Sequence[Placed], part_of: _Indices, along_mm: _Array) -> _Arcs:
         """The arcs to places on stretches; see `positions`."""
-        starts = [part.start for part in parts]
-        begins = np.array([start.position_mm for start in starts])[part_of]
-        headings = np.array([start.heading for start in starts])[part_of]
-        bevels = np.array([start.bevel for start in starts])[part_of]
+        starts = Poses.of(part.start for part in parts).at(part_of)
         turned = np.array([part.bent_per_mm for part in parts])[part_of] * along_mm
         half = 0.5 * turned
         chord = along_mm * np.sinc(half / math.pi)
         ahead, aside = chord * np.cos(half), chord * np.sin(half)
-        ends = begins + ahead[:, None] * headings
-        ends -= aside[:, None] * bevels
-        return _Arcs(headings, bevels, turned, ahead, aside, ends)
+        ends = starts.position + ahead[:, None] * starts.heading
+        ends -= aside[:, None] * starts.bevel
+        return _Arcs(starts, turned, ahead, aside, ends)
 
 
 def _turn_about(

@@ -16,7 +16,7 @@ iterated distances give no good slopes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Final
 
@@ -132,24 +132,47 @@ def enters_at(arc: Arc, shape: Shape) -> float | None:
     """
     if isinstance(shape, Sphere):
         return arc.enters_at(shape.middle_mm, shape.radius_mm)
-    if shape.distance_at_mm(arc.start.position_mm) <= 0.0:
-        return 0.0
     if shape.error_mm > TOLERANCE_MM:
         return _enters_bound_at(arc, shape)
-    waiting = [(0.5 * arc.length_mm, 0.5 * arc.length_mm)]
+    return first_within(
+        lambda at_mm: shape.distance_at_mm(arc.position_at(at_mm)), 0.0, arc.length_mm
+    )
+
+
+def first_within(
+    away_mm: Callable[[float], float],
+    start: float,
+    end: float,
+    speed: float = 1.0,
+    slack_mm: float = 0.0,
+    least_mm: float = 0.5 * TOLERANCE_MM,
+) -> float | None:
+    """The first place or time at which a distance is 0 or less; None if it never is.
+
+    Args:
+        away_mm: The distance at a place or a time.
+        start: Where to begin.
+        end: Where to end.
+        speed: The distance changes by at most this for each unit of the place or the time.
+        slack_mm: And by this much besides.
+        least_mm: What takes the distance less than this far is looked at in its middle only.
+    """
+    if away_mm(start) <= 0.0:
+        return start
+    waiting = [(0.5 * (start + end), 0.5 * (end - start))]
     while waiting:
-        at_mm, half_mm = waiting.pop()
-        away_mm = shape.distance_at_mm(arc.position_at(at_mm))
-        if away_mm > half_mm:
+        at, half = waiting.pop()
+        found_mm = away_mm(at)
+        if found_mm > half * speed + slack_mm:
             continue
-        if half_mm <= 0.5 * TOLERANCE_MM:
-            if away_mm <= 0.0:
-                return at_mm
+        if half * speed <= least_mm:
+            if found_mm <= 0.0:
+                return at
             continue
         # The earlier half is taken first.
-        half_mm *= 0.5
-        waiting += [(at_mm + half_mm, half_mm), (at_mm - half_mm, half_mm)]
-    return arc.length_mm if shape.distance_at_mm(arc.end.position_mm) <= 0.0 else None
+        half *= 0.5
+        waiting += [(at + half, half), (at - half, half)]
+    return end if away_mm(end) <= 0.0 else None
 
 
 def _enters_bound_at(arc: Arc, shape: Shape) -> float | None:
@@ -184,10 +207,7 @@ def places_on(arcs: Sequence[Arc], owners: NDArray[np.intp], along: _Array) -> _
     """The places at some lengths along their arcs, as in `ntagen.needle.kinematics.push`."""
     import numpy as np
 
-    starts = np.array([arc.start.position_mm for arc in arcs])[owners]
-    headings = np.array([arc.start.heading for arc in arcs])[owners]
-    bevels = np.array([arc.start.bevel for arc in arcs])[owners]
-    half_turns = 0.5 * along / np.array([arc.radius_mm for arc in arcs])[owners]
-    chords = along * np.sinc(half_turns / math.pi)
-    ahead, aside = chords * np.cos(half_turns), chords * np.sin(half_turns)
-    return np.asarray(starts + ahead[:, None] * headings - aside[:, None] * bevels)
+    from ntagen.needle.poses import Poses
+
+    radii = np.array([arc.radius_mm for arc in arcs])[owners]
+    return Poses.of(arc.start for arc in arcs).at(owners).places(radii, along)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ntagen.scene import Pose
 from ntagen.values import dataclass
 
 _Array = NDArray[np.float64]
@@ -19,6 +21,13 @@ class Poses:
     position: _Array
     heading: _Array
     bevel: _Array
+
+    @staticmethod
+    def of(poses: Iterable[Pose]) -> Poses:
+        """These poses."""
+        vectors = [(one.position_mm, one.heading, one.bevel) for one in poses]
+        rows = np.array(vectors, dtype=np.float64).reshape(-1, 3, 3)
+        return Poses(rows[:, 0], rows[:, 1], rows[:, 2])
 
     def at(self, rows: NDArray[np.intp]) -> Poses:
         """Those of these rows."""
@@ -41,7 +50,7 @@ class Poses:
             cosine * self.bevel + sine * self.heading,
         )
 
-    def places(self, radius_mm: float | _Array, length_mm: _Array) -> _Array:
+    def places(self, radius_mm: float | _Array, length_mm: float | _Array) -> _Array:
         """The places after pushes."""
         half = 0.5 * (length_mm / radius_mm)
         chord = length_mm * np.sinc(half / math.pi)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ntagen.motion import Motion
 from ntagen.needle.kinematics import Arc, Nearest
-from ntagen.needle.nearest import TOLERANCE_MM, places_on
+from ntagen.needle.nearest import TOLERANCE_MM, first_within, places_on
 from ntagen.scene import SHAFT_SPACING_MM, Pose, Vector
 from ntagen.shapes import Shape
 from ntagen.values import dataclass
@@ -168,23 +168,7 @@ class Timeline:
         is_bound = shape.error_mm > TOLERANCE_MM
         slack_mm = shape.error_mm if is_bound else 0.0
         least_mm = _BOUND_PIECE_MM if is_bound else 0.5 * TOLERANCE_MM
-        start_s, end_s = stretch
-        if away_mm(start_s) <= 0.0:
-            return start_s
-        waiting = [(0.5 * (start_s + end_s), 0.5 * (end_s - start_s))]
-        while waiting:
-            at_s, half_s = waiting.pop()
-            found_mm = away_mm(at_s)
-            if found_mm > half_s * speed_mm_per_s + slack_mm:
-                continue
-            if half_s * speed_mm_per_s <= least_mm:
-                if found_mm <= 0.0:
-                    return at_s
-                continue
-            # The earlier half is taken first.
-            half_s *= 0.5
-            waiting += [(at_s + half_s, half_s), (at_s - half_s, half_s)]
-        return end_s if away_mm(end_s) <= 0.0 else None
+        return first_within(away_mm, *stretch, speed_mm_per_s, slack_mm, least_mm)
 
     def shaft_nearest(self, shape: Shape, motion: Motion) -> Nearest:
         """The least distance of tip and shaft to a moving shape, and at which depth that is.

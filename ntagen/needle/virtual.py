@@ -139,8 +139,8 @@ class VirtualNeedle:
             return
         is_seen = self._free_bevel and self._path.depth_mm == 0.0
         rolls_err = self._has_rolled and not is_seen
-        self._factor, error_rad = self._answers.pick(rolls_err=rolls_err)
-        self._path = self._path.roll(error_rad)
+        self._factor, error_rad = next(self._answers)
+        self._path = self._path.roll(error_rad if rolls_err else 0.0)
         self._has_picked = True
 
     def wait(self, seconds: float) -> None:

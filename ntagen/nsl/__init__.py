@@ -17,6 +17,7 @@ or a `SourceError`, nothing else.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
@@ -148,7 +149,7 @@ def _task(source: Source, reporter: Reporter, include: Sequence[str | Path]) -> 
 
     reporter.enter(source.path)
     draft = resolve(source, reporter, include)
-    built = None if draft is None else build(draft, reporter)
-    if built is None or reporter.has_errors:
+    task = None if draft is None else build(draft, reporter)
+    if task is None or reporter.has_errors:
         raise SourceError(reporter.diagnostics)
-    return Task(built.scene, built.given, built.device, built.tracker, reporter.diagnostics)
+    return replace(task, warnings=reporter.diagnostics)

@@ -14,20 +14,19 @@ from dataclasses import replace
 from typing import Any, Final, Literal, cast
 
 from ntagen import rules
-from ntagen.hardware import GrblDevice, OpenIGTLinkTracker
 from ntagen.motion import Breath
-from ntagen.nsl import build_devices
+from ntagen.nsl import Task, build_devices
 from ntagen.nsl.build_regions import PlacedRegion, Regions
 from ntagen.nsl.diagnostics import Reporter
-from ntagen.nsl.draft import Draft
+from ntagen.nsl.draft import Draft, kept
 from ntagen.nsl.moves import MotionBuilder
 from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import ROUNDING, dot, minus, times, unit
-from ntagen.parameters import Given
 from ntagen.rounding import (
     COARSEST_PER_MM,
     USUAL_PER_MM,
     chosen,
+    farthest_mm,
     least_margin,
     precision_of,
     units_per_mm,
@@ -45,9 +44,7 @@ from ntagen.scene import (
     Tissue,
     Vector,
 )
-from ntagen.shapes import HalfSpace
 from ntagen.units import deg_from_rad, rad_from_deg
-from ntagen.values import dataclass
 
 DEFAULT_TIP_MM: Final[Vector] = (0.0, 0.0, 0.0)
 DEFAULT_HEADING: Final[Vector] = (0.0, -1.0, 0.0)
@@ -63,29 +60,12 @@ DEFAULT_ROLL_DISTANCE_MM: Final = 2.0
 _ABSURD_MM: Final = 1e100
 
 
-@dataclass(frozen=True, slots=True)
-class Built:
-    """What a draft describes.
-
-    Attributes:
-        scene: The scene.
-        given: The settings of the driver, in the order written.
-        device: The device that moves the needle.
-        tracker: What measures it.
-    """
-
-    scene: Scene
-    given: tuple[Given, ...] = ()
-    device: GrblDevice | None = None
-    tracker: OpenIGTLinkTracker | None = None
-
-
-def build(draft: Draft, reporter: Reporter) -> Built | None:
+def build(draft: Draft, reporter: Reporter) -> Task | None:
     """What the draft describes, or None after an error, which is reported."""
     device = build_devices.grbl_device(draft, reporter)
     tracker = build_devices.tracker(draft, reporter)
     scene = _Builder(draft, reporter).scene()
-    return None if scene is None else Built(scene, tuple(draft.given), device, tracker)
+    return None if scene is None else Task(scene, tuple(draft.given), device, tracker)
 
 
 _TISSUE_RULES: Final[dict[str, tuple[str, Callable[[float], rules.Breach | None]]]] = {
@@ -227,17 +207,9 @@ class _Builder:
         placed = self._draft.vectors.get(keyword)
         if placed is None:
             return default if keyword not in self._draft.seen else None
-        if placed.value is None:
-            return None
-        if max(map(abs, placed.value)) == 0.0:
-            self._report(
-                "direction-zero",
-                placed.span,
-                f"the {keyword} has no direction",
-                hint=f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`",
-            )
-            return None
-        return unit(placed.value)
+        hint = f"write for example `{keyword} {'-y' if keyword == 'heading' else '+z'}`"
+        value = placed.obeying(self._reporter, rules.direction, f"the {keyword}", hint)
+        return None if value is None else unit(value)
 
     def _report_skew(self, heading: Vector, bevel: Vector, breach: rules.Breach) -> None:
         """Reports a bevel that is not at right angles to the heading, and proposes the nearest."""
@@ -251,44 +223,35 @@ class _Builder:
             hint = f"write `bevel ({', '.join(f'{_rounded(c):g}' for c in unit(rest))})`"
         self._reporter.obeys(replace(breach, hint=hint), placed.span)
 
-    def _positive(self, keyword: str, kind: str, role: str) -> float | None:
+    def _positive(
+        self, keyword: str, kind: str, role: str, otherwise: float | None = None
+    ) -> float | None:
         """A property of the needle or its motion that is greater than 0."""
         placed = self._draft.numbers.get(keyword)
         if placed is None:
-            return None
-        return placed.obeying(lambda value: rules.positive(value, role, kind), self._reporter)
+            return None if keyword in self._draft.seen else otherwise
+        return placed.obeying(self._reporter, rules.positive, role, kind)
 
     def _needle(self, tip: Pose | None) -> Needle | None:
         """The needle, or None after a mistake in it."""
         radius = self._positive("radius", "radius-not-positive", "the radius of the motion circle")
         speed = self._positive("speed", "speed-not-positive", "the insertion speed")
-        length = (
-            DEFAULT_LENGTH_MM
-            if "length" not in self._draft.seen
-            else self._positive("length", "length-not-positive", "the needle's length")
-        )
+        role = "the needle's length"
+        length = self._positive("length", "length-not-positive", role, DEFAULT_LENGTH_MM)
         if tip is None or radius is None or speed is None or length is None:
             return None
         return Needle(tip, radius, speed, length)
 
     def _limits(self) -> Limits | None:
         """What the controller may do, or None after a mistake in it."""
-        draft = self._draft
-        step = (
-            DEFAULT_STEP_S
-            if "step" not in draft.seen
-            else self._positive("step", "step-not-positive", "the step")
-        )
+        draft, reporter = self._draft, self._reporter
+        step = self._positive("step", "step-not-positive", "the step", DEFAULT_STEP_S)
         angles = self._roll_angles()
-        count: int | None = DEFAULT_MAX_ROLLS
-        if draft.max_rolls is not None:
-            count = draft.max_rolls.obeying(rules.roll_count, self._reporter)
-        distance: float | None = DEFAULT_ROLL_DISTANCE_MM
-        if draft.roll_distance is not None:
-            distance = draft.roll_distance.obeying(
-                lambda value: rules.not_negative(value, "the distance between rolls"),
-                self._reporter,
-            )
+        count = kept(draft.max_rolls, DEFAULT_MAX_ROLLS, reporter, rules.roll_count)
+        role = "the distance between rolls"
+        distance = kept(
+            draft.roll_distance, DEFAULT_ROLL_DISTANCE_MM, reporter, rules.not_negative, role
+        )
         if step is None or angles is None or count is None or distance is None:
             return None
         return Limits(step, angles, count, distance, draft.is_bevel_free, self._spins())
@@ -299,7 +262,7 @@ class _Builder:
             return tuple(map(rad_from_deg, DEFAULT_ROLLS_DEG))
         found: dict[int, Span] = {}
         for placed in self._draft.angles:
-            angle_rad = placed.obeying(rules.roll, self._reporter)
+            angle_rad = placed.obeying(self._reporter, rules.roll)
             if angle_rad is None:
                 continue
             degrees = round(deg_from_rad(angle_rad))
@@ -314,7 +277,7 @@ class _Builder:
         """The fractions of the insertion in which the needle may spin; those without a mistake."""
         found: list[float] = []
         for placed in self._draft.spins:
-            spin = placed.obeying(rules.spin, self._reporter)
+            spin = placed.obeying(self._reporter, rules.spin)
             if spin is None:
                 continue
             repeated = rules.spin_repeated([*found, spin], len(found))
@@ -339,16 +302,14 @@ class _Builder:
         tissue = MEASURED_TISSUE if kind == "stochastic" else Tissue("adversarial")
         values: dict[str, Any] = {}
         for word, (field_name, rule) in _TISSUE_RULES.items():
-            placed = self._draft.tissue.get(word)
-            value = None if placed is None else placed.obeying(rule, self._reporter)
+            value = kept(self._draft.tissue.get(word), None, self._reporter, rule)
             if value is not None:
                 values[field_name] = value
         return replace(tissue, **values)
 
     def _resolution(self) -> int | None:
         """Fixed-point units in a mm if they are written, and rightly."""
-        placed = self._draft.resolution
-        value = None if placed is None else placed.obeying(rules.resolution, self._reporter)
+        value = kept(self._draft.resolution, None, self._reporter, rules.resolution)
         return None if value is None else round(value)
 
     # -------------------------------------------------------------------------------------- rules
@@ -478,14 +439,8 @@ class _Builder:
             )
         start = DEFAULT_TIP_MM if tip is None else tip.position_mm
         for sphere in spheres:
-            region = sphere.region
-            # The model also contains the distance from the tip to the centre.
-            reach = max(math.dist(start, region.center_mm), math.hypot(*region.center_mm))
-            # A half-space has no end; only its point is in the model.
-            extent = 0.0 if isinstance(region.shape, HalfSpace) else region.shape.reach_mm()
-            if region.motion is not None:
-                extent += region.motion.reach_mm
-            yield f"`{region.name}`", reach + extent, sphere.place
+            length_mm = farthest_mm(sphere.region, start)
+            yield f"`{sphere.region.name}`", length_mm, sphere.place
 
 
 def _units_per_mm(scene: Scene | None, written: int | None) -> int:

@@ -13,14 +13,10 @@ def grbl_device(draft: Draft, reporter: Reporter) -> GrblDevice | None:
     device = draft.devices.get("device")
     if device is None or device.address.value is None:
         return None
-    axes = {}
-    for word in ("insert", "roll"):
-        axis = _axis(word, device, draft, reporter)
-        if axis is not None:
-            axes[word] = axis
-    if len(axes) < 2:
+    insert, roll = (_axis(word, device, draft, reporter) for word in ("insert", "roll"))
+    if insert is None or roll is None:
         return None
-    return GrblDevice(device.address.value, axes["insert"], axes["roll"])
+    return GrblDevice(device.address.value, insert, roll)
 
 
 def _axis(word: str, device: DraftDevice, draft: Draft, reporter: Reporter) -> Axis | None:
@@ -35,20 +31,16 @@ def _axis(word: str, device: DraftDevice, draft: Draft, reporter: Reporter) -> A
                 hint=f"add for example `{form}`",
             )
         return None
-    letter, steps = device.axes[word]
-    if letter.value is None or steps.value is None:
-        return None
-    is_right = reporter.obeys(hardware.axis_letter(letter.value), letter.span)
-    if not reporter.obeys(hardware.axis_steps(steps.value), steps.span) or not is_right:
-        return None
-    return Axis(letter.value, steps.value)
+    placed_letter, placed_steps = device.axes[word]
+    letter = placed_letter.obeying(reporter, hardware.axis_letter)
+    steps = placed_steps.obeying(reporter, hardware.axis_steps)
+    return None if letter is None or steps is None else Axis(letter, steps)
 
 
 def tracker(draft: Draft, reporter: Reporter) -> OpenIGTLinkTracker | None:
     """The tracker that the file describes, or None without one or after an error."""
     device = draft.devices.get("tracker")
-    if device is None or device.address.value is None:
+    address = None if device is None else device.address.obeying(reporter, hardware.address)
+    if device is None or address is None:
         return None
-    if not reporter.obeys(hardware.address(device.address.value), device.address.span):
-        return None
-    return OpenIGTLinkTracker(*hardware.host_and_port(device.address.value), device.name)
+    return OpenIGTLinkTracker(*hardware.host_and_port(address), device.name)

@@ -20,7 +20,7 @@ from ntagen.nsl.source import Span
 from ntagen.nsl.vectors import dot, minus
 from ntagen.nsl.wording import article
 from ntagen.scene import Needle, Pose, Region, Vector
-from ntagen.shapes import UPRIGHT, Shape, Sphere, is_in, overlap, thickness_mm
+from ntagen.shapes import Shape, Sphere, is_in, overlap, thickness_mm
 from ntagen.values import dataclass
 
 if TYPE_CHECKING:
@@ -106,8 +106,7 @@ class Regions:
         for region in map(self._own, targets):
             if region is None:
                 return
-            moved_mm = 0.0 if region.motion is None else region.motion.reach_mm
-            ends = _corners(replace(region, shape=region.shape.grown(moved_mm)))
+            ends = _corners(region.grown(region.moved_mm))
             depths += [dot(minus(end, needle.tip.position_mm), needle.tip.heading) for end in ends]
         self._depth_mm = max(0.0, *depths, 0.0) + _FIELD_MARGIN_MM
 
@@ -153,26 +152,21 @@ class Regions:
         if draft.solid is not None:
             shape = self._solids.shape(draft, draft.solid)
             return None if shape is None else Region(draft.name, draft.kind, shape)
-        radius = draft.radius.obeying(
-            lambda value: rules.positive(value, f"the radius of `{draft.name}`"), self._reporter
-        )
+        role = f"the radius of `{draft.name}`"
+        radius = draft.radius.obeying(self._reporter, rules.positive, role)
         if radius is None or draft.center is None or draft.center.value is None:
             return None
         return Region.ball(draft.name, draft.kind, draft.center.value, radius)
 
     def _around(self, draft: DraftRegion) -> Region | None:
         """A detection region around a critical one."""
-        margin = draft.margin.value
-        if margin is not None and not self._reporter.obeys(
-            rules.not_negative(margin, f"the margin of `{draft.name}`", "margin-negative"),
-            draft.margin.span,
-        ):
-            margin = None
-        elif margin == 0.0:
+        role = f"the margin of `{draft.name}`"
+        margin = draft.margin.obeying(self._reporter, rules.not_negative, role, "margin-negative")
+        if margin == 0.0:
             self._report(
                 "margin-zero",
                 draft.margin.span,
-                f"the margin of `{draft.name}` is 0: nearness is never noticed before contact",
+                f"{role} is 0: nearness is never noticed before contact",
                 hint="write for example `margin 3 mm`",
             )
         inner = self._critical_inside(draft)
@@ -180,13 +174,9 @@ class Regions:
         if region is None or margin is None:
             return None
         shape = region.shape.grown(margin)
-        if not self._reporter.obeys(
-            rules.finite(
-                [number for _, numbers, _ in shape.parts() for number in numbers],
-                f"the radius of `{draft.name}`",
-            ),
-            draft.margin.span,
-        ):
+        numbers = [number for _, numbers, _ in shape.parts() for number in numbers]
+        breach = rules.finite(numbers, f"the radius of `{draft.name}`")
+        if not self._reporter.obeys(breach, draft.margin.span):
             return None
         # A shell moves with what it lies around.
         motion = region.motion if draft.moves is None else self._motions.motion(draft)
@@ -266,9 +256,7 @@ class Regions:
         region, span = target.region, target.place
         offset = minus(region.center_mm, tip.position_mm)
         ahead = dot(offset, tip.heading)
-        reach_mm = region.shape.reach_mm()
-        if region.motion is not None:
-            reach_mm += region.motion.reach_mm
+        reach_mm = region.shape.reach_mm() + region.moved_mm
         if ahead + reach_mm < 0.0:
             self._report(
                 "target-behind-needle",
@@ -276,7 +264,7 @@ class Regions:
                 f"`{region.name}` lies {-ahead - reach_mm:.3g} mm behind the needle's tip",
                 hint="move it along the heading, or turn the heading round",
             )
-        elif is_in(_placed(region, 0.0), tip.position_mm):
+        elif is_in(region.at(0.0).shape, tip.position_mm):
             self._report(
                 "tip-in-target",
                 span,
@@ -313,7 +301,7 @@ class Regions:
     def _check_start(self, tip: Pose, other: PlacedRegion) -> None:
         """The tip must not start in a critical region, and should not in a detection region."""
         region = other.region
-        if not is_in(_placed(region, 0.0), tip.position_mm):
+        if not is_in(region.at(0.0).shape, tip.position_mm):
             return
         self._report(
             "tip-in-critical" if region.kind == "critical" else "tip-in-detection",
@@ -346,11 +334,4 @@ def _together(one: Region, other: Region) -> Iterator[tuple[Shape, Shape]]:
     period_s = 1.0 if moving is None else moving.period_s
     for moment in range(_MOMENTS):
         time_s = moment * period_s / _MOMENTS
-        yield _placed(one, time_s), _placed(other, time_s)
-
-
-def _placed(region: Region, time_s: float) -> Shape:
-    """The shape of a region where it is at a time of the breath."""
-    if region.motion is None:
-        return region.shape
-    return region.shape.placed(UPRIGHT, region.motion.at_mm(time_s))
+        yield one.at(time_s).shape, other.at(time_s).shape

@@ -7,9 +7,9 @@ it to the draft.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter
@@ -65,39 +65,33 @@ class ContentResolver:
     ) -> None:
         self._reporter = reporter
         self._evaluator = evaluator
-        self._driver = driver
         self._solids = SolidResolver(evaluator)
         self._images = ImageResolver(reporter, evaluator)
         self._moves = MovesResolver(reporter, evaluator, folders)
+        self._adders: dict[type, Callable[[Any, Scope, Draft], None]] = {
+            tree.Query: self._query,
+            tree.Setting: self._setting,
+            tree.Roll: self._roll,
+            tree.Spin: self._spin,
+            tree.Wait: self._moves.wait,
+            tree.Gate: self._moves.gate,
+            tree.Choice: self._choice,
+            tree.Tissue: self._tissue,
+            tree.Parameter: driver.add_parameter,
+            tree.Axis: driver.axis,
+            tree.Tracker: driver.tracker,
+            tree.Transform: self._images.transform,
+            tree.Resolution: self._resolution,
+        }
 
     def add(
         self, statement: tree.Statement, scope: Scope, draft: Draft, *, is_in_loop: bool
     ) -> None:
         """Resolves a statement about the environment itself."""
-        match statement:
-            case tree.Region():
-                self._region(statement, scope, draft, is_in_loop=is_in_loop)
-            case tree.Query():
-                self._query(statement, draft)
-            case tree.Setting():
-                self._setting(statement, scope, draft)
-            case tree.Roll() | tree.Spin():
-                self._turns(statement, scope, draft)
-            case tree.Wait() | tree.Gate():
-                self._moves.rest(statement, scope, draft)
-            case tree.Choice() | tree.Tissue():
-                self._behaviour(statement, scope, draft)
-            case tree.Parameter():
-                draft.given += self._driver.parameter(statement, scope)
-            case tree.Axis():
-                self._driver.axis(statement, scope, draft)
-            case tree.Tracker():
-                self._driver.tracker(statement, draft)
-            case tree.Transform():
-                draft.transform = self._images.transform(statement, scope)
-                draft.has_gaps |= draft.transform is None
-            case tree.Resolution():
-                self._resolution(statement, scope, draft)
+        if isinstance(statement, tree.Region):
+            self._region(statement, scope, draft, is_in_loop=is_in_loop)
+        else:
+            self._adders[type(statement)](statement, scope, draft)
 
     def _region(
         self, statement: tree.Region, scope: Scope, draft: Draft, *, is_in_loop: bool
@@ -124,14 +118,8 @@ class ContentResolver:
             return
         first = draft.regions.setdefault(name, region)
         if first is not region:
-            self._reporter.report(
-                "duplicate-name",
-                statement.name.span,
-                f"there is a region `{name}` already",
-                hint="choose another name"
-                + (" or another index" if statement.name.indices else ""),
-                notes=(f"the first is at {first.name_span.place}",),
-            )
+            other = "another name or another index" if statement.name.indices else "another name"
+            self._reporter.taken(statement.name.span, f"a region `{name}`", first.name_span, other)
 
     def _is_full(self, statement: tree.Region, draft: Draft) -> bool:
         """Whether the environment has the maximum number of regions; if so, reports it."""
@@ -152,16 +140,9 @@ class ContentResolver:
         """A region with its sphere, or with the region that it lies around."""
         keyword, span, shape = statement.keyword, statement.name.span, statement.shape
         if isinstance(shape, tree.Sphere):
-            role = f"the radius of `{name}`"
             center = self._evaluator.vector(shape.center, scope, LENGTH, f"the centre of `{name}`")
-            radius = self._evaluator.number(shape.radius, scope, LENGTH, role)
-            return DraftRegion(
-                keyword,
-                name,
-                span,
-                Placed(center, shape.center.span),
-                Placed(radius, shape.radius.span),
-            )
+            radius = self._evaluator.number(shape.radius, scope, LENGTH, f"the radius of `{name}`")
+            return DraftRegion(keyword, name, span, center, radius)
         if isinstance(shape, tree.Solid):
             solid = self._solids.solid(shape, name, scope)
             extent: Placed[float] = Placed(None, shape.measures[EXTENTS[shape.form]].span)
@@ -182,102 +163,67 @@ class ContentResolver:
                 hint="give it a sphere, or make it a `detection` region",
             )
             return None
-        return DraftRegion(
-            keyword,
-            name,
-            span,
-            None,
-            Placed(margin, shape.margin.span),
-            Placed(around, shape.region.span),
-        )
+        inner = Placed(around, shape.region.span)
+        return DraftRegion(keyword, name, span, None, margin, inner)
 
     def _region_name(self, name: tree.RegionName, scope: Scope) -> str | None:
         """A region's name with the values of its indices: ``Ring[3]``."""
         text = name.identifier.text
         for index in name.indices:
-            number = self._evaluator.whole(index, scope, "an index")
+            number = self._evaluator.whole(index, scope, "an index").value
             if number is None:
                 return None
             text += f"[{number}]"
         return text
 
-    def _query(self, statement: tree.Query, draft: Draft) -> None:
+    def _query(self, statement: tree.Query, _: Scope, draft: Draft) -> None:
         """A named query; the engine checks its text later."""
         name = statement.name
         first = draft.queries.setdefault(name.text, Placed(statement.text, name.span))
         if first.span is not name.span:
-            self._reporter.report(
-                "duplicate-name",
-                name.span,
-                f"there is a query `{name.text}` already",
-                hint="choose another name",
-                notes=(f"the first is at {first.span.place}",),
-            )
+            self._reporter.taken(name.span, f"a query `{name.text}`", first.span)
 
     def _setting(self, statement: tree.Setting, scope: Scope, draft: Draft) -> None:
         """A property of the needle or of its motion."""
-        span, value = statement.value.span, statement.value
+        value = statement.value
         is_free = isinstance(value, tree.Name) and value.text == FREE and FREE not in scope
         if statement.keyword == "bevel" and is_free:
             draft.is_bevel_free = True
         elif statement.keyword in VECTORS:
             dimension, role = VECTORS[statement.keyword]
-            vector = self._evaluator.vector(statement.value, scope, dimension, role)
-            draft.vectors[statement.keyword] = Placed(vector, span)
+            vector = self._evaluator.vector(value, scope, dimension, role)
+            draft.vectors[statement.keyword] = vector
         else:
             dimension, role = NUMBERS[statement.keyword]
-            number = self._evaluator.number(statement.value, scope, dimension, role)
-            draft.numbers[statement.keyword] = Placed(number, span)
-
-    def _turns(self, statement: tree.Roll | tree.Spin, scope: Scope, draft: Draft) -> None:
-        """How the needle may be turned between pushes, or in them."""
-        if isinstance(statement, tree.Roll):
-            self._roll(statement, scope, draft)
-        else:
-            self._spin(statement, scope, draft)
+            number = self._evaluator.number(value, scope, dimension, role)
+            draft.numbers[statement.keyword] = number
 
     def _roll(self, statement: tree.Roll, scope: Scope, draft: Draft) -> None:
         """The rolls that may be chosen, and their limits."""
-        angles = self._evaluator.list_of(statement.angles, scope, ANGLE, "a roll")
-        draft.angles = [
-            Placed(angle, expression.span)
-            for angle, expression in zip(angles, statement.angles, strict=True)
-        ]
+        evaluator = self._evaluator
+        draft.angles = evaluator.list_of(statement.angles, scope, ANGLE, "a roll")
         for limits, words in ((statement.at_most, "at most"), (statement.at_least, "at least")):
             for repeated in limits[1:]:
-                self._reporter.report(
-                    "statement-repeated",
-                    repeated.span,
-                    f"`{words}` is written a second time",
-                    hint="remove one of the two",
-                )
+                self._reporter.repeated(repeated.span, words)
         for limit in statement.at_most[:1]:
-            count = self._evaluator.whole(limit, scope, "the number of rolls")
-            draft.max_rolls = Placed(count, limit.span)
+            draft.max_rolls = evaluator.whole(limit, scope, "the number of rolls")
         for limit in statement.at_least[:1]:
-            distance = self._evaluator.number(limit, scope, LENGTH, "the distance between rolls")
-            draft.roll_distance = Placed(distance, limit.span)
+            role = "the distance between rolls"
+            draft.roll_distance = evaluator.number(limit, scope, LENGTH, role)
 
     def _spin(self, statement: tree.Spin, scope: Scope, draft: Draft) -> None:
         """The fractions of the insertion in which the needle may spin."""
         draft.spins = [
-            Placed(self._evaluator.number(one, scope, NUMBER, "a spun fraction"), one.span)
+            self._evaluator.number(one, scope, NUMBER, "a spun fraction")
             for one in statement.fractions
         ]
 
-    def _choice(self, statement: tree.Choice, draft: Draft) -> None:
+    def _choice(self, statement: tree.Choice, _: Scope, draft: Draft) -> None:
         """A property that is one of a few words."""
         if is_choice(statement.word, statement.keyword, self._reporter):
             draft.choices[statement.keyword] = statement.word.text
         else:
             draft.has_gaps = True
-
-    def _behaviour(self, statement: tree.Choice | tree.Tissue, scope: Scope, draft: Draft) -> None:
-        """What is safe, or how the tissue behaves."""
-        if isinstance(statement, tree.Choice):
-            self._choice(statement, draft)
-        else:
-            self._tissue(statement, scope, draft)
 
     def _tissue(self, statement: tree.Tissue, scope: Scope, draft: Draft) -> None:
         """How the tissue behaves, with its bounds or spreads."""
@@ -302,19 +248,13 @@ class ContentResolver:
         for bound in statement.bounds:
             word = bound.word.text
             if word in draft.tissue:
-                self._reporter.report(
-                    "statement-repeated",
-                    bound.word.span,
-                    f"`{word}` is written a second time",
-                    hint="remove one of the two",
-                )
+                self._reporter.repeated(bound.word.span, word)
             dimension, role = TISSUE[word]
-            value = self._evaluator.number(bound.value, scope, dimension, role)
-            draft.tissue[word] = Placed(value, bound.value.span)
+            draft.tissue[word] = self._evaluator.number(bound.value, scope, dimension, role)
 
     def _resolution(self, statement: tree.Resolution, scope: Scope, draft: Draft) -> None:
         """The fixed-point scale, as units per mm."""
-        count = self._evaluator.number(statement.count, scope, NUMBER, "the resolution")
+        count = self._evaluator.number(statement.count, scope, NUMBER, "the resolution").value
         unit = self._evaluator.unit(statement.unit)
         value: float | None = None
         if unit is not None and unit[1] != LENGTH:

@@ -8,7 +8,7 @@ the node, and passes on only those with a meaning: nodes, names, texts, numbers 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from lark import Transformer, v_args
 
@@ -68,6 +68,11 @@ def _placed_word(
 _with_word = v_args(wrapper=_placed_word)
 
 
+def _listed(make: Callable[..., object], single: int = 0) -> Callable[..., object]:
+    """Makes a node whose last field is a tuple: of all parts after so many single ones."""
+    return staticmethod(lambda span, *parts: make(span, *parts[:single], parts[single:]))
+
+
 @v_args(wrapper=_placed)
 class TreeBuilder(Transformer[Any, tree.Statement]):
     """Makes the node of each rule."""
@@ -79,41 +84,16 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
     resolution = tree.Resolution
     axis = tree.Axis
     gate = tree.Gate
+    environment = tree.Environment
+    loop = tree.Loop
+    device = tree.Device
+    tracker = tree.Tracker
+    wait = tree.Wait
+    section = _with_word(tree.Section)
     setting = _with_word(tree.Setting)
     safety = _with_word(tree.Choice)
-
-    def environment(self, span: Span, name: tree.Identifier) -> tree.Environment:
-        """``environment paper``."""
-        return tree.Environment(span, name, ())
-
-    @_with_word
-    def section(self, span: Span, word: Literal["needle", "motion", "drive"]) -> tree.Section:
-        """``needle``, ``motion`` or ``drive``."""
-        return tree.Section(span, word, ())
-
-    def loop(
-        self, span: Span, variable: tree.Identifier, first: tree.Expression, last: tree.Expression
-    ) -> tree.Loop:
-        """``for i in 0..7``."""
-        return tree.Loop(span, variable, first, last, ())
-
-    def parameter(self, span: Span, words: str, *values: tree.Expression) -> tree.Parameter:
-        """``pull 4 mm``, in `drive`."""
-        return tree.Parameter(span, words, values)
-
-    def device(self, span: Span, kind: tree.Identifier, port: tree.Identifier) -> tree.Device:
-        """``device grbl "/dev/ttyACM0"``."""
-        return tree.Device(span, kind, port, ())
-
-    def tracker(
-        self,
-        span: Span,
-        kind: tree.Identifier,
-        address: tree.Identifier,
-        name: tree.Identifier | None = None,
-    ) -> tree.Tracker:
-        """``tracker openigtlink "localhost:18944" "Needle"``."""
-        return tree.Tracker(span, kind, address, name)
+    spin = _listed(tree.Spin)
+    parameter = _listed(tree.Parameter, 1)
 
     def tissue(self, span: Span, word: tree.Identifier, *bounds: _Part) -> tree.Tissue:
         """``tissue adversarial curvature 10 % roll 5 deg``."""
@@ -144,27 +124,14 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
         """``at least 2 mm apart``."""
         return _Clause(span, "least", (value,))
 
-    def spin(self, span: Span, *fractions: tree.Expression) -> tree.Spin:
-        """``spin 20 %, 40 %``."""
-        return tree.Spin(span, fractions)
-
-    def wait(
-        self, span: Span, length: tree.Expression, at_most: _Clause | None = None
-    ) -> tree.Wait:
-        """``wait 0.5 s at most 2 times``."""
-        return tree.Wait(span, length, at_most.values[0] if at_most else None)
-
     # ----------------------------------------------------------------------------------- regions
 
     region = tree.Region
     sphere = tree.Sphere
     around = tree.Around
-
-    def region_name(
-        self, span: Span, identifier: tree.Identifier, *indices: tree.Expression
-    ) -> tree.RegionName:
-        """``Ring[i]``."""
-        return tree.RegionName(span, identifier, indices)
+    region_name = _listed(tree.RegionName, 1)
+    image = _with_word(_listed(tree.Image, 2))
+    words = _with_word(_listed(tree.Clause, 1))
 
     @_with_word
     def solid(self, span: Span, form: tree.SolidForm, *parts: _Part) -> tree.Solid:
@@ -177,18 +144,6 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
     def turned(self, span: Span, angle: tree.Expression, axis: tree.Expression) -> _Clause:
         """``turned 30 deg about +z``."""
         return _Clause(span, "turned", (angle, axis))
-
-    @_with_word
-    def image(
-        self, span: Span, form: tree.ImageForm, path: tree.Identifier, *clauses: tree.Clause
-    ) -> tree.Image:
-        """``mesh "liver.stl" in LPS mm``."""
-        return tree.Image(span, form, path, clauses)
-
-    @_with_word
-    def words(self, span: Span, keyword: _Part, *words: tree.Identifier) -> tree.Clause:
-        """``in LPS mm`` or ``segment "tumor"``."""
-        return tree.Clause(span, keyword, words)
 
     @_with_word
     def value(self, span: Span, keyword: _Part, value: tree.Expression) -> tree.Clause:
@@ -220,6 +175,8 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
 
     parenthesised = _Parenthesised
     measured = tree.Measured
+    vector = _listed(tree.Vector)
+    call = _listed(tree.Call, 1)
 
     def number(self, span: Span, text: str) -> tree.Number:
         """``1.5``."""
@@ -228,14 +185,6 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
     def name(self, span: Span, name: tree.Identifier) -> tree.Name:
         """``depth``."""
         return tree.Name(span, name.text)
-
-    def call(self, span: Span, function: tree.Identifier, *arguments: tree.Expression) -> tree.Call:
-        """``sin(30 deg)``."""
-        return tree.Call(span, function, arguments)
-
-    def vector(self, span: Span, *components: tree.Expression) -> tree.Vector:
-        """``(0, -50, 0)``."""
-        return tree.Vector(span, components)
 
     def signed(self, span: Span, *parts: _Part) -> tree.Signed:
         """``-x``."""

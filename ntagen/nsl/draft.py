@@ -28,11 +28,30 @@ class Placed(Generic[T]):
     value: T | None
     span: Span
 
-    def obeying(self, rule: Callable[[T], Breach | None], reporter: Reporter) -> T | None:
-        """The value if it obeys a rule; if not, that is reported. None after a mistake."""
-        if self.value is None or not reporter.obeys(rule(self.value), self.span):
+    def obeying(
+        self, reporter: Reporter, rule: Callable[..., Breach | None], *rest: object
+    ) -> T | None:
+        """The value if it obeys a rule; if not, that is reported. None after a mistake.
+
+        Args:
+            reporter: Collects the mistakes.
+            rule: Of the value and the rest.
+            rest: What the rule is told besides.
+        """
+        if self.value is None or not reporter.obeys(rule(self.value, *rest), self.span):
             return None
         return self.value
+
+
+def kept(
+    placed: Placed[T] | None,
+    otherwise: T | None,
+    reporter: Reporter,
+    rule: Callable[..., Breach | None],
+    *rest: object,
+) -> T | None:
+    """`Placed.obeying`; if there is no value, what it is otherwise."""
+    return otherwise if placed is None else placed.obeying(reporter, rule, *rest)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,33 +10,15 @@ from ntagen.nsl.diagnostics import Reporter, SourceError, did_you_mean
 from ntagen.nsl.draft import Draft, DraftDevice, Placed
 from ntagen.nsl.evaluate import CONSTANTS, Evaluator, Scope
 from ntagen.nsl.parser import parse
-from ntagen.nsl.quantity import (
-    ANGLE,
-    DATA,
-    FORCE,
-    FORCE_PER_LENGTH,
-    LENGTH,
-    NUMBER,
-    STEPS_PER_ANGLE,
-    STEPS_PER_LENGTH,
-    TIME,
-    TURNING,
-    Dimension,
-)
+from ntagen.nsl.quantity import NUMBER, STEPS_PER_ANGLE, STEPS_PER_LENGTH, Dimension, quotient
 from ntagen.nsl.source import Source
 from ntagen.parameters import BY_WORDS, MEASURES, Given, Kind, Parameter, Value
 from ntagen.units import RAD_PER
 
 _DIMENSIONS: Final[dict[Kind, Dimension]] = {
-    "length": LENGTH,
-    "angle": ANGLE,
-    "time": TIME,
-    "force": FORCE,
-    "force per length": FORCE_PER_LENGTH,
-    "angle per time": TURNING,
-    "data": DATA,
-    "ratio": NUMBER,
-    "percentage": NUMBER,
+    kind: quotient(tuple(measure.unit.split("/")))[1] if measure.unit else NUMBER
+    for kind, measure in MEASURES.items()
+    if measure.units and kind != "count"
 }
 
 CHOICES: Final = {
@@ -50,16 +32,8 @@ CHOICES: Final = {
 
 def is_choice(word: tree.Identifier, keyword: str, reporter: Reporter) -> bool:
     """Whether a word is one of those that a property allows; if not, reports it."""
-    known = CHOICES[keyword]
-    if word.text in known:
-        return True
-    reporter.report(
-        "unknown-choice",
-        word.span,
-        f"there is no {keyword} `{word.text}`",
-        hint=did_you_mean(word.text, known) or f"write {' or '.join(f'`{w}`' for w in known)}",
-    )
-    return False
+    message = f"there is no {keyword} `{word.text}`"
+    return reporter.chooses(word.text, word.span, CHOICES[keyword], message)
 
 
 def read_settings(texts: Sequence[str], origin: str) -> tuple[Given, ...]:
@@ -84,13 +58,8 @@ def read_settings(texts: Sequence[str], origin: str) -> tuple[Given, ...]:
             continue
         first = firsts.setdefault(statement.keyword, statement)
         if first is not statement:
-            reporter.report(
-                "statement-repeated",
-                statement.span,
-                f"`{statement.keyword}` is written a second time",
-                hint="remove one of the two",
-                notes=(f"the first is `{first.span.text}`",),
-            )
+            note = f"the first is `{first.span.text}`"
+            reporter.repeated(statement.span, statement.keyword, note)
         given += resolver.parameter(statement, Scope())
     if reporter.has_errors:
         raise SourceError(reporter.diagnostics)
@@ -112,6 +81,10 @@ class DriverResolver:
         self._reporter = reporter
         self._evaluator = evaluator
         self._takes_plain_numbers = takes_plain_numbers
+
+    def add_parameter(self, statement: tree.Parameter, scope: Scope, draft: Draft) -> None:
+        """Adds a setting of the driver."""
+        draft.given += self.parameter(statement, scope)
 
     def parameter(self, statement: tree.Parameter, scope: Scope) -> list[Given]:
         """A setting of the driver; none after a mistake."""
@@ -159,9 +132,9 @@ class DriverResolver:
         if self._takes_plain_numbers:
             first = _measured(first, MEASURES[parameter.kind].unit)
         if parameter.kind == "count":
-            return self._evaluator.whole(first, scope, role)
+            return self._evaluator.whole(first, scope, role).value
         if parameter.kind in _DIMENSIONS:
-            return self._evaluator.number(first, scope, _DIMENSIONS[parameter.kind], role)
+            return self._evaluator.number(first, scope, _DIMENSIONS[parameter.kind], role).value
         words = [self._word(expression, parameter) for expression in statement.values]
         if any(word is None for word in words):
             return None
@@ -172,16 +145,9 @@ class DriverResolver:
     def _word(self, expression: tree.Expression, parameter: Parameter) -> str | None:
         """A word that a setting allows; None after a mistake."""
         text = expression.text if isinstance(expression, tree.Name) else expression.span.text
-        if text in parameter.choices:
-            return text
-        self._reporter.report(
-            "unknown-choice",
-            expression.span,
-            f"`{parameter.words}` cannot be `{text}`",
-            hint=did_you_mean(text, parameter.choices)
-            or f"write {' or '.join(f'`{word}`' for word in parameter.choices)}",
-        )
-        return None
+        message = f"`{parameter.words}` cannot be `{text}`"
+        is_known = self._reporter.chooses(text, expression.span, parameter.choices, message)
+        return text if is_known else None
 
     def device(self, statement: tree.Device, draft: Draft) -> bool:
         """A device without its axes; returns whether there is such a device."""
@@ -196,16 +162,16 @@ class DriverResolver:
         dimension = STEPS_PER_LENGTH if statement.keyword == "insert" else STEPS_PER_ANGLE
         role = f"the steps of `{statement.keyword}`"
         steps = self._evaluator.number(statement.steps, scope, dimension, role)
-        if steps is not None and statement.keyword == "roll":
+        if steps.value is not None and statement.keyword == "roll":
             # Dimensions are computed per rad; controllers and people count per degree.
-            steps *= RAD_PER["deg"]
+            steps = Placed(steps.value * RAD_PER["deg"], steps.span)
         letter = Placed(statement.letter.text, statement.letter.span)
         device = draft.devices.get("device")
         # Without one, the statement before the braces has a mistake, which was reported.
         if device is not None:
-            device.axes[statement.keyword] = (letter, Placed(steps, statement.steps.span))
+            device.axes[statement.keyword] = (letter, steps)
 
-    def tracker(self, statement: tree.Tracker, draft: Draft) -> None:
+    def tracker(self, statement: tree.Tracker, _: Scope, draft: Draft) -> None:
         """A tracker."""
         if is_choice(statement.kind, "tracker", self._reporter):
             address = Placed(statement.address.text, statement.address.span)

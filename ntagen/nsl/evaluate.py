@@ -14,6 +14,7 @@ from typing import Final
 
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
+from ntagen.nsl.draft import Placed
 from ntagen.nsl.quantity import (
     ALIASES,
     ANGLE,
@@ -27,6 +28,7 @@ from ntagen.nsl.quantity import (
     scalar,
 )
 from ntagen.nsl.source import Span
+from ntagen.scene import Vector
 from ntagen.values import dataclass
 
 CONSTANTS: Final = {
@@ -63,8 +65,8 @@ class Evaluator:
 
     def number(
         self, expression: tree.Expression, scope: Scope, dimension: Dimension, role: str
-    ) -> float | None:
-        """One number of a dimension, in mm, rad and s.
+    ) -> Placed[float]:
+        """One number of a dimension, in mm, rad and s, with its place.
 
         Args:
             expression: The expression.
@@ -73,72 +75,71 @@ class Evaluator:
             role: The place in words, as the subject of a message: ``the radius``.
 
         Returns:
-            The number, or None after a mistake.
+            The number; it is None after a mistake.
         """
-        plain = _plain_numbers(expression, dimension)
-        if plain is not None and len(plain) == 1:
-            return plain[0]
-        value = self.evaluate(expression, scope)
-        if value is None:
-            return None
-        if value.is_vector:
-            self._report(
-                "vector-misused",
-                expression.span,
-                f"{role} is a single value, but this is a vector",
-                hint=f"write for example `{_example(dimension)}`",
-            )
-            return None
-        return value.number if self._has(value, dimension, expression, role) else None
+        found = self._numbers(expression, scope, dimension, role, is_vector=False)
+        return Placed(found[0] if found else None, expression.span)
 
     def vector(
         self, expression: tree.Expression, scope: Scope, dimension: Dimension, role: str
-    ) -> tuple[float, float, float] | None:
+    ) -> Placed[Vector]:
         """Three numbers of a dimension, in mm, rad and s; arguments and result as in `number`."""
+        found = self._numbers(expression, scope, dimension, role, is_vector=True)
+        return Placed((found[0], found[1], found[2]) if found else None, expression.span)
+
+    def _numbers(
+        self,
+        expression: tree.Expression,
+        scope: Scope,
+        dimension: Dimension,
+        role: str,
+        *,
+        is_vector: bool,
+    ) -> Sequence[float] | None:
+        """The numbers of a vector, or the only one of a single value; None after a mistake."""
         plain = _plain_numbers(expression, dimension)
-        if plain is not None and len(plain) == 3:
-            return plain[0], plain[1], plain[2]
+        if plain is not None and len(plain) == (3 if is_vector else 1):
+            return plain
         value = self.evaluate(expression, scope)
         if value is None:
             return None
-        if not value.is_vector:
-            unit = f" {USUAL_UNIT[dimension]}" if dimension in USUAL_UNIT else ""
+        if value.is_vector != is_vector:
+            wanted, found = "a single value", "a vector"
+            example = _example(dimension)
+            if is_vector:
+                wanted, found = found, wanted
+                example = f"(0, -25, 0) {USUAL_UNIT.get(dimension, '')}".rstrip()
             self._report(
                 "vector-misused",
                 expression.span,
-                f"{role} is a vector, but this is a single value",
-                hint=f"write for example `(0, -25, 0){unit}`",
+                f"{role} is {wanted}, but this is {found}",
+                hint=f"write for example `{example}`",
             )
             return None
-        if not self._has(value, dimension, expression, role):
-            return None
-        first, second, third = value.numbers
-        return first, second, third
+        return value.numbers if self._has(value, dimension, expression, role) else None
 
-    def whole(self, expression: tree.Expression, scope: Scope, role: str) -> int | None:
+    def whole(self, expression: tree.Expression, scope: Scope, role: str) -> Placed[int]:
         """A whole number; arguments and result as in `number`."""
-        value = self.number(expression, scope, NUMBER, role)
-        if value is None:
-            return None
-        rounded = round(value)
+        value = self.number(expression, scope, NUMBER, role).value
+        rounded = None if value is None else round(value)
         # The result of a division may differ from a whole number by rounding.
-        if abs(value - rounded) > 1e-9 * max(1.0, abs(value)):
+        if value is not None and abs(value - round(value)) > 1e-9 * max(1.0, abs(value)):
             self._report(
                 "not-whole",
                 expression.span,
                 f"{role} must be a whole number, but this is {value:g}",
                 hint=f"write {rounded}" if isinstance(expression, tree.Number) else None,
             )
-            return None
-        return rounded
+            rounded = None
+        return Placed(rounded, expression.span)
 
     def list_of(
         self, expressions: Sequence[tree.Expression], scope: Scope, dimension: Dimension, role: str
-    ) -> list[float | None]:
+    ) -> list[Placed[float]]:
         """Numbers of a dimension; one without a unit takes that of the last: ``90, 180 deg``."""
         last = expressions[-1]
         unit = last.unit if isinstance(last, tree.Measured) else None
-        values: list[float | None] = []
+        values: list[Placed[float]] = []
         for expression in expressions:
             written = self.evaluate(expression, scope)
             if unit is not None and written is not None and written.dimension == NUMBER:

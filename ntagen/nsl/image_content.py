@@ -6,7 +6,7 @@ from typing import Final
 
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
-from ntagen.nsl.draft import DraftImage, DraftTransform, Placed
+from ntagen.nsl.draft import Draft, DraftImage, DraftTransform, Placed
 from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.quantity import LENGTH, NUMBER, UNITS
 
@@ -53,27 +53,26 @@ class ImageResolver:
                 word = clauses[keyword].words[0]
                 part = Placed(word.text, word.span)
         if "label" in clauses and (value := clauses["label"].value) is not None:
-            label = self._evaluator.whole(value, scope, f"the label of `{name}`")
-            part = Placed(label, value.span)
-            is_right = is_right and label is not None
+            part = self._evaluator.whole(value, scope, f"the label of `{name}`")
+            is_right = is_right and part.value is not None
         lengths: dict[str, Placed[float]] = {}
         for keyword, what in (("radius", "the radius"), ("grid", "the grid")):
             if keyword in clauses and (value := clauses[keyword].value) is not None:
                 role = f"{what} of `{name}`"
                 length = self._evaluator.number(value, scope, LENGTH, role)
-                if length is not None and length <= 0.0:
-                    self._reporter.report(
-                        "radius-not-positive",
-                        value.span,
-                        f"{role} must be greater than 0, but this is {length:g} mm",
-                    )
-                    length = None
-                lengths[keyword] = Placed(length, value.span)
-                is_right = is_right and length is not None
+                lengths[keyword] = length
+                is_right = self._is_positive(length, role) and is_right
         path = Placed(shape.path.text, shape.path.span)
         radius_mm, grid_mm = lengths.get("radius"), lengths.get("grid")
         image = DraftImage(shape.form, path, space, unit_mm, part, matrix, radius_mm, grid_mm)
         return image if is_right else None
+
+    def _is_positive(self, length: Placed[float], role: str) -> bool:
+        """Whether a length has no mistake and is greater than 0; if it is not, reports it."""
+        if length.value is not None and length.value <= 0.0:
+            message = f"{role} must be greater than 0, but this is {length.value:g} mm"
+            self._reporter.report("radius-not-positive", length.span, message)
+        return length.value is not None and length.value > 0.0
 
     def _space(
         self, form: tree.ImageForm, clause: tree.Clause | None
@@ -101,17 +100,17 @@ class ImageResolver:
                 return None, None, None, False
         return space, unit, matrix, True
 
-    def transform(self, statement: tree.Transform, scope: Scope) -> DraftTransform | None:
+    def transform(self, statement: tree.Transform, scope: Scope, draft: Draft) -> None:
+        """Where imaging space is."""
+        draft.transform = self._transform(statement, scope)
+        draft.has_gaps |= draft.transform is None
+
+    def _transform(self, statement: tree.Transform, scope: Scope) -> DraftTransform | None:
         """Where imaging space is; None after a mistake."""
         direction, space = statement.direction, statement.space
         for word, known in ((direction, ("from", "to")), (space, _SPACES)):
-            if word.text not in known:
-                self._reporter.report(
-                    "unknown-choice",
-                    word.span,
-                    f"a transform is not written with `{word.text}` here",
-                    hint=did_you_mean(word.text, known) or f"write `{known[0]}` or `{known[1]}`",
-                )
+            message = f"a transform is not written with `{word.text}` here"
+            if not self._reporter.chooses(word.text, word.span, known, message):
                 return None
         is_from = direction.text == "from"
         placed = Placed(space.text, space.span)
@@ -147,16 +146,14 @@ class ImageResolver:
             is_shift = index == 3 and not is_last
             what = "a shift" if is_shift else "an entry of the turn"
             dimension = LENGTH if is_shift else NUMBER
-            numbers.append(self._evaluator.number(component, scope, dimension, what))
+            numbers.append(self._evaluator.number(component, scope, dimension, what).value)
         found = tuple(number for number in numbers if number is not None)
         return found if len(found) == 4 else None
 
     def _repeated(self, clause: tree.Clause) -> None:
-        self._reporter.report(
-            "statement-repeated",
-            clause.span,
-            f"`{clause.keyword}` says once more which part is meant"
-            if clause.keyword in ("segment", "label", "point")
-            else f"`{clause.keyword}` is written a second time",
-            hint="remove one of the two",
-        )
+        message = f"`{clause.keyword}` says once more which part is meant"
+        if clause.keyword not in ("segment", "label", "point"):
+            self._reporter.repeated(clause.span, clause.keyword)
+        else:
+            hint = "remove one of the two"
+            self._reporter.report("statement-repeated", clause.span, message, hint=hint)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, cast
 
 from ntagen.nsl.diagnostics import Reporter
 from ntagen.nsl.draft import Draft, DraftImage, DraftRegion, Placed
-from ntagen.nsl.reading import is_below
+from ntagen.nsl.reading import located
 from ntagen.nsl.source import Span
 from ntagen.shapes import Field, Shape
 
@@ -58,14 +57,11 @@ class ImageBuilder:
             from ntagen.imaging.meshes import refuse_large
 
             refuse_large(path)
-        space, unit = image.space, image.unit_mm
+        said = (image.part, image.matrix, image.space, image.unit_mm)
         key = (
             _digest([path] if image.form == "mesh" else files_of(path)),
             image.form,
-            None if image.part is None else image.part.value,
-            None if image.matrix is None else image.matrix.value,
-            None if space is None else space.value,
-            None if unit is None else unit.value,
+            *(None if one is None else one.value for one in said),
             self._imaging,
             wish,
         )
@@ -256,21 +252,9 @@ class ImageBuilder:
 
     def _path(self, placed: Placed[str]) -> str | None:
         """The path of a file, if it may be read; it begins at the folder of the description."""
-        path = os.path.join(os.path.dirname(placed.span.source.path), placed.value or "")
-        try:
-            key = os.path.realpath(path)
-        except ValueError as error:
-            self._reporter.report("file-unreadable", placed.span, f"cannot read `{path}`: {error}")
-            return None
-        if any(is_below(key, folder) for folder in self._draft.folders):
-            return path
-        self._reporter.report(
-            "include-outside",
-            placed.span,
-            f"`{path}` is not below the folder of the first file",
-            hint=f"allow it with `--include {os.path.dirname(key)}`",
-        )
-        return None
+        folders, named = self._draft.folders, placed.value or ""
+        found = located(named, placed.span, folders, self._reporter, "read")
+        return None if found is None else found[0]
 
     def _report(self, error: Exception, span: Span) -> None:
         from ntagen.imaging.mistakes import ImageError

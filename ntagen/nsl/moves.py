@@ -13,7 +13,7 @@ from ntagen import rules
 from ntagen.motion import Breath, Gate, Motion
 from ntagen.nsl import tree
 from ntagen.nsl.diagnostics import Reporter
-from ntagen.nsl.draft import Draft, DraftMoves, DraftRegion, Placed
+from ntagen.nsl.draft import Draft, DraftMoves, DraftRegion, Placed, kept
 from ntagen.nsl.evaluate import Evaluator, Scope
 from ntagen.nsl.quantity import ANGLE, LENGTH, NUMBER, TIME
 from ntagen.nsl.source import Span
@@ -53,8 +53,8 @@ class MovesResolver:
     def moves(self, moves: tree.Moves, name: str, scope: Scope) -> DraftMoves:
         """How a region moves."""
         evaluator = self._evaluator
-        period_s = evaluator.number(moves.period, scope, TIME, f"the period of `{name}`")
-        draft = DraftMoves(moves.span, Placed(period_s, moves.period.span))
+        period = evaluator.number(moves.period, scope, TIME, f"the period of `{name}`")
+        draft = DraftMoves(moves.span, period)
         if moves.path is not None:
             draft.table = self._from_file(moves.path)
             draft.is_table = True
@@ -62,43 +62,30 @@ class MovesResolver:
             draft.is_table = True
             draft.table = [
                 (
-                    Placed(evaluator.number(time, scope, TIME, f"a time of `{name}`"), time.span),
-                    Placed(
-                        evaluator.vector(place, scope, LENGTH, f"a displacement of `{name}`"),
-                        place.span,
-                    ),
+                    evaluator.number(time, scope, TIME, f"a time of `{name}`"),
+                    evaluator.vector(place, scope, LENGTH, f"a displacement of `{name}`"),
                 )
                 for place, time in moves.places
             ]
         else:
             way, towards = moves.way
-            way_mm = evaluator.number(way, scope, LENGTH, f"the way of `{name}`")
-            draft.way = Placed(way_mm, way.span)
-            direction = evaluator.vector(towards, scope, NUMBER, f"the way of `{name}`")
-            draft.towards = Placed(direction, towards.span)
+            draft.way = evaluator.number(way, scope, LENGTH, f"the way of `{name}`")
+            draft.towards = evaluator.vector(towards, scope, NUMBER, f"the way of `{name}`")
             if moves.phase is not None:
-                phase_rad = evaluator.number(moves.phase, scope, ANGLE, f"the phase of `{name}`")
-                draft.phase = Placed(phase_rad, moves.phase.span)
+                draft.phase = evaluator.number(moves.phase, scope, ANGLE, f"the phase of `{name}`")
         return draft
 
-    def rest(self, statement: tree.Wait | tree.Gate, scope: Scope, draft: Draft) -> None:
-        """How the needle may wait, or when it may be pushed."""
-        if isinstance(statement, tree.Gate):
-            self._gate(statement, scope, draft)
-            return
-        length_s = self._evaluator.number(statement.length, scope, TIME, "a wait")
-        draft.wait = Placed(length_s, statement.length.span)
+    def wait(self, statement: tree.Wait, scope: Scope, draft: Draft) -> None:
+        """How the needle may wait."""
+        draft.wait = self._evaluator.number(statement.length, scope, TIME, "a wait")
         if statement.at_most is not None:
-            count = self._evaluator.whole(statement.at_most, scope, "the number of waits")
-            draft.max_pauses = Placed(count, statement.at_most.span)
+            role = "the number of waits"
+            draft.max_pauses = self._evaluator.whole(statement.at_most, scope, role)
 
-    def _gate(self, statement: tree.Gate, scope: Scope, draft: Draft) -> None:
+    def gate(self, statement: tree.Gate, scope: Scope, draft: Draft) -> None:
         """When the needle may be pushed."""
-        angles = [
-            Placed(self._evaluator.number(one, scope, ANGLE, "a phase"), one.span)
-            for one in (statement.first, statement.last)
-        ]
-        draft.gate = (angles[0], angles[1])
+        first = self._evaluator.number(statement.first, scope, ANGLE, "a phase")
+        draft.gate = (first, self._evaluator.number(statement.last, scope, ANGLE, "a phase"))
         draft.gate_span = statement.span
 
     def _from_file(self, path: tree.Identifier) -> list[tuple[Placed[float], Placed[Vector]]]:
@@ -191,17 +178,13 @@ class MotionBuilder:
         phase_rad = 0.0 if moves.phase is None else moves.phase.value
         if way is None or towards is None or phase_rad is None:
             return None
-        if way.value is None or towards.value is None:
+        if way.value is None:
             return None
-        if not any(towards.value):
-            self.reporter.report(
-                "direction-zero",
-                towards.span,
-                f"the way of `{draft.name}` has no direction",
-                hint="write for example `along +z`",
-            )
+        what, hint = f"the way of `{draft.name}`", "write for example `along +z`"
+        direction = towards.obeying(self.reporter, rules.direction, what, hint)
+        if direction is None:
             return None
-        return Motion(period_s, times(way.value, unit(towards.value)), phase_rad % _TURN_RAD)
+        return Motion(period_s, times(way.value, unit(direction)), phase_rad % _TURN_RAD)
 
     def _is_that_of_others(self, name: str, period_s: float, span: Span) -> bool:
         if self.period_s is None or self.period_span is None:
@@ -275,19 +258,10 @@ class MotionBuilder:
                     hint="add for example `moves 12 mm along +z every 4 s` to a region",
                 )
             return None
-        wait_s = limits.step_s if draft.wait is None else draft.wait.value
-        pauses = DEFAULT_PAUSES if draft.max_pauses is None else draft.max_pauses.value
-        if wait_s is None or pauses is None:
-            return None
-        if draft.wait is not None and not self.reporter.obeys(
-            rules.positive(wait_s, "a wait", "wait-wrong"), draft.wait.span
-        ):
-            return None
-        if draft.max_pauses is not None and not self.reporter.obeys(
-            rules.pause_count(pauses), draft.max_pauses.span
-        ):
-            return None
-        if not self._has_common_time(wait_s, limits):
+        reporter, role = self.reporter, "a wait"
+        wait_s = kept(draft.wait, limits.step_s, reporter, rules.positive, role, "wait-wrong")
+        pauses = kept(draft.max_pauses, DEFAULT_PAUSES, reporter, rules.pause_count)
+        if wait_s is None or pauses is None or not self._has_common_time(wait_s, limits):
             return None
         breath = Breath(self.period_s, wait_s, pauses, self._gate())
         return breath if self._opens(breath, limits) else None

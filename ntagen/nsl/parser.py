@@ -46,6 +46,7 @@ from ntagen.nsl.tokens import (
 from ntagen.nsl.wording import (
     STRAY_HINTS,
     TERMINAL_WORDS,
+    UNCLOSED,
     describe,
     form_of,
     quoted,
@@ -409,27 +410,13 @@ class _Parser:
     def _report_stray(self) -> None:
         """Reports characters that are not tokens of the language."""
         for token in self._stray:
+            span, hint = token.span, STRAY_HINTS.get(token.text[0])
+            kind, message = "stray-character", f"unexpected {visible(token.text)}"
+            if token.type in UNCLOSED:
+                kind, message, hint = UNCLOSED[token.type]
             if token.type == "UNCLOSED_COMMENT":
-                self._reporter.report(
-                    "unclosed-comment",
-                    self._source.span(token.span.start, token.span.start + 2),
-                    "this comment is never closed",
-                    hint="end it with `*/`",
-                )
-            elif token.type == "UNCLOSED_STRING":
-                self._reporter.report(
-                    "unclosed-string",
-                    token.span,
-                    "this quote is never closed",
-                    hint='end the path with `"` on the same line',
-                )
-            else:
-                self._reporter.report(
-                    "stray-character",
-                    token.span,
-                    f"unexpected {visible(token.text)}",
-                    hint=STRAY_HINTS.get(token.text[0]),
-                )
+                span = self._source.span(span.start, span.start + 2)
+            self._reporter.report(kind, span, message, hint=hint)
 
     def _report_misplaced(self, word: Token, kind: BlockKind | None) -> None:
         """Reports a statement that stands in the wrong braces; None is any."""

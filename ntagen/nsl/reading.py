@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Sequence
 
 from ntagen.files import read_file
 from ntagen.nsl.diagnostics import Reporter, did_you_mean
@@ -93,6 +94,39 @@ def _nearby(path: str) -> str | None:
     return did_you_mean(name, names, cutoff=0.75)
 
 
-def is_below(path: str, folder: str) -> bool:
+def located(
+    named: str, span: Span, folders: Sequence[str], reporter: Reporter, does: str
+) -> tuple[str, str] | None:
+    """The path of a file that is named at a place, and where its links lead.
+
+    Args:
+        named: The path as it is written; it begins at the folder of the text.
+        span: Where it is written.
+        folders: Folders below which the file may lie.
+        reporter: Collects the mistakes.
+        does: What is done with the file, for messages.
+
+    Returns:
+        Both paths, or None after a mistake.
+    """
+    path = os.path.join(os.path.dirname(span.source.path), named)
+    try:
+        key = os.path.realpath(path)
+    except ValueError as error:
+        # No file can have such a name, but a text that is not from a file may contain it.
+        reporter.report("file-unreadable", span, f"cannot {does} `{path}`: {error}")
+        return None
+    if any(_is_below(key, folder) for folder in folders):
+        return path, key
+    reporter.report(
+        "include-outside",
+        span,
+        f"`{path}` is not below the folder of the first file",
+        hint=f"allow it with `--include {os.path.dirname(key)}`",
+    )
+    return None
+
+
+def _is_below(path: str, folder: str) -> bool:
     """Whether a file lies below a folder; links have been followed in both paths."""
     return path.startswith(folder if folder.endswith(os.sep) else folder + os.sep)

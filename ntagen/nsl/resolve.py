@@ -21,7 +21,7 @@ from ntagen.nsl.driving import CHOICES, DriverResolver
 from ntagen.nsl.evaluate import CONSTANTS, FUNCTIONS, Definition, Evaluator, Scope
 from ntagen.nsl.parser import MAX_DEPTH, parse
 from ntagen.nsl.quantity import Quantity, is_unit, scalar
-from ntagen.nsl.reading import is_below, read_source
+from ntagen.nsl.reading import located, read_source
 from ntagen.nsl.source import Source
 from ntagen.nsl.tokens import ALLOWED, BLOCKS, BlockKind
 from ntagen.parameters import BY_WORDS
@@ -173,13 +173,7 @@ class _Resolver:
         first = self._draft.seen.setdefault(key, statement.span)
         if first is statement.span:
             return False
-        self._reporter.report(
-            "statement-repeated",
-            statement.span,
-            f"`{statement.keyword}` is written a second time",
-            hint="remove one of the two",
-            notes=(f"the first is at {first.place}",),
-        )
+        self._reporter.repeated(statement.span, statement.keyword, f"the first is at {first.place}")
         return True
 
     # ------------------------------------------------------------------------------- composition
@@ -202,15 +196,10 @@ class _Resolver:
     def _include(self, statement: tree.Include, scope: Scope, place: BlockKind) -> None:
         """Resolves the statements of another file as if they stood here; a file counts once."""
         span = statement.path.span
-        source_path = span.source.path
-        path = os.path.join(os.path.dirname(source_path), statement.path.text)
-        try:
-            key = os.path.realpath(path)
-        except ValueError as error:
-            # No file can have such a name, but a text that is not from a file may contain it.
-            reason = str(error)
-            self._reporter.report("file-unreadable", span, f"cannot include `{path}`: {reason}")
+        found = located(statement.path.text, span, self._folders, self._reporter, "include")
+        if found is None:
             return
+        path, key = found
         if key in self._open_files:
             chain = [os.path.basename(p) for p in self._open_files[self._open_files.index(key) :]]
             self._reporter.report(
@@ -228,14 +217,6 @@ class _Resolver:
                 "nesting-too-deep", span, f"includes are nested deeper than {MAX_DEPTH}"
             )
             return
-        if not any(is_below(key, folder) for folder in self._folders):
-            self._reporter.report(
-                "include-outside",
-                span,
-                f"`{path}` is not below the folder of the first file",
-                hint=f"allow it with `--include {os.path.dirname(key)}`",
-            )
-            return
         self._included.add(key)
         source = read_source(path, self._reporter, included_at=span)
         if source is None:
@@ -250,8 +231,8 @@ class _Resolver:
 
     def _loop(self, statement: tree.Loop, scope: Scope) -> None:
         """Resolves the body once for each number from the first to the last."""
-        first = self._evaluator.whole(statement.first, scope, "the first number of a loop")
-        last = self._evaluator.whole(statement.last, scope, "the last number of a loop")
+        first = self._evaluator.whole(statement.first, scope, "the first number of a loop").value
+        last = self._evaluator.whole(statement.last, scope, "the last number of a loop").value
         is_free = self._is_name_free(statement.variable, scope)
         if first is not None and last is not None and first > last:
             self._reporter.report(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from ntagen import rules
@@ -15,6 +14,7 @@ from ntagen.nsl.vectors import unit
 from ntagen.scene import Vector
 from ntagen.shapes import (
     UPRIGHT,
+    Axes,
     Box,
     Capsule,
     Cylinder,
@@ -55,28 +55,19 @@ class SolidResolver:
         for role, expression in zip(_VECTORS[shape.form], shape.measures[:2], strict=True):
             dimension = NUMBER if role == "direction" else LENGTH
             what = f"the {role} of `{name}`"
-            value = self._evaluator.vector(expression, scope, dimension, what)
-            vectors.append(Placed(value, expression.span))
-        numbers = []
-        for expression in shape.measures[2:]:
-            what = f"the radius of `{name}`"
-            radius = self._evaluator.number(expression, scope, LENGTH, what)
-            numbers.append(Placed(radius, expression.span))
+            vectors.append(self._evaluator.vector(expression, scope, dimension, what))
+        numbers = tuple(
+            self._evaluator.number(one, scope, LENGTH, f"the radius of `{name}`")
+            for one in shape.measures[2:]
+        )
         turn = None
         if shape.turned is not None:
             angle, axis = shape.turned
             turn = (
-                Placed(
-                    self._evaluator.number(angle, scope, ANGLE, f"the turn of `{name}`"), angle.span
-                ),
-                Placed(
-                    self._evaluator.vector(axis, scope, NUMBER, f"the axis of `{name}`"), axis.span
-                ),
+                self._evaluator.number(angle, scope, ANGLE, f"the turn of `{name}`"),
+                self._evaluator.vector(axis, scope, NUMBER, f"the axis of `{name}`"),
             )
-        return DraftSolid(shape.form, tuple(vectors), tuple(numbers), turn)
-
-
-_Maker = Callable[[DraftRegion, DraftSolid, tuple[Vector, Vector], list[float]], Shape | None]
+        return DraftSolid(shape.form, tuple(vectors), numbers, turn)
 
 
 class SolidBuilder:
@@ -91,79 +82,56 @@ class SolidBuilder:
         numbers = [one.value for one in solid.numbers if one.value is not None]
         if len(vectors) < 2 or len(numbers) < len(solid.numbers):
             return None
-        bad = [one for one in solid.numbers if not self._is_positive(draft, one, "radius")]
-        if bad:
+        if [one for one in solid.numbers if not self._is_positive(draft, one, "radius")]:
             return None
-        makers: dict[tree.SolidForm, _Maker] = {
-            "box": self._box,
-            "capsule": self._capsule,
-            "cylinder": self._cylinder,
-            "ellipsoid": self._ellipsoid,
-            "halfspace": self._halfspace,
-        }
-        return makers[solid.form](draft, solid, (vectors[0], vectors[1]), numbers)
+        first, second = vectors
+        match solid.form:
+            case "box":
+                axes = self._axes(draft, solid, "size")
+                return None if axes is None else Box(first, second, axes)
+            case "ellipsoid":
+                axes = self._axes(draft, solid, "least radius")
+                return None if axes is None else Ellipsoid(first, second, axes)
+            case "capsule":
+                return Capsule(first, second, numbers[0], numbers[-1])
+            case "cylinder":
+                return self._cylinder(draft, solid, first, second, numbers[0])
+            case "halfspace":
+                return self._halfspace(draft, solid, first)
 
     def _is_positive(self, draft: DraftRegion, placed: Placed[float], role: str) -> bool:
-        value = 0.0 if placed.value is None else placed.value
-        return self._reporter.obeys(
-            rules.positive(value, f"the {role} of `{draft.name}`"), placed.span
-        )
+        what = f"the {role} of `{draft.name}`"
+        return placed.obeying(self._reporter, rules.positive, what) is not None
 
-    def _turned(
-        self, draft: DraftRegion, solid: DraftSolid, role: str
-    ) -> tuple[tuple[Vector, Vector, Vector], Vector] | None:
-        """The axes and the extents of a box or an ellipsoid."""
+    def _axes(self, draft: DraftRegion, solid: DraftSolid, role: str) -> Axes | None:
+        """The axes of a box or an ellipsoid, whose extents are checked, too."""
         extents = solid.vectors[1]
         least = Placed(min(extents.value or (0.0,)), extents.span)
-        if not self._is_positive(draft, least, role) or extents.value is None:
+        if not self._is_positive(draft, least, role):
             return None
         if solid.turn is None:
-            return UPRIGHT, extents.value
+            return UPRIGHT
         angle, axis = solid.turn
-        if angle.value is None or axis.value is None:
+        if angle.value is None:
             return None
         direction = self._direction(draft, axis, "turn")
-        return None if direction is None else (turning(direction, angle.value), extents.value)
+        return None if direction is None else turning(direction, angle.value)
 
     def _direction(self, draft: DraftRegion, placed: Placed[Vector], role: str) -> Vector | None:
         """A direction of length 1."""
-        if placed.value is None:
-            return None
-        if max(map(abs, placed.value)) == 0.0:
-            self._reporter.report(
-                "direction-zero",
-                placed.span,
-                f"the {role} of `{draft.name}` has no direction",
-                hint="write for example `-y` or `(0, -1, 0)`",
-            )
-            return None
-        return unit(placed.value)
-
-    def _box(
-        self, draft: DraftRegion, solid: DraftSolid, places: tuple[Vector, Vector], _: list[float]
-    ) -> Shape | None:
-        found = self._turned(draft, solid, "size")
-        return None if found is None else Box(places[0], found[1], found[0])
-
-    def _ellipsoid(
-        self, draft: DraftRegion, solid: DraftSolid, places: tuple[Vector, Vector], _: list[float]
-    ) -> Shape | None:
-        found = self._turned(draft, solid, "least radius")
-        return None if found is None else Ellipsoid(places[0], found[1], found[0])
-
-    def _capsule(
-        self, _: DraftRegion, __: DraftSolid, places: tuple[Vector, Vector], radii: list[float]
-    ) -> Shape | None:
-        return Capsule(*places, radii[0], radii[-1])
+        what, hint = f"the {role} of `{draft.name}`", "write for example `-y` or `(0, -1, 0)`"
+        value = placed.obeying(self._reporter, rules.direction, what, hint)
+        return None if value is None else unit(value)
 
     def _cylinder(
         self,
         draft: DraftRegion,
         solid: DraftSolid,
-        places: tuple[Vector, Vector],
-        radii: list[float],
+        start_mm: Vector,
+        end_mm: Vector,
+        radius_mm: float,
     ) -> Shape | None:
-        if places[0] == places[1]:
+        if start_mm == end_mm:
             self._reporter.report(
                 "direction-zero",
                 solid.vectors[1].span,
@@ -171,11 +139,9 @@ class SolidBuilder:
                 hint="move one of its ends",
             )
             return None
-        return Cylinder(*places, radii[0])
+        return Cylinder(start_mm, end_mm, radius_mm)
 
-    def _halfspace(
-        self, draft: DraftRegion, solid: DraftSolid, places: tuple[Vector, Vector], _: list[float]
-    ) -> Shape | None:
+    def _halfspace(self, draft: DraftRegion, solid: DraftSolid, point_mm: Vector) -> Shape | None:
         if draft.kind == "target":
             self._reporter.report(
                 "target-without-end",
@@ -185,4 +151,4 @@ class SolidBuilder:
             )
             return None
         towards = self._direction(draft, solid.vectors[1], "side")
-        return None if towards is None else HalfSpace(places[0], towards)
+        return None if towards is None else HalfSpace(point_mm, towards)

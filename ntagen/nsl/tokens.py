@@ -74,14 +74,7 @@ TISSUE_BOUNDS: Final = ("curvature", "roll", "tip")
 RESERVED: Final = (KEYWORDS | _OTHER_WORDS) - _LATER_MOTION
 """All words that cannot be names because of the grammar."""
 
-BLOCKS: Final[dict[str, BlockKind]] = {
-    "environment": "environment",
-    "needle": "needle",
-    "motion": "motion",
-    "for": "for",
-    "drive": "drive",
-    "device": "device",
-}
+BLOCKS: Final[dict[str, BlockKind]] = {kind: kind for kind in ALLOWED if kind != "file"}
 """The statements that have braces."""
 
 NAMING: Final = REGIONS | {"environment", "let", "for"}

@@ -261,7 +261,7 @@ class Wait:
 
     span: Span
     length: Expression
-    at_most: Expression | None
+    at_most: Expression | None = None
     keyword: Literal["wait"] = "wait"
 
 
@@ -358,7 +358,7 @@ class Device:
     span: Span
     kind: Identifier
     port: Identifier
-    body: tuple[Statement, ...]
+    body: tuple[Statement, ...] = ()
     keyword: Literal["device"] = "device"
 
 
@@ -369,7 +369,7 @@ class Tracker:
     span: Span
     kind: Identifier
     address: Identifier
-    name: Identifier | None
+    name: Identifier | None = None
     keyword: Literal["tracker"] = "tracker"
 
 
@@ -379,7 +379,7 @@ class Section:
 
     span: Span
     keyword: Literal["needle", "motion", "drive"]
-    body: tuple[Statement, ...]
+    body: tuple[Statement, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,7 +390,7 @@ class Loop:
     variable: Identifier
     first: Expression
     last: Expression
-    body: tuple[Statement, ...]
+    body: tuple[Statement, ...] = ()
     keyword: Literal["for"] = "for"
 
 
@@ -400,7 +400,7 @@ class Environment:
 
     span: Span
     name: Identifier
-    body: tuple[Statement, ...]
+    body: tuple[Statement, ...] = ()
     keyword: Literal["environment"] = "environment"
 
 

@@ -27,6 +27,16 @@ STRAY_HINTS: Final = {
     "\ufeff": "the file has a byte order mark inside its text: delete it",
 }
 
+UNCLOSED: Final = {
+    "UNCLOSED_COMMENT": ("unclosed-comment", "this comment is never closed", "end it with `*/`"),
+    "UNCLOSED_STRING": (
+        "unclosed-string",
+        "this quote is never closed",
+        'end the path with `"` on the same line',
+    ),
+}
+"""What is wrong with tokens that have no end, by their terminals: the kind, the message, a hint."""
+
 FORMS: Final = {
     "environment": "write `environment NAME { … }`",
     "needle": "write `needle { … }`",

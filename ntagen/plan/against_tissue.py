@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal
 
 from ntagen.errors import InputError, ModelError
-from ntagen.plan.closed_loop import Reach, Segment, certify_all, decisions_of
+from ntagen.plan.branches import Reach, certify_all
+from ntagen.plan.closed_loop import Segment, decisions_of
 from ntagen.plan.synthesise import GUIDE, STRATEGY_QUERY
 from ntagen.rounding import units_per_mm
 from ntagen.scene import Scene

@@ -25,15 +25,14 @@ from typing import Final, Literal
 from ntagen.errors import LimitError
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Plan
-from ntagen.plan.certify import Certificate
 from ntagen.plan.extract import step_length_mm
 from ntagen.plan.rank import (
+    CRITERIA,
     MOST_RESERVE_RATIO,
     USEFUL_CLEARANCE_MM,
     USEFUL_RESERVE_MM,
     Candidate,
     rank,
-    reserve_of,
 )
 from ntagen.plan.stricter import BETWEEN_STEPS_MM, deeper, near_center, shorter, stricter, wider
 from ntagen.plan.synthesise import EngineSynthesiser, Listing, Synthesis, select
@@ -58,11 +57,10 @@ _MOST_LISTED: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Criterion:
-    """How a criterion is asked for. What is better has a smaller badness.
+class Question:
+    """How a criterion is asked for. What is better has a smaller badness (`rank.CRITERIA`).
 
     Attributes:
-        badness: That of a certificate, in mm or as a count; never less than `ideal`.
         ideal: No plan of this scene has less badness.
         among: The scene whose plans have at most this badness.
         resolution: A smaller difference is not asked for.
@@ -70,7 +68,6 @@ class Criterion:
         is_exact: Whether the model does not round it.
     """
 
-    badness: Callable[[Certificate], float]
     ideal: Callable[[Scene], float]
     among: Callable[[Scene, float], Scene]
     resolution: Callable[[Scene], float]
@@ -82,26 +79,22 @@ def _least_length_mm(scene: Scene) -> float:
     """The straight way to the ball around the last target."""
     last = scene.targets[-1]
     away_mm = distance(scene.needle.tip.position_mm, last.center_mm)
-    moved_mm = 0.0 if last.motion is None else last.motion.reach_mm
-    return max(0.0, away_mm - last.shape.reach_mm() - moved_mm)
+    return max(0.0, away_mm - last.shape.reach_mm() - last.moved_mm)
 
 
-CRITERIA: Final = {
-    "clearance": Criterion(
-        badness=lambda one: -min(USEFUL_CLEARANCE_MM, one.critical_clearance_mm),
+QUESTIONS: Final = {
+    "clearance": Question(
         ideal=lambda _: -USEFUL_CLEARANCE_MM,
         among=lambda scene, most: wider(scene, -most),
         resolution=lambda _: 0.2,
     ),
-    "reserve": Criterion(
-        badness=lambda one: -reserve_of(one),
+    "reserve": Question(
         ideal=lambda _: -USEFUL_RESERVE_MM,
         # Near the start, distances count several times.
         among=lambda scene, most: deeper(wider(scene, -most / MOST_RESERVE_RATIO), -most),
         resolution=lambda _: 0.5,
     ),
-    "rolls": Criterion(
-        badness=lambda one: one.roll_count,
+    "rolls": Question(
         ideal=lambda _: 0,
         among=lambda scene, most: replace(
             scene, limits=replace(scene.limits, max_rolls=min(scene.limits.max_rolls, int(most)))
@@ -110,15 +103,13 @@ CRITERIA: Final = {
         is_counted=True,
         is_exact=True,
     ),
-    "length": Criterion(
-        badness=lambda one: one.length_mm,
+    "length": Question(
         ideal=_least_length_mm,
         among=shorter,
         resolution=step_length_mm,
         is_exact=True,
     ),
-    "target": Criterion(
-        badness=lambda one: one.end_distance_mm,
+    "target": Question(
         ideal=lambda _: 0.0,
         among=near_center,
         resolution=lambda _: 0.2,
@@ -157,9 +148,8 @@ class Best:
         """Whether the best plan is as good by a criterion as any can be, up to its resolution."""
         if name not in self.limits or not self.candidates:
             return False
-        criterion = CRITERIA[name]
-        badness = criterion.badness(self.candidates[0].certificate)
-        return badness - self.limits[name] <= criterion.resolution(scene) + _SLACK
+        badness = CRITERIA[name](self.candidates[0].certificate)
+        return badness - self.limits[name] <= QUESTIONS[name].resolution(scene) + _SLACK
 
 
 def goodness(name: str, badness: float) -> float:
@@ -265,12 +255,12 @@ class _Search:
         yield
         among = [self._deep(self.scene)]
         for name in self.engine.ranking:
-            criterion = CRITERIA[name]
-            for _ in self._settle(name, criterion, among[-1]):
+            question = QUESTIONS[name]
+            for _ in self._settle(name, question, among[-1]):
                 yield
-            rounded_mm = 0.0 if criterion.is_exact else self._rounded_mm()
-            most = self._badness(criterion) + criterion.resolution(self.scene) + rounded_mm
-            among.append(criterion.among(among[-1], most))
+            rounded_mm = 0.0 if question.is_exact else self._rounded_mm()
+            most = self._badness(name) + question.resolution(self.scene) + rounded_mm
+            among.append(question.among(among[-1], most))
         if self.count > 1:
             for scene in reversed(among):
                 most = _MOST_LISTED + self.count
@@ -302,26 +292,26 @@ class _Search:
         self.is_proved_none = not self.candidates and listing.is_complete
         return bool(self.candidates)
 
-    def _settle(self, name: str, criterion: Criterion, scene: Scene) -> Iterator[None]:
+    def _settle(self, name: str, question: Question, scene: Scene) -> Iterator[None]:
         """Asks for plans that are better by a criterion until none is, or none can be had."""
-        limit = self.limits[name] = criterion.ideal(scene)
-        resolution = criterion.resolution(scene)
+        limit = self.limits[name] = question.ideal(scene)
+        resolution = question.resolution(scene)
         wanted = limit
-        while (before := self._badness(criterion)) - limit > resolution + _SLACK:
-            question = criterion.among(scene, wanted)
-            if not self._ask(question, 1).plans:
-                limit = self.limits[name] = wanted + 1 if criterion.is_counted else wanted
-            elif self._badness(criterion) >= before:
+        while (before := self._badness(name)) - limit > resolution + _SLACK:
+            better = question.among(scene, wanted)
+            if not self._ask(better, 1).plans:
+                limit = self.limits[name] = wanted + 1 if question.is_counted else wanted
+            elif self._badness(name) >= before:
                 # In exact kinematics that plan is not better, so "yes" tells little.
-                self._ask(self._safer(question), 1)
-                if self._badness(criterion) >= before:
+                self._ask(self._safer(better), 1)
+                if self._badness(name) >= before:
                     return
             yield
-            wanted = limit if criterion.is_counted else 0.5 * (self._badness(criterion) + limit)
+            wanted = limit if question.is_counted else 0.5 * (self._badness(name) + limit)
 
-    def _badness(self, criterion: Criterion) -> float:
+    def _badness(self, name: str) -> float:
         """That of the best plan."""
-        return criterion.badness(rank(self.candidates, self.engine.ranking)[0].certificate)
+        return CRITERIA[name](rank(self.candidates, self.engine.ranking)[0].certificate)
 
     def _safer(self, scene: Scene) -> Scene:
         """The scene whose plans probably hold in exact kinematics."""

@@ -1,4 +1,4 @@
-"""The branches of a strategy against a tissue that answers, one after the other, as paths.
+"""The branches of a strategy against a tissue that answers, as paths, and what holds on them.
 
 Where a branch leads follows from the needle's pose and from what the tissue picks, in exact
 kinematics.
@@ -11,13 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ntagen.needle.kinematics import Arc, orthonormal, roll
+from ntagen.needle.nearest import nearest_to, places_on
 from ntagen.needle.path import sample_poses
 from ntagen.plan.closed_loop import Branch, Segment
 from ntagen.scene import Pose, Scene
 
 _SPACING_MM = 0.25
+_DENSE_MM = 0.1
+"""For a certificate, distances are computed at points so far apart on a path."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,3 +135,56 @@ def worst_path(tree: Segment, scene: Scene) -> tuple[Stretch, ...]:
             if min(margin_mm, depth_mm) < least_mm:
                 worst, least_mm = stretch.numbers, min(margin_mm, depth_mm)
     return path_of(tree, scene, worst)
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """What holds on all branches of a tree, in exact kinematics.
+
+    Attributes:
+        leaves: The number of branches.
+        clearance_mm: The least distance to a region that must not be touched; infinite without one.
+        depth_mm: The least depth in the target at the end.
+        longest_mm: The length of the longest branch.
+        most_rolls: The most rolls on a branch.
+    """
+
+    leaves: int
+    clearance_mm: float
+    depth_mm: float
+    longest_mm: float
+    most_rolls: int
+
+    def holds(self, tip_mm: float) -> bool:
+        """Whether nothing is touched and the target is reached if the tip is off by this much."""
+        is_free = self.clearance_mm >= tip_mm and self.clearance_mm > 0.0
+        return is_free and self.depth_mm >= tip_mm
+
+    def missing_mm(self, tip_mm: float) -> float:
+        """How much is missing on the worst branch so that it holds; 0 if nothing is."""
+        return max(0.0, tip_mm - min(self.clearance_mm, self.depth_mm))
+
+
+def certify_all(tree: Segment, scene: Scene) -> Reach:
+    """Follows all branches of a tree from the needle's pose, in exact kinematics."""
+    clearance_mm = depth_mm = math.inf
+    for stretch in stretches(tree, scene):
+        arc = stretch.arc
+        points = _points(arc)
+        for region in scene.avoided:
+            # No point of the path is farther than half the spacing from one of these.
+            near_mm = float(region.shape.distance_mm(points).min()) - 0.5 * _DENSE_MM
+            if near_mm < clearance_mm:
+                nearest = nearest_to((arc,), arc.start.position_mm, region.shape)
+                clearance_mm = min(clearance_mm, nearest.distance_mm)
+        if stretch.branch.then is None:
+            depth_mm = min(depth_mm, -scene.targets[-1].distance_mm(arc.end.position_mm))
+    is_free = scene.limits.free_bevel and tree.roll_rad != 0.0
+    return Reach(tree.leaves, clearance_mm, depth_mm, tree.longest_mm, tree.most_rolls - is_free)
+
+
+def _points(arc: Arc) -> NDArray[np.float64]:
+    """Points on an arc, at most `_DENSE_MM` apart, with both ends, of shape (n, 3)."""
+    count = max(1, math.ceil(arc.length_mm / _DENSE_MM))
+    along_mm = np.linspace(0.0, arc.length_mm, count + 1)
+    return places_on([arc], np.zeros(count + 1, dtype=np.intp), along_mm)

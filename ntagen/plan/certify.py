@@ -215,8 +215,8 @@ def clearance(arcs: tuple[Arc, ...], entry_mm: Vector, region: Region) -> Cleara
     """The smallest distance of a chain of arcs to a region; it begins at `entry_mm`."""
     nearest = nearest_to(arcs, entry_mm, region.shape)
     # Wherever a moving region is: no time is given.
-    reach_mm = 0.0 if region.motion is None else region.motion.reach_mm
-    return Clearance(region.name, region.kind, nearest.distance_mm - reach_mm, nearest.at_mm)
+    away_mm = nearest.distance_mm - region.moved_mm
+    return Clearance(region.name, region.kind, away_mm, nearest.at_mm)
 
 
 def _arrivals(

@@ -88,9 +88,7 @@ class _Batch:
             self._levels.append(self._next(*level))
 
     def _start(self) -> _Level:
-        tip = self._scene.needle.tip
-        vectors = (tip.position_mm, tip.heading, tip.bevel)
-        pose = Poses(*(np.array([vector], dtype=np.float64) for vector in vectors))
+        pose = Poses.of([self._scene.needle.tip])
         at_entry = [one.shape.distance_mm(pose.position) for one in self._smooth]
         near = np.column_stack([pose.away(self._middles), *at_entry])
         entered = np.full((1, len(self._scene.targets)), math.nan)

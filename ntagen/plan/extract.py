@@ -11,13 +11,16 @@ tissue's answers) are not actions of the needle.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import chain, groupby
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from ntagen.errors import NtagenError
 from ntagen.plan.actions import Action, Plan, Push, Roll, Wait
 from ntagen.scene import Scene
+
+if TYPE_CHECKING:
+    from ntagen.checker import Answer, EngineEdge, EnginePlan, EngineStep, Simulation
 
 _PUSH: Final = "do_push!"
 _ROLL: Final = "do_rotate!"
@@ -28,59 +31,7 @@ _CHECKER: Final = "Checker"
 _REACHED: Final = "Final_TR_Reached"
 
 
-class Edge(Protocol):
-    """An edge as the engine lists it."""
-
-    @property
-    def sync(self) -> str | None:
-        """The synchronisation, such as ``do_push!``."""
-
-    @property
-    def select(self) -> dict[str, int]:
-        """The values of the edge's selections."""
-
-
-class Step(Protocol):
-    """A move of one or more edges."""
-
-    @property
-    def edges(self) -> Sequence[Edge]:
-        """The edges that are taken together."""
-
-
-class Run(Protocol):
-    """A winning run of the model."""
-
-    @property
-    def steps(self) -> Sequence[Step]:
-        """The moves in order."""
-
-
-class Listed(Protocol):
-    """Plans as the engine lists them; see `ntagen.checker.Answer`."""
-
-    def plan_chains(self) -> Sequence[Sequence[Step]]:
-        """The distinct sequences of moves."""
-
-    def plan_pages(self) -> Iterable[Sequence[Sequence[int]]]:
-        """The plans, some at a time: of each, the indices of its sequences of moves."""
-
-
-class Walk(Protocol):
-    """A walk through a model, from its initial state."""
-
-    @property
-    def locations(self) -> dict[str, str]:
-        """The location of each process."""
-
-    def moves(self) -> Sequence[Step]:
-        """The moves of the state."""
-
-    def take(self, index: int) -> None:
-        """Takes a move."""
-
-
-def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
+def extract(runs: Iterable[EnginePlan], scene: Scene) -> tuple[Plan, ...]:
     """The different plans of the runs, in the order of the runs.
 
     Raises:
@@ -90,7 +41,7 @@ def extract(runs: Iterable[Run], scene: Scene) -> tuple[Plan, ...]:
     return tuple(dict.fromkeys(_plan(run, scene) for run in runs))
 
 
-def pages_of(listed: Listed, scene: Scene) -> Iterator[list[Plan]]:
+def pages_of(listed: Answer, scene: Scene) -> Iterator[list[Plan]]:
     """The plans of an answer, some at a time, in its order: only one page is in memory.
 
     In the model of a scene the User alone has a choice, and each choice is an action. So no plan
@@ -115,7 +66,7 @@ class _Actions:
         self._scene = scene
         self._sums: dict[tuple[Action, int], Action] = {}
 
-    def runs_in(self, steps: Iterable[Step]) -> tuple[tuple[Action, int], ...]:
+    def runs_in(self, steps: Iterable[EngineStep]) -> tuple[tuple[Action, int], ...]:
         """Each action of some moves, and how often it follows itself."""
         edges = (edge for step in steps for edge in step.edges)
         found = [action for edge in edges if (action := _action(edge, self._scene)) is not None]
@@ -142,7 +93,7 @@ class _Actions:
         return Plan(tuple(actions))
 
 
-def leads_to_target(walk: Walk, plan: Plan, scene: Scene) -> bool:
+def leads_to_target(walk: Simulation, plan: Plan, scene: Scene) -> bool:
     """Whether the model of the scene can make a plan, and reaches its last target.
 
     The model ends with the first step that ends in the last target. The plan may push deeper into
@@ -187,7 +138,7 @@ def _moves_of(plan: Plan, scene: Scene) -> list[tuple[str, int]]:
     return moves[::-1]
 
 
-def _decision(step: Step) -> tuple[str, int] | None:
+def _decision(step: EngineStep) -> tuple[str, int] | None:
     """What the User's edge of a move sends, with the index of the angle or spin, or -1."""
     for edge in step.edges:
         if edge.sync == _PUSH:
@@ -211,12 +162,12 @@ def _wait_s(scene: Scene) -> float:
     return scene.breath.wait_s
 
 
-def _plan(run: Run, scene: Scene) -> Plan:
+def _plan(run: EnginePlan, scene: Scene) -> Plan:
     edges = (edge for step in run.steps for edge in step.edges)
     return Plan.of(action for edge in edges if (action := _action(edge, scene)) is not None)
 
 
-def _action(edge: Edge, scene: Scene) -> Action | None:
+def _action(edge: EngineEdge, scene: Scene) -> Action | None:
     limits = scene.limits
     if edge.sync == _PUSH:
         spin = edge.select.get(_SPIN_INDEX, 0)

@@ -337,8 +337,7 @@ class Prospects:
         Those that come no nearer to the target than `useful_mm`, however they bend, are left out.
         """
         limits = self._scene.limits
-        tips = [(one.tip.position_mm, one.tip.heading, one.tip.bevel) for one in places]
-        tip = Poses(*np.array(tips, dtype=np.float64).swapaxes(0, 1))
+        tip = Poses.of(one.tip for one in places)
         straight_mm = lengths(self._middle - tip.position)
         left_mm = np.minimum(most_mm, _LONGEST_RATIO * straight_mm + self._reach_mm)
         levels = [self._straight(places, tip, left_mm)]

@@ -32,12 +32,6 @@ USEFUL_RESERVE_MM: Final = 4.0
 MOST_RESERVE_RATIO: Final = 3.0
 """Distances to regions that are near the start count at most this much more."""
 
-_CLEARANCE_STEP_MM: Final = 0.1
-"""Clearances are compared in steps of this size: no sensor sees a smaller difference."""
-
-_RESERVE_STEP_MM: Final = 0.25
-"""Reserves are compared in steps of this size: a roll more costs about as much."""
-
 _FEW: Final = 1000
 """Fewer plans are certified one after the other: numpy takes a tenth of a second."""
 
@@ -68,11 +62,6 @@ class Candidate:
     certificate: Certificate
 
 
-def _by_clearance(candidate: Candidate) -> float:
-    clipped_mm = min(USEFUL_CLEARANCE_MM, candidate.certificate.critical_clearance_mm)
-    return -round(clipped_mm / _CLEARANCE_STEP_MM)
-
-
 def reserve_of(certificate: Certificate) -> float:
     """How far the needle may be off a plan without harm, in mm at its end; negative if it fails.
 
@@ -90,22 +79,18 @@ def reserve_of(certificate: Certificate) -> float:
     return max(-USEFUL_RESERVE_MM, min(USEFUL_RESERVE_MM, least_mm))
 
 
-def _by_reserve(candidate: Candidate) -> float:
-    return -round(reserve_of(candidate.certificate) / _RESERVE_STEP_MM)
-
-
-def _by_target(candidate: Candidate) -> float:
-    return candidate.certificate.end_distance_mm
-
-
-CRITERIA: Final[dict[str, Callable[[Candidate], float]]] = {
-    "clearance": _by_clearance,
-    "rolls": lambda candidate: candidate.certificate.roll_count,
-    "length": lambda candidate: candidate.certificate.length_mm,
-    "target": _by_target,
-    "reserve": _by_reserve,
+CRITERIA: Final[dict[str, Callable[[Certificate], float]]] = {
+    "clearance": lambda one: -min(USEFUL_CLEARANCE_MM, one.critical_clearance_mm),
+    "rolls": lambda one: one.roll_count,
+    "length": lambda one: one.length_mm,
+    "target": lambda one: one.end_distance_mm,
+    "reserve": lambda one: -reserve_of(one),
 }
 """The criteria; smaller is better. ``target`` is the distance of the end to the target's centre."""
+
+_STEPS_MM: Final = {"clearance": 0.1, "reserve": 0.25}
+"""Clearances and reserves are compared in steps of this size: no sensor sees a smaller difference
+of clearances, and a roll more costs about one step of the reserve."""
 
 
 def parse_ranking(text: str) -> tuple[str, ...]:
@@ -176,6 +161,13 @@ def rank(
     """The candidates, best first; equal ones in the order of their actions as text."""
 
     def key(candidate: Candidate) -> tuple[tuple[float, ...], str]:
-        return tuple(CRITERIA[name](candidate) for name in ranking), str(candidate.plan)
+        places = (place_of(name, candidate.certificate) for name in ranking)
+        return tuple(places), str(candidate.plan)
 
     return tuple(sorted(candidates, key=key))
+
+
+def place_of(name: str, certificate: Certificate) -> float:
+    """The value of a criterion by which plans are ranked: in whole steps if it has them."""
+    badness = CRITERIA[name](certificate)
+    return round(badness / _STEPS_MM[name]) if name in _STEPS_MM else badness

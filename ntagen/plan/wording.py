@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from ntagen.plan.certify import Certificate
-from ntagen.plan.rank import USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM
+from ntagen.plan.rank import CRITERIA, USEFUL_CLEARANCE_MM, USEFUL_RESERVE_MM
 from ntagen.plan.synthesise import Margins
 
 if TYPE_CHECKING:
@@ -71,13 +71,13 @@ def judged(certificate: Certificate, margins: Margins) -> str:
 
 def bounded(best: Best, ranking: Sequence[str], scene: Scene) -> list[str]:
     """How good the best plan is by each criterion, and how good any plan can be; a line each."""
-    from ntagen.plan.anytime import CRITERIA, goodness
+    from ntagen.plan.anytime import goodness
 
     certificate = best.candidates[0].certificate
     lines = []
     among = "no plan"
     for name in ranking:
-        value = goodness(name, CRITERIA[name].badness(certificate))
+        value = goodness(name, CRITERIA[name](certificate))
         unit = "" if name == "rolls" else " mm"
         if best.is_settled(name, scene):
             said = f"{among} is better"

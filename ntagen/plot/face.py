@@ -6,8 +6,8 @@ import time
 from pathlib import Path
 from typing import Final
 
-from ntagen.drive.engine import engine_for
 from ntagen.drive.reading import read_log
+from ntagen.drive.settings import engine_for
 from ntagen.plan.synthesise import EngineSynthesiser
 from ntagen.plot.animation import Animation, animation_of
 from ntagen.plot.picture import Picture

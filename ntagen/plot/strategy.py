@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from ntagen.needle.path import sample_poses
-from ntagen.plan.branches import Stretch, expected_path, stretches
-from ntagen.plan.closed_loop import Segment, certify_all
+from ntagen.plan.branches import Stretch, certify_all, expected_path, stretches
+from ntagen.plan.closed_loop import Segment
 from ntagen.plot.picture import Curve, Picture
 from ntagen.scene import Scene
 

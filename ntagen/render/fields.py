@@ -16,10 +16,9 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from ntagen.errors import InputError
 from ntagen.render.fixed_point import fixed_point
 from ntagen.rules import LARGEST_UNITS, table_fits
-from ntagen.scene import Region
+from ntagen.scene import Region, require
 from ntagen.shapes import SAMPLES_PER_MM, Field
 from ntagen.values import dataclass
 
@@ -82,9 +81,7 @@ def field_rows(
             count += math.prod(field.counts)
         names[key].append(" ".join(region.name.split()))
         rows.append(_row(region, field, starts[key], scale))
-    breach = table_fits(count)
-    if breach is not None:
-        raise InputError(f"{breach.message}\nhint: {breach.hint}")
+    require(table_fits(count))
     parts = tuple(
         (_lines(field.samples, field.is_inner, field.sample_doubt_mm, scale), ", ".join(names[key]))
         for key, field in shapes.items()

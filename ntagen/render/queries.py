@@ -7,7 +7,7 @@ from typing import Final
 from ntagen import rules
 from ntagen.errors import InputError
 from ntagen.render.chance import has_unsafe
-from ntagen.scene import Scene
+from ntagen.scene import Scene, require
 from ntagen.values import dataclass
 
 
@@ -56,9 +56,7 @@ def model_queries(scene: Scene) -> tuple[Query, ...]:
     papers = PAPER_QUERIES[1:] if is_long else PAPER_QUERIES
     queries = {query.name: query for query in (*papers, *_chance_queries(scene))}
     for named in scene.queries:
-        breach = rules.query(named.name, named.text)
-        if breach is not None:
-            raise InputError(f"{breach.message}\nhint: {breach.hint}")
+        require(rules.query(named.name, named.text))
         text = " ".join(named.text.split())
         formula = f"strategy {named.name} = {text}" if text.startswith("control") else text
         query = queries.setdefault(named.name, Query(named.name, formula, named.name))

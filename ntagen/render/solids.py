@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import field
-from typing import Final
+from typing import Any, Final, cast
 
 from ntagen.errors import InputError
-from ntagen.render.fields import FieldRow, Samples, field_rows
+from ntagen.render.fields import Samples, field_rows
 from ntagen.render.fixed_point import fixed_point
 from ntagen.render.frame import Matrix
 from ntagen.rules import units_of
@@ -107,64 +107,33 @@ def solids(
     tables: list[Table] = []
     places: dict[int, int] = {}
     samples: Samples | None = None
-    for form in FORMS:
+    for number, form in enumerate(FORMS, start=1):
         all_mine = [region for region in avoided if isinstance(region.shape, form)]
         unmoved = [region for region in all_mine if region.motion is None]
         mine = unmoved + [region for region in all_mine if region.motion is not None]
         wanted = [region for region in targets if isinstance(region.shape, form)]
         if not mine and not wanted:
             continue
-        places |= {id(region): number for number, region in enumerate([*mine, *wanted])}
+        places |= {id(region): place for place, region in enumerate([*mine, *wanted])}
+        rows = [
+            _Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in (*mine, *wanted)
+        ]
+        values: Sequence[Any] = [row.shape for row in rows]
         if form is Field:
-            fields = [
-                (region, shape)
-                for region in (*mine, *wanted)
-                if isinstance(shape := region.shape.placed(axes, (0, 0, 0)), Field)
-            ]
-            found, samples = field_rows(fields, scale)
-            tables.append(_field_table(found, (len(mine), len(unmoved)), scale))
-            continue
-        rows = [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in mine]
-        rows += [_Row(region, region.shape.placed(axes, (0, 0, 0)), scale) for region in wanted]
+            values, samples = field_rows(
+                [(row.region, cast(Field, row.shape)) for row in rows], scale
+            )
+        pairs = list(zip(rows, values, strict=True))
         columns = tuple(
-            Column(name, dims, note, tuple(Entry(make(row), row.note) for row in rows))
+            Column(name, dims, note, tuple(Entry(make(*one), one[0].note) for one in pairs))
             for name, dims, note, make in _COLUMNS[form]
         )
-        number = FORMS.index(form) + 1
-        tables.append(Table(_NAMES[form], number, len(rows), len(mine), len(unmoved), columns))
+        kind = form.__name__.upper()
+        tables.append(Table(kind, number, len(rows), len(mine), len(unmoved), columns))
     if all(isinstance(target.shape, Sphere) for target in targets):
         return Solids(tuple(tables), samples=samples, places=places)
     goals = tuple(_target(one, places, scale, axes) for one in targets)
     return Solids(tuple(tables), goals, samples, places)
-
-
-def _field_table(rows: Sequence[FieldRow], avoided: tuple[int, int], scale: int) -> Table:
-    """The table of fields; so many of them are to be avoided, and so many of these keep still."""
-
-    def column(name: str, dimensions: str, note: str, make: Callable[[FieldRow], str]) -> Column:
-        entries = tuple(Entry(make(row), " ".join(row.region.name.split())) for row in rows)
-        return Column(name, dimensions, note, entries)
-
-    def lengths(row: FieldRow, values: Vector) -> str:
-        return _Row(row.region, row.field, scale).lengths(values)
-
-    columns = (
-        column("corner", "[3]", "The first point.", lambda r: lengths(r, r.field.corner_mm)),
-        column(
-            "axes",
-            "[3][3]",
-            "Its own axes.",
-            lambda r: _axes(_Row(r.region, r.field, scale), r.field.axes),
-        ),
-        column("extent", "[3]", "From there to the last.", lambda r: lengths(r, r.field.extent_mm)),
-        column("count", "[3]", "How many points.", lambda r: _braced(map(str, r.field.counts))),
-        column("first", "", "Where its samples begin.", lambda r: str(r.first)),
-        column("low", "[3]", "Where the solid begins.", lambda r: _braced(map(str, r.low))),
-        column("high", "[3]", "Where it ends.", lambda r: _braced(map(str, r.high))),
-        column("side", "", "-1: samples are depths.", lambda r: "-1" if r.field.is_inner else "1"),
-        column("rounding", "", _ROUNDING, lambda r: str(r.rounding)),
-    )
-    return Table("FIELD", FORMS.index(Field) + 1, len(rows), *avoided, columns)
 
 
 def _target(
@@ -230,14 +199,11 @@ def _way(start: Vector, end: Vector) -> Vector:
     return (x, y, z)
 
 
-def _round_ends(row: _Row) -> tuple[Vector, Vector, int, int, int]:
+def _round_ends(row: _Row, shape: Capsule) -> tuple[Vector, Vector, int, int, int]:
     """The start, the direction, the length and the radii of a capsule, in units.
 
     If one ball contains the other, also after rounding, there is only this one, of length 0.
     """
-    shape = row.shape
-    if not isinstance(shape, Capsule):
-        raise TypeError(shape)
     start, end = row.length(shape.start_radius_mm), row.length(shape.end_radius_mm)
     length = row.length(shape.length_mm)
     if abs(start - end) < length:
@@ -246,85 +212,56 @@ def _round_ends(row: _Row) -> tuple[Vector, Vector, int, int, int]:
     return middle, (0.0, 0.0, 0.0), 0, max(start, end), max(start, end)
 
 
-_Make = Callable[[_Row], str]
+_Make = Callable[[_Row, Any], str]
+"""A column's function of a row and its shape, or the `FieldRow` of a field."""
 
-
-def _of(form: type[Shape], make: Callable[..., str]) -> _Make:
-    """A column's function of a row, for a shape of this kind."""
-
-    def text(row: _Row) -> str:
-        if not isinstance(row.shape, form):
-            raise TypeError(row.shape)
-        return make(row, row.shape)
-
-    return text
-
-
-_NAMES: Final[dict[type[Shape], str]] = {
-    Box: "BOX",
-    Capsule: "CAPSULE",
-    Cylinder: "CYLINDER",
-    Ellipsoid: "ELLIPSOID",
-    HalfSpace: "HALFSPACE",
-}
 _ROUNDING: Final = "All points at most this far away belong to it as well."
 _COLUMNS: Final[dict[type[Shape], tuple[tuple[str, str, str, _Make], ...]]] = {
     Box: (
-        ("center", "[3]", "Its centre.", _of(Box, lambda r, s: r.lengths(s.middle_mm))),
+        ("center", "[3]", "Its centre.", lambda r, s: r.lengths(s.middle_mm)),
         (
             "half",
             "[3]",
             "Half of its edges.",
-            _of(
-                Box, lambda r, s: r.lengths((s.size_mm[0] / 2, s.size_mm[1] / 2, s.size_mm[2] / 2))
-            ),
+            lambda r, s: r.lengths((s.size_mm[0] / 2, s.size_mm[1] / 2, s.size_mm[2] / 2)),
         ),
-        ("axes", "[3][3]", "Its own axes.", _of(Box, lambda r, s: _axes(r, s.axes))),
-        ("rounding", "", _ROUNDING, _of(Box, lambda r, s: str(r.length(s.rounding_mm)))),
+        ("axes", "[3][3]", "Its own axes.", lambda r, s: _axes(r, s.axes)),
+        ("rounding", "", _ROUNDING, lambda r, s: str(r.length(s.rounding_mm))),
     ),
     Capsule: (
-        ("start", "[3]", "The first centre.", lambda r: r.lengths(_round_ends(r)[0])),
-        ("way", "[3]", "From there to the other.", lambda r: r.direction(_round_ends(r)[1])),
-        ("length", "", "How far that is.", lambda r: str(_round_ends(r)[2])),
-        ("radius", "", "The radius at the first centre.", lambda r: str(_round_ends(r)[3])),
-        ("end_radius", "", "The radius at the other.", lambda r: str(_round_ends(r)[4])),
+        ("start", "[3]", "The first centre.", lambda r, s: r.lengths(_round_ends(r, s)[0])),
+        ("way", "[3]", "From there to the other.", lambda r, s: r.direction(_round_ends(r, s)[1])),
+        ("length", "", "How far that is.", lambda r, s: str(_round_ends(r, s)[2])),
+        ("radius", "", "The radius at the first centre.", lambda r, s: str(_round_ends(r, s)[3])),
+        ("end_radius", "", "The radius at the other.", lambda r, s: str(_round_ends(r, s)[4])),
     ),
     Cylinder: (
-        ("center", "[3]", "Its middle.", _of(Cylinder, lambda r, s: r.lengths(s.center_mm))),
-        (
-            "way",
-            "[3]",
-            "Its axis.",
-            _of(Cylinder, lambda r, s: r.direction(_way(s.start_mm, s.end_mm))),
-        ),
-        (
-            "half",
-            "",
-            "Half of its length.",
-            _of(Cylinder, lambda r, s: str(r.length(s.length_mm / 2))),
-        ),
-        ("radius", "", "Its radius.", _of(Cylinder, lambda r, s: str(r.length(s.radius_mm)))),
-        ("rounding", "", _ROUNDING, _of(Cylinder, lambda r, s: str(r.length(s.rounding_mm)))),
+        ("center", "[3]", "Its middle.", lambda r, s: r.lengths(s.center_mm)),
+        ("way", "[3]", "Its axis.", lambda r, s: r.direction(_way(s.start_mm, s.end_mm))),
+        ("half", "", "Half of its length.", lambda r, s: str(r.length(s.length_mm / 2))),
+        ("radius", "", "Its radius.", lambda r, s: str(r.length(s.radius_mm))),
+        ("rounding", "", _ROUNDING, lambda r, s: str(r.length(s.rounding_mm))),
     ),
     Ellipsoid: (
-        ("center", "[3]", "Its centre.", _of(Ellipsoid, lambda r, s: r.lengths(s.middle_mm))),
-        ("radius", "[3]", "Its radii.", _of(Ellipsoid, lambda r, s: r.lengths(s.radii_mm, 1))),
-        ("axes", "[3][3]", "Its own axes.", _of(Ellipsoid, lambda r, s: _axes(r, s.axes))),
-        ("rounding", "", _ROUNDING, _of(Ellipsoid, lambda r, s: str(r.length(s.rounding_mm)))),
+        ("center", "[3]", "Its centre.", lambda r, s: r.lengths(s.middle_mm)),
+        ("radius", "[3]", "Its radii.", lambda r, s: r.lengths(s.radii_mm, 1)),
+        ("axes", "[3][3]", "Its own axes.", lambda r, s: _axes(r, s.axes)),
+        ("rounding", "", _ROUNDING, lambda r, s: str(r.length(s.rounding_mm))),
     ),
     HalfSpace: (
-        (
-            "point",
-            "[3]",
-            "A point of its plane.",
-            _of(HalfSpace, lambda r, s: r.lengths(s.point_mm)),
-        ),
-        (
-            "towards",
-            "[3]",
-            "From there into it.",
-            _of(HalfSpace, lambda r, s: r.direction(s.towards)),
-        ),
+        ("point", "[3]", "A point of its plane.", lambda r, s: r.lengths(s.point_mm)),
+        ("towards", "[3]", "From there into it.", lambda r, s: r.direction(s.towards)),
+    ),
+    Field: (
+        ("corner", "[3]", "The first point.", lambda r, f: r.lengths(f.field.corner_mm)),
+        ("axes", "[3][3]", "Its own axes.", lambda r, f: _axes(r, f.field.axes)),
+        ("extent", "[3]", "From there to the last.", lambda r, f: r.lengths(f.field.extent_mm)),
+        ("count", "[3]", "How many points.", lambda _, f: _braced(map(str, f.field.counts))),
+        ("first", "", "Where its samples begin.", lambda _, f: str(f.first)),
+        ("low", "[3]", "Where the solid begins.", lambda _, f: _braced(map(str, f.low))),
+        ("high", "[3]", "Where it ends.", lambda _, f: _braced(map(str, f.high))),
+        ("side", "", "-1: samples are depths.", lambda _, f: "-1" if f.field.is_inner else "1"),
+        ("rounding", "", _ROUNDING, lambda _, f: str(f.rounding)),
     ),
 }
 """By kind of shape: the tables' names, their dimensions, what they are, and how a row is made."""

@@ -23,7 +23,7 @@ from ntagen.render.frame import Matrix, cross, model_frame, turned
 from ntagen.render.moving import Moving, moving, still
 from ntagen.render.solids import Solids, solids
 from ntagen.rounding import units_per_mm
-from ntagen.scene import Region, Scene, Vector
+from ntagen.scene import Region, Scene, Vector, require
 from ntagen.shapes import Sphere
 from ntagen.units import deg_from_rad
 from ntagen.values import dataclass
@@ -277,7 +277,7 @@ def _check_motion(scene: Scene) -> None:
     needle, limits, per_mm = scene.needle, scene.limits, units_per_mm(scene)
     push_mm = needle.speed_mm_per_s * limits.step_s
     for radius_mm in scene.radii_mm:
-        breach = (
+        require(
             rules.fits(radius_mm, per_mm, "the radius of the motion circle")
             or rules.visible(radius_mm, per_mm, "the radius of the motion circle")
             or rules.fits(push_mm, per_mm, "a push")
@@ -289,8 +289,6 @@ def _check_motion(scene: Scene) -> None:
                 swept=scene.safety == "swept",
             )
         )
-        if breach is not None:
-            raise InputError(f"{breach.message}\nhint: {breach.hint}")
 
 
 def _sweep_margin(scale: int, radius_mm: float) -> int:

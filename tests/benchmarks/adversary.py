@@ -21,6 +21,7 @@ import json
 import math
 import statistics
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def scene_of(path: Path, limits: Limits, tissue: Tissue) -> Scene:
 def followed(found: Defence, count: int) -> dict[str, Any]:
     """How many simulated tissues the strategy survives."""
     assert found.tree is not None
-    tree, scene = json.loads(json.dumps(found.tree.to_json())), found.scene
+    tree, scene = json.loads(json.dumps(asdict(found.tree))), found.scene
     tip_mm = scene.tissue.tip_mm
     random = np.random.default_rng(1)
     at_corners = oracle.simulate(tree, scene, count, oracle.corners(scene, random))

@@ -22,11 +22,11 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Maker, Result, answering, simulate
 from ntagen.drive.states import Event, State
 from ntagen.drive.trees import COURSE, course_to_log
-from ntagen.needle.answering import Given as GivenPicks
+from ntagen.needle import answering as tissues
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.plan.against_tissue import defend
-from ntagen.plan.branches import expected_path, path_of, stretches, worst_path
-from ntagen.plan.closed_loop import Segment, certify_all
+from ntagen.plan.branches import certify_all, expected_path, path_of, stretches, worst_path
+from ntagen.plan.closed_loop import Segment
 from ntagen.scene import Limits, Needle, Pose, Region, Scene, Tissue
 from tests.drive.runs import Diary
 from tests.examples import examples
@@ -77,7 +77,7 @@ def picking(way: list[tuple[float, float]], radius_mm: float = 30.0) -> Maker:
         Errors(),
         seed,
         SimulatedClock(),
-        answers=GivenPicks(way),
+        answers=tissues.given(way),
     )
 
 

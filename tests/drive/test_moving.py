@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ntagen.drive.pace import LATE_S, Pace
+from ntagen.drive.pieces import LATE_S, Pace
 from ntagen.drive.records import Breathed, Command, Record
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ntagen.needle.answering import Drawn
+from ntagen.needle.answering import drawn
 from ntagen.needle.kinematics import pushed_to
 from ntagen.needle.virtual import Errors, SimulatedClock, VirtualNeedle
 from ntagen.plan.actions import Plan, Push, Roll
@@ -53,7 +53,7 @@ def _run(plan: Plan, scene: Scene, seed: int) -> Result:
         Errors(),
         seed,
         SimulatedClock(),
-        answers=Drawn(scene.tissue, seed),
+        answers=drawn(scene.tissue, seed),
         free_bevel=scene.limits.free_bevel,
     )
     offsets = np.random.default_rng([seed, 9])

@@ -113,7 +113,7 @@ def command(
     is_apart (whether it is less probable than the best one).
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
-    from ntagen.drive.engine import engine_for
+    from ntagen.drive.settings import engine_for
     from ntagen.plan.anytime import best_plans
     from ntagen.plan.rank import split_ranking
 

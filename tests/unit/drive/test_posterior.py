@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def promised(where: Scene, **changes: object) -> Promise | None:
 
 def check_won(promise: Promise) -> None:
     """Tissues of other code pick corners: all reach the target, with the tip error to spare."""
-    tree, where = promise.tree.to_json(), promise.scene
+    tree, where = asdict(promise.tree), promise.scene
     tissue = where.tissue
     picks = oracle.corners(where, np.random.default_rng(1))
     outcome = oracle.simulate(tree, where, 2000, picks)

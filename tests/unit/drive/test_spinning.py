@@ -19,7 +19,7 @@ from ntagen.drive.replay import replay
 from ntagen.drive.scene_json import scene_from_json, scene_to_json
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Result, simulate, synthesiser_for
-from ntagen.drive.spinning import TURN_RAD, Spun, push_seconds, spun
+from ntagen.drive.spinning import TURN_RAD, Spun, push_seconds, steered
 from ntagen.drive.stepped import Stepped
 from ntagen.drive.torsion import Compensated, Lag
 from ntagen.errors import DeviceError, InputError
@@ -171,9 +171,9 @@ class Plain:
 
 def test_a_device_that_cannot_turn_meanwhile_is_refused_before_anything_moves() -> None:
     for device in (Plain(), Compensated(Plain(), Lag(1.0))):
-        assert spun(device, scene()) is device
+        assert steered(device, scene(), 0.0) is device
         with pytest.raises(InputError, match="cannot insert and turn"):
-            spun(device, DEEP)
+            steered(device, DEEP, 0.0)
     with pytest.raises(DeviceError, match="cannot insert and turn"):
         Assembly(Plain(), Plain()).spin(1.0, 0.5)
 

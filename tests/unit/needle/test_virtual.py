@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ntagen.errors import DeviceError
-from ntagen.needle.answering import Drawn
+from ntagen.needle.answering import drawn
 from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedle
 from ntagen.scene import Needle, Tissue
 from tests.steering import ENTRY, sphere
@@ -113,11 +113,16 @@ def test_impossible_commands_are_refused(value: float) -> None:
 
 def test_a_tissue_with_chance_draws_by_its_spreads() -> None:
     tissue = Tissue("stochastic", 0.1, 0.2, 0.3)
-    drawn = [Drawn(tissue, seed).pick(rolls_err=True) for seed in range(4000)]
-    factors = [math.log(factor) for factor, _ in drawn]
-    errors = [error for _, error in drawn]
+    picks = [next(drawn(tissue, seed)) for seed in range(4000)]
+    factors = [math.log(factor) for factor, _ in picks]
+    errors = [error for _, error in picks]
     for values, spread in ((factors, 0.1), (errors, 0.2)):
         # Five standard deviations of each, for normal numbers.
         assert abs(statistics.fmean(values)) < 5.0 * spread / math.sqrt(4000.0)
         assert abs(statistics.pstdev(values) - spread) < 5.0 * spread / math.sqrt(8000.0)
-    assert all(Drawn(tissue, seed).pick(rolls_err=False)[1] == 0.0 for seed in range(5))
+    for seed in range(5):
+        # Before the first roll there is none that errs.
+        true, answers = Needle(ENTRY, 30.0, 2.0), drawn(tissue, seed)
+        needle = VirtualNeedle(true, (), Errors(), seed, SimulatedClock(), answers=answers)
+        needle.push(1.0)
+        assert needle.pierced[0].start == ENTRY

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
+from ntagen.drive.trees import tree_from_json
 from ntagen.errors import InputError
 from ntagen.plan.against_tissue import Defence, defend
-from ntagen.plan.closed_loop import Segment, certify_all
+from ntagen.plan.branches import certify_all
 from ntagen.scene import Limits, Needle, Pose, Region, Scene, Tissue
 from tests.oracles import tissue as oracle
 from tests.oracles.answers import has_strategy
@@ -62,7 +63,7 @@ def test_a_strategy_holds_on_all_branches_and_passes_the_engines_check(solved: D
 
 def test_simulated_tissues_that_pick_corners_do_no_harm(solved: Defence) -> None:
     assert solved.tree is not None
-    tree, scene = json.loads(json.dumps(solved.tree.to_json())), solved.scene
+    tree, scene = json.loads(json.dumps(asdict(solved.tree))), solved.scene
     random = np.random.default_rng(0)
     outcome = oracle.simulate(tree, scene, 500, oracle.corners(scene, random))
     assert outcome.safe(scene.tissue.tip_mm).all()
@@ -73,7 +74,7 @@ def test_simulated_tissues_that_pick_corners_do_no_harm(solved: Defence) -> None
 
 def test_factors_that_change_at_each_push_stay_between_those_that_do_not(solved: Defence) -> None:
     assert solved.tree is not None
-    tree, scene = json.loads(json.dumps(solved.tree.to_json())), solved.scene
+    tree, scene = json.loads(json.dumps(asdict(solved.tree))), solved.scene
     anew = oracle.simulate_pushes(tree, scene, 200, np.random.default_rng(0))
     assert anew.safe(0.0).all()
     steady = replace(scene, tissue=Tissue("adversarial", 0.0, 0.0, 0.0))
@@ -112,7 +113,7 @@ def test_the_certificate_sees_a_tissue_beyond_its_bounds(solved: Defence) -> Non
         criticals=(Region.ball("C", "critical", (0.0, -12.0, 0.0), 3.0),),
     )
     assert not certify_all(solved.tree, blocked).holds(0.0)
-    assert Segment.from_json(solved.tree.to_json()) == solved.tree
+    assert tree_from_json(json.loads(json.dumps(asdict(solved.tree)))) == solved.tree
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2, 3, 6, 14, 22, 35])

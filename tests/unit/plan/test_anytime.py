@@ -8,9 +8,8 @@ from time import monotonic
 
 import pytest
 
-from ntagen.plan.anytime import CRITERIA, Best, best_plans, goodness
-from ntagen.plan.rank import CRITERIA as RANKS
-from ntagen.plan.rank import Candidate
+from ntagen.plan.anytime import QUESTIONS, Best, best_plans, goodness
+from ntagen.plan.rank import CRITERIA, Candidate, place_of
 from ntagen.plan.synthesise import EngineSynthesiser
 from ntagen.scene import Scene
 from tests.steering import CRITICAL, PAPER, TARGET, scene, sphere
@@ -46,24 +45,24 @@ def test_no_plan_is_better_than_a_limit_says(where: Scene, ranking: tuple[str, .
     assert best.is_final
     assert best.verdict == "found"
     for name in ranking:
-        criterion = CRITERIA[name]
+        badness, question = CRITERIA[name], QUESTIONS[name]
         # The model's integers lose 1 % of an arc.
-        limit = best.limits[name] - (0.0 if criterion.is_exact else 0.7)
+        limit = best.limits[name] - (0.0 if question.is_exact else 0.7)
         # The list may have none: its plans end with the first step that ends in the target.
-        assert min((criterion.badness(one.certificate) for one in others), default=limit) >= limit
-        mine = criterion.badness(best.candidates[0].certificate) + criterion.resolution(where)
-        others = [one for one in others if criterion.badness(one.certificate) <= mine]
+        assert min((badness(one.certificate) for one in others), default=limit) >= limit
+        mine = badness(best.candidates[0].certificate) + question.resolution(where)
+        others = [one for one in others if badness(one.certificate) <= mine]
 
 
 @pytest.mark.parametrize("ranking", [RANKINGS[0], RANKINGS[2], RANKINGS[3]], ids="-".join)
 def test_what_is_settled_is_the_best_of_all(ranking: tuple[str, ...]) -> None:
     best = final(PAPER, ranking=ranking)
     name = ranking[0]
-    criterion = CRITERIA[name]
-    optimum = criterion.badness(every(PAPER, ranking)[0].certificate)
+    badness, question = CRITERIA[name], QUESTIONS[name]
+    optimum = badness(every(PAPER, ranking)[0].certificate)
     assert best.is_settled(name, PAPER)
-    mine = criterion.badness(best.candidates[0].certificate)
-    assert mine <= optimum + criterion.resolution(PAPER) + 0.7
+    mine = badness(best.candidates[0].certificate)
+    assert mine <= optimum + question.resolution(PAPER) + 0.7
 
 
 def test_each_answer_is_at_least_as_good_as_the_one_before() -> None:
@@ -71,7 +70,10 @@ def test_each_answer_is_at_least_as_good_as_the_one_before() -> None:
     answers = list(best_plans(BESIDE, EngineSynthesiser(ranking=ranking), clock=monotonic, count=3))
     assert [one.is_final for one in answers] == [False] * (len(answers) - 1) + [True]
     for before, after in itertools.pairwise(answers):
-        keys = [[RANKS[name](one.candidates[0]) for name in ranking] for one in (before, after)]
+        keys = [
+            [place_of(name, one.candidates[0].certificate) for name in ranking]
+            for one in (before, after)
+        ]
         assert keys[1] <= keys[0]
         assert after.looked_at >= before.looked_at
         assert all(after.limits[name] >= limit for name, limit in before.limits.items())
@@ -80,9 +82,11 @@ def test_each_answer_is_at_least_as_good_as_the_one_before() -> None:
 def test_the_best_five_are_the_five_best_of_all() -> None:
     best = final(PAPER, count=5)
     ranking = RANKINGS[0]
-    expected = [[RANKS[n](one) for n in ranking] for one in every(PAPER, ranking)[:5]]
+    expected = [
+        [place_of(n, one.certificate) for n in ranking] for one in every(PAPER, ranking)[:5]
+    ]
     assert best.is_complete
-    assert [[RANKS[n](one) for n in ranking] for one in best.candidates] == expected
+    assert [[place_of(n, one.certificate) for n in ranking] for one in best.candidates] == expected
 
 
 def test_all_plans_given_hold() -> None:
