@@ -15,9 +15,7 @@
 use std::cell::RefCell;
 
 use crate::cancellation;
-use crate::exec::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
-};
+use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
 use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
 
 use super::moves::{Error, Part};
@@ -30,7 +28,7 @@ pub(super) struct Code<'a> {
     network: &'a Network,
     interpreter: Interpreter,
     /// What the running call emits; kept to save allocations.
-    emitted: RefCell<(Vec<EmittedConstraint>, Vec<EmittedAssignment>)>,
+    emitted: RefCell<(Vec<FixedConstraint>, Vec<EmittedAssignment>)>,
 }
 
 /// An edge whose guard holds, by the words alone.
@@ -156,13 +154,7 @@ impl<'a> Code<'a> {
             if self.call(function, values, &mut words.to_vec())? == 0 {
                 return Ok(None);
             }
-            let emitted = &self.emitted.borrow().0;
-            constraints.extend(emitted.iter().map(|one| FixedConstraint {
-                left: one.left,
-                right: one.right,
-                bound: one.bound,
-                strict: one.strict,
-            }));
+            constraints.extend_from_slice(&self.emitted.borrow().0);
         }
         Ok(Some(constraints))
     }

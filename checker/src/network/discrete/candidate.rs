@@ -1,6 +1,6 @@
 //! The parts of moves: enabled edge instances, the receivers of a broadcast, and the participants.
 
-use crate::exec::EmittedConstraint;
+use crate::ir::FixedConstraint;
 
 use super::transition::Part;
 
@@ -104,7 +104,7 @@ pub(super) struct Audience {
     pub(super) channel: u32,
     /// The candidates with their constraints; the first candidate is a sender's.
     pub(super) candidates: Vec<Candidate>,
-    pub(super) constraints: Vec<EmittedConstraint>,
+    pub(super) constraints: Vec<FixedConstraint>,
     /// The groups of the receivers, in their order.
     pub(super) groups: Vec<Group>,
     /// The sender that was not asked what it receives.

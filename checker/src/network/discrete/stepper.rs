@@ -13,8 +13,10 @@
 use std::ops::Range;
 
 use crate::cancellation;
-use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
+use crate::exec::{Context, EmittedAssignment, Executor, RunTimeError};
+use crate::ir::{
+    ChannelId, Edge, FixedConstraint, FunctionId, Network, RunTimeErrorKind, Update, Urgency,
+};
 
 use super::broadcast_filter::{BroadcastFilter, Scope};
 use super::candidate::{Audience, Candidate, Choice, Group};
@@ -39,7 +41,7 @@ pub struct Stepper<'a> {
     pub(super) receivers: Receivers,
     /// Whether any channel is urgent.
     pub(super) has_urgent_channels: bool,
-    pub(super) constraints: Vec<EmittedConstraint>,
+    pub(super) constraints: Vec<FixedConstraint>,
     pub(super) assignments: Vec<EmittedAssignment>,
     pub(super) arguments: Vec<i32>,
     pub(super) candidates: Vec<Candidate>,
@@ -54,7 +56,7 @@ pub struct Stepper<'a> {
     pub(super) filter: BroadcastFilter,
     /// The receivers of the channel of the last broadcast, and the buffer for their constraints.
     pub(super) audience: Audience,
-    pub(super) heard: Vec<EmittedConstraint>,
+    pub(super) heard: Vec<FixedConstraint>,
     /// The cached enabled instances of edges.
     pub(super) instances: Instances,
     pub(super) partners: Partners,
@@ -376,7 +378,7 @@ impl<'a> Stepper<'a> {
     pub fn invariants(
         &mut self,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.invariants_of(0..self.network.processes.len(), words)
     }
 
@@ -385,7 +387,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         process: usize,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.invariants_of(process..process + 1, words)
     }
 
@@ -393,7 +395,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         processes: Range<usize>,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.constraints.clear();
         self.arguments.clear();
         for index in processes {

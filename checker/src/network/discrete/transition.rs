@@ -1,7 +1,6 @@
 //! Moves, each a composed transition, in flat buffers that are reused for the next state.
 
-use crate::exec::EmittedConstraint;
-use crate::ir::ChannelId;
+use crate::ir::{ChannelId, FixedConstraint};
 use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
 
@@ -64,7 +63,7 @@ impl Label {
 pub struct Moves {
     headers: Vec<Header>,
     parts: Vec<Part>,
-    constraints: Vec<EmittedConstraint>,
+    constraints: Vec<FixedConstraint>,
     /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast
     /// receivers that abstain.
     excluded: Vec<(u32, u32)>,
@@ -78,7 +77,7 @@ pub struct MoveRef<'a> {
     /// The parts: the sender (or the only process) first, then receivers in process order.
     pub parts: &'a [Part],
     /// The clock constraints of the participants' guards.
-    pub constraints: &'a [EmittedConstraint],
+    pub constraints: &'a [FixedConstraint],
     /// The channel of the synchronisation; `None` for an internal edge.
     pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
@@ -95,7 +94,7 @@ pub struct MoveRef<'a> {
 
 impl<'a> MoveRef<'a> {
     /// The conjunctions of clock constraints that must not hold.
-    pub fn excluded(&self) -> impl Iterator<Item = &'a [EmittedConstraint]> {
+    pub fn excluded(&self) -> impl Iterator<Item = &'a [FixedConstraint]> {
         let moves = self.moves;
         moves.excluded[self.excluded.0 as usize..self.excluded.1 as usize]
             .iter()
@@ -187,8 +186,8 @@ impl Moves {
     pub(in crate::network) fn push<'c>(
         &mut self,
         parts: &[Part],
-        constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
-        excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        constraints: impl IntoIterator<Item = &'c [FixedConstraint]>,
+        excluded: impl IntoIterator<Item = &'c [FixedConstraint]>,
         label: Label,
     ) {
         let first_part = self.parts.len() as u32;

@@ -1,8 +1,8 @@
 //! The effect of moves on clocks: how the constraints and assignments that code emits become those
 //! of zones.
 
-use crate::exec::{EmittedAssignment, EmittedConstraint};
-use crate::ir::ClockId;
+use crate::exec::EmittedAssignment;
+use crate::ir::{ClockId, FixedConstraint};
 use crate::network::Failure;
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
@@ -129,16 +129,14 @@ pub(super) fn check_limit(value: i32) -> Result<(), Failure> {
 /// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared
 /// with itself).
 pub(super) fn to_constraints(
-    emitted: &[EmittedConstraint],
+    emitted: &[FixedConstraint],
 ) -> Result<Option<Vec<Constraint>>, Failure> {
     let mut constraints = Vec::new();
     Ok(add_constraints(emitted, &mut constraints)?.then_some(constraints))
 }
 
 /// An emitted constraint as one on zones, which may compare a clock with itself.
-pub(in crate::network) fn to_constraint(
-    emitted: &EmittedConstraint,
-) -> Result<Constraint, Failure> {
+pub(in crate::network) fn to_constraint(emitted: &FixedConstraint) -> Result<Constraint, Failure> {
     let bound = if emitted.strict {
         Bound::strict(emitted.bound)
     } else {
@@ -153,7 +151,7 @@ pub(in crate::network) fn to_constraint(
 
 /// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
 pub(in crate::network) fn add_constraints(
-    emitted: &[EmittedConstraint],
+    emitted: &[FixedConstraint],
     constraints: &mut Vec<Constraint>,
 ) -> Result<bool, Failure> {
     constraints.clear();
@@ -185,11 +183,11 @@ pub(super) fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failu
 }
 
 /// The zones of a federation as conjunctions of constraints.
-pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
+pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<FixedConstraint>> {
     let conjunction = |zone: &[Bound]| {
         let mut constraints = Vec::new();
         minimal::for_each_minimal(zone, federation.dimension(), |one| {
-            constraints.push(EmittedConstraint {
+            constraints.push(FixedConstraint {
                 left: ClockId(one.left as u32),
                 right: ClockId(one.right as u32),
                 bound: one.bound.value(),

@@ -2,8 +2,8 @@
 
 use hashbrown::HashTable;
 
-use crate::exec::{EmittedAssignment, EmittedConstraint};
-use crate::ir::ClockId;
+use crate::exec::EmittedAssignment;
+use crate::ir::{ClockId, FixedConstraint};
 
 /// Effects; each is stored once, as words that determine the result. The first words say how many
 /// words there are up to the end of the guard, of the assignments and of the invariant. Then come
@@ -47,7 +47,7 @@ impl PackedEffects {
         self.key[part] = self.key.len() as u32;
     }
 
-    pub(super) fn add_constraints(&mut self, emitted: &[EmittedConstraint]) {
+    pub(super) fn add_constraints(&mut self, emitted: &[FixedConstraint]) {
         for one in emitted {
             let clocks = packed(one.left, one.right) | u32::from(one.strict) << 31;
             self.key.extend([clocks, one.bound.cast_unsigned()]);
@@ -64,7 +64,7 @@ impl PackedEffects {
         self.key[first..self.key[end] as usize].as_chunks().0
     }
 
-    pub(super) fn guard(&self) -> Vec<EmittedConstraint> {
+    pub(super) fn guard(&self) -> Vec<FixedConstraint> {
         constraints(self.pairs(FRONT, GUARD))
     }
 
@@ -80,7 +80,7 @@ impl PackedEffects {
             .collect()
     }
 
-    pub(super) fn invariant(&self) -> Vec<EmittedConstraint> {
+    pub(super) fn invariant(&self) -> Vec<FixedConstraint> {
         constraints(self.pairs(self.key[ASSIGNMENTS] as usize, INVARIANT))
     }
 
@@ -126,8 +126,8 @@ fn packed(first: ClockId, second: ClockId) -> u32 {
 }
 
 /// The constraints in pairs of words.
-fn constraints(pairs: &[[u32; 2]]) -> Vec<EmittedConstraint> {
-    let constraint = |&[clocks, bound]: &[u32; 2]| EmittedConstraint {
+fn constraints(pairs: &[[u32; 2]]) -> Vec<FixedConstraint> {
+    let constraint = |&[clocks, bound]: &[u32; 2]| FixedConstraint {
         left: ClockId(clocks & MOST_CLOCKS),
         right: ClockId(clocks >> CLOCK_BITS & MOST_CLOCKS),
         bound: bound.cast_signed(),

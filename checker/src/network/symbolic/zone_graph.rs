@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use crate::cancellation;
-use crate::exec::EmittedConstraint;
+use crate::ir::FixedConstraint;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
@@ -302,7 +302,7 @@ impl<'a> Symbolic<'a> {
     }
 
     /// Whether some constraint of a conjunction holds nowhere in the zone.
-    fn is_false(&self, conjunction: &[EmittedConstraint], zone: &[Bound]) -> bool {
+    fn is_false(&self, conjunction: &[FixedConstraint], zone: &[Bound]) -> bool {
         conjunction.iter().any(|one| {
             let constraint = to_constraint(one);
             constraint.is_ok_and(|one| !dbm::satisfies(zone, self.dimension, &one))
