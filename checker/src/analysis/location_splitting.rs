@@ -19,8 +19,7 @@ use rustc_hash::FxHashMap;
 
 use crate::exec::{Context, Interpreter};
 use crate::ir::{
-    ClockAtom, ClockRange, Edge, FixedConstraint, FunctionId, Guard, Network, Shape, Update,
-    Variable,
+    ClockAtom, Edge, FixedConstraint, FunctionId, Guard, Network, Shape, Update, Variable,
 };
 
 use super::function_reads::read_words;
@@ -469,15 +468,8 @@ struct FunctionRun<'a> {
 
 /// Adds the comparisons that a guard makes where it emits these constraints.
 fn add_atoms(guard: &Guard, emitted: &[FixedConstraint], atoms: &mut Vec<ClockAtom>) {
-    for constraint in guard.fixed.iter().chain(emitted) {
-        let single = |first| ClockRange { first, count: 1 };
-        let atom = ClockAtom {
-            left: single(constraint.left),
-            right: single(constraint.right),
-            low: constraint.bound,
-            high: constraint.bound,
-            strict: constraint.strict,
-        };
+    for &constraint in guard.fixed.iter().chain(emitted) {
+        let atom = ClockAtom::from(constraint);
         if !atoms.contains(&atom) {
             atoms.push(atom);
         }

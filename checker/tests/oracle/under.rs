@@ -25,10 +25,8 @@ fn restrict(graph: &mut Graph, strategy: &Strategy) {
     let network = &graph.network;
     for node in &mut graph.nodes {
         let said = Said::new(network, strategy, &node.state, ticks);
-        node.steps.retain(|step| {
-            let parts: Vec<Part> = step.parts.iter().map(|&part| part.into()).collect();
-            !step.controllable || said.allows(&parts)
-        });
+        node.steps
+            .retain(|step| !step.controllable || said.allows(&step.parts));
         node.is_obliged = !said.allows_waiting();
     }
 }

@@ -289,7 +289,7 @@ impl Stepper<'_> {
 /// one.
 fn next_branches(network: &Network, parts: &mut [Part]) -> bool {
     for part in parts.iter_mut().rev() {
-        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        let edge = network.edge(*part);
         if part.branch as usize + 1 < edge.branches.len() {
             part.branch += 1;
             return true;

@@ -53,19 +53,9 @@ pub(super) enum Choice {
 }
 
 impl Group {
-    /// The place of its first candidate.
-    pub(super) fn first(&self) -> usize {
-        self.first
-    }
-
     /// How many choices there are.
     pub(super) fn picks(&self) -> u64 {
         (self.end - self.first) as u64
-    }
-
-    /// The number of moves that its choices stand for.
-    pub(super) fn ways(&self) -> u64 {
-        self.ways
     }
 
     /// The same group for candidates that begin at another place.
@@ -114,6 +104,6 @@ pub(super) struct Audience {
 impl Audience {
     /// The process of a group.
     pub(super) fn process_of(&self, group: &Group) -> u32 {
-        self.candidates[group.first()].process
+        self.candidates[group.first].process
     }
 }

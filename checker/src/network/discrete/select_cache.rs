@@ -13,11 +13,11 @@
 //!   later is not remembered, nor are edges whose words seldom come again. That is judged by how
 //!   often each set was used and not in trials of states, as an edge has few sets or many.
 
-use std::hash::{Hash, Hasher};
+use std::hash::BuildHasher;
 use std::ops::Range;
 
 use hashbrown::HashTable;
-use rustc_hash::FxHasher;
+use rustc_hash::FxBuildHasher;
 
 use crate::ir::{Edge, FixedConstraint, Network};
 
@@ -287,9 +287,5 @@ fn deciding_words(network: &Network, edge: &Edge) -> Option<Vec<u32>> {
 }
 
 fn hash(key: &[i32]) -> u64 {
-    let mut hasher = FxHasher::default();
-    for &value in key {
-        value.hash(&mut hasher);
-    }
-    hasher.finish()
+    FxBuildHasher.hash_one(key)
 }

@@ -26,7 +26,7 @@ use super::receivers::Receivers;
 use super::select_cache::Instances;
 use super::selects::select_values;
 use super::transition::{MoveListId, MoveRef, Moves, Part};
-use super::transition_cache::{Next, Record, TransitionCache, VectorId};
+use super::transition_cache::{Point, Record, TransitionCache, VectorId};
 use crate::network::failure::Failure;
 use crate::tuning::Tuning;
 
@@ -185,7 +185,7 @@ impl<'a> Stepper<'a> {
 
     /// The edge of a part.
     pub fn edge(&self, part: Part) -> &'a Edge {
-        &self.network.processes[part.process as usize].edges[part.edge as usize]
+        self.network.edge(part)
     }
 
     /// Writes all moves of the state that the words allow into `out`.
@@ -252,31 +252,27 @@ impl<'a> Stepper<'a> {
 
     /// The moves of a state with this location vector, if they are in the cache.
     fn known_list(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
-        let Some(mut way) = self.transitions.start(vector) else {
-            return Ok(Found::Nothing);
-        };
-        loop {
-            match self.transitions.next(way) {
-                Next::Moves(list) => return Ok(Found::Moves(list)),
-                Next::Ask(function, arguments) => {
-                    let mut context = Context {
-                        state: words,
-                        constraints: &mut self.constraints,
-                        assignments: &mut self.assignments,
-                    };
-                    match self.executor.call(function, arguments, &mut context) {
-                        Ok(answer) => self.transitions.answer(&mut way, answer),
-                        Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
-                            return Err(error.into());
-                        }
-                        // The moves are then made without the cache, which shows whether the
-                        // failure counts.
-                        Err(_) => return Ok(Found::Failure),
-                    }
+        let mut point = self.transitions.root(vector);
+        while let Some(Point::Ask(question)) = point {
+            let (function, arguments) = self.transitions.asked(question);
+            let mut context = Context {
+                state: words,
+                constraints: &mut self.constraints,
+                assignments: &mut self.assignments,
+            };
+            match self.executor.call(function, arguments, &mut context) {
+                Ok(answer) => point = self.transitions.after(question, answer),
+                Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
+                    return Err(error.into());
                 }
-                Next::Unknown => return Ok(Found::Nothing),
+                // The moves are then made without the cache, which shows whether the failure counts.
+                Err(_) => return Ok(Found::Failure),
             }
         }
+        Ok(match point {
+            Some(Point::Moves(list)) => Found::Moves(list),
+            _ => Found::Nothing,
+        })
     }
 
     /// Makes the moves of a state with this location vector, and caches them if they do not depend

@@ -1,6 +1,8 @@
 //! Moves, each a composed transition, in flat buffers that are reused for the next state.
 
 use crate::ir::{ChannelId, FixedConstraint};
+
+pub use crate::ir::Part;
 use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
 
@@ -10,20 +12,6 @@ const MOST_MOVES: usize = 1 << 20;
 /// The index of cached moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MoveListId(pub(super) u32);
-
-/// The part of one process in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
-    /// binding fastest.
-    pub select: u32,
-}
 
 /// Ranges into the buffers of [`Moves`].
 #[derive(Clone, Copy, Debug)]
@@ -46,16 +34,6 @@ pub(in crate::network) struct Label {
     /// Whether it is known that its guards leave something of the zone for which the moves were
     /// computed.
     pub(in crate::network) is_possible: bool,
-}
-
-impl Label {
-    /// The same for a move whose constraints were changed.
-    pub(in crate::network) fn unsettled(self) -> Label {
-        Label {
-            is_possible: false,
-            ..self
-        }
-    }
 }
 
 /// The moves of a state, by ascending rank.
@@ -209,5 +187,19 @@ impl Moves {
             excluded: (first_excluded, self.excluded.len() as u32),
             label,
         });
+    }
+
+    /// Adds a move of another list, which none of these conjunctions may allow any more.
+    pub(in crate::network) fn push_without<'c>(
+        &mut self,
+        one: MoveRef<'c>,
+        forbidden: impl Iterator<Item = &'c [FixedConstraint]>,
+    ) {
+        let label = Label {
+            is_possible: false,
+            ..one.label
+        };
+        let excluded = one.excluded().chain(forbidden);
+        self.push(one.parts, [one.constraints], excluded, label);
     }
 }

@@ -74,8 +74,7 @@ impl ClockEffect {
         if within.constrain_all(&self.guard) {
             let mut rest = Federation::of_zone(dimension, within.bounds());
             self.subtract_excluded(&mut rest);
-            let pieces = rest.zones();
-            out.extend(pieces.map(|bounds| Zone::from_bounds(dimension, bounds)));
+            out.extend(rest.to_zones());
             out.retain_mut(|piece| self.enter(piece));
         }
     }
@@ -101,7 +100,7 @@ impl ClockEffect {
 
     /// The part of a zone in which the move is possible.
     pub fn enabled_part(&self, zone: &[Bound], dimension: usize) -> Federation {
-        let mut enabled = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
+        let mut enabled = Federation::universe(dimension);
         enabled.constrain_all(&self.invariant);
         enabled.preimage(&self.guard, &self.assignments);
         enabled.intersect_zone(zone);
@@ -182,19 +181,24 @@ pub(super) fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failu
     })
 }
 
-/// The zones of a federation as conjunctions of constraints.
-pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<FixedConstraint>> {
-    let conjunction = |zone: &[Bound]| {
-        let mut constraints = Vec::new();
-        minimal::for_each_minimal(zone, federation.dimension(), |one| {
-            constraints.push(FixedConstraint {
-                left: ClockId(one.left as u32),
-                right: ClockId(one.right as u32),
-                bound: one.bound.value(),
-                strict: one.bound.is_strict(),
-            });
+/// The fewest constraints that make a zone.
+pub fn conjunction(zone: &[Bound], dimension: usize) -> Vec<FixedConstraint> {
+    let mut constraints = Vec::new();
+    minimal::for_each_minimal(zone, dimension, |one| {
+        constraints.push(FixedConstraint {
+            left: ClockId(one.left as u32),
+            right: ClockId(one.right as u32),
+            bound: one.bound.value(),
+            strict: one.bound.is_strict(),
         });
-        constraints
-    };
-    federation.zones().map(conjunction).collect()
+    });
+    constraints
+}
+
+/// The zones of a federation as conjunctions.
+pub fn conjunctions(federation: &Federation) -> Vec<Vec<FixedConstraint>> {
+    let zones = federation.zones();
+    zones
+        .map(|zone| conjunction(zone, federation.dimension()))
+        .collect()
 }

@@ -92,24 +92,16 @@ impl PackedEffects {
             table,
             key,
         } = self;
-        let of = |index: u32| {
-            let index = index as usize;
-            let first = index.checked_sub(1).map_or(0, |before| ends[before]);
-            &words[first as usize..ends[index] as usize]
-        };
         let hash_of_key = hash_words(key);
-        if let Some(&index) = table.find(hash_of_key, |&index| of(index) == key.as_slice()) {
+        let is_key = |&index: &u32| entry(words, ends, index) == key.as_slice();
+        if let Some(&index) = table.find(hash_of_key, is_key) {
             return index;
         }
         let index = ends.len() as u32;
         words.extend_from_slice(key);
         ends.push(words.len() as u32);
-        let of = |index: u32| {
-            let index = index as usize;
-            let first = index.checked_sub(1).map_or(0, |before| ends[before]);
-            &words[first as usize..ends[index] as usize]
-        };
-        table.insert_unique(hash_of_key, index, |&index| hash_words(of(index)));
+        let hash_of = |&index: &u32| hash_words(entry(words, ends, index));
+        table.insert_unique(hash_of_key, index, hash_of);
         index
     }
 }
@@ -118,6 +110,13 @@ impl PackedEffects {
 const CLOCK_BITS: u32 = 15;
 /// The greatest clock that fits.
 pub(super) const MOST_CLOCKS: u32 = (1 << CLOCK_BITS) - 1;
+
+/// The words of an effect.
+fn entry<'w>(words: &'w [u32], ends: &[u32], index: u32) -> &'w [u32] {
+    let index = index as usize;
+    let first = index.checked_sub(1).map_or(0, |before| ends[before]);
+    &words[first as usize..ends[index] as usize]
+}
 
 /// Two clocks in the lower 30 bits of a word.
 fn packed(first: ClockId, second: ClockId) -> u32 {

@@ -93,13 +93,7 @@ pub(super) fn apply(
         };
         // An empty conjunction always holds.
         if !forbidden.iter().any(Vec::is_empty) {
-            let excluded = one.excluded().chain(forbidden.iter().map(Vec::as_slice));
-            rest.push(
-                one.parts,
-                [one.constraints],
-                excluded,
-                one.label.unsettled(),
-            );
+            rest.push_without(one, forbidden.iter().map(Vec::as_slice));
         }
     }
     *moves = rest;
