@@ -32,6 +32,9 @@ use super::moves::{Error, Part};
 use super::symbolic::{Possible, Symbolic, by_priority, guarded, without_all};
 use super::zone::{Comparison, Zone, is_exact};
 
+const MAY_LEAVE: &str =
+    "waits that may lead out of it, with a clock that stands still beside two that run,";
+
 /// The states with some words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct States {
@@ -191,9 +194,8 @@ impl ClosureCheck<'_> {
                 let futures = futures(&zone, &stopped, &barriers).into_iter();
                 let futures = &mut futures.map(|later| later.within(invariant.iter().copied()));
                 if !futures.all(|later| later.is_covered(&own)) {
-                    let what = "waits that may lead out of it, with a clock that stands still beside two that run,";
                     let leaves = is_exact(&stopped).then_some(Defect::DelayLeaves);
-                    return leaves.ok_or(Error::Unsupported(what)).map(Some);
+                    return leaves.ok_or(Error::Unsupported(MAY_LEAVE)).map(Some);
                 }
             }
             let possible = self.symbolic.possible(&combinations, words, &zone)?;
@@ -214,16 +216,21 @@ impl ClosureCheck<'_> {
                 return Ok(Some(Defect::Met));
             }
             self.coverage.moves += possible.len() as u64;
-            for (one, enabled) in possible.iter().zip(&enabled) {
-                for part in enabled {
-                    let entered = part.after(&one.effect.assignments);
-                    if !entered.is_covered(self.of(&one.effect.target)) {
-                        return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
-                    }
-                }
+            let mut moves = possible.iter().zip(&enabled);
+            if let Some((one, _)) = moves.find(|(one, enabled)| self.leaves(one, enabled)) {
+                return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
             }
         }
         Ok(None)
+    }
+
+    /// Whether a move leads out of the certificate from where it is possible.
+    fn leaves(&self, one: &Possible, enabled: &[Zone]) -> bool {
+        let states = self.of(&one.effect.target);
+        let mut entered = enabled
+            .iter()
+            .map(|part| part.after(&one.effect.assignments));
+        entered.any(|zone| !zone.is_covered(states))
     }
 
     /// Where moves are possible.
