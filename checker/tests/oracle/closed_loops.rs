@@ -14,7 +14,7 @@ use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyStat
 use checker::ir;
 use checker::network::Part;
 use checker::verify::regions::Bounding;
-use checker::verify::{self, Regions, Semantics, State};
+use checker::verify::{Regions, Semantics, State};
 use checker::zones::dbm::Constraint;
 use checker::zones::{Bound, Federation, Zone};
 use proptest::prop_assert_eq;
@@ -280,7 +280,7 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
             let is_allowed = if strategy.owner.owns(one.controllable) {
                 now.allows(&one.parts)
             } else {
-                now.picks(&parts)
+                now.picks(&one.parts)
             };
             if !is_allowed {
                 continue;

@@ -7,7 +7,6 @@ use checker::engine::format::strategy_json;
 use checker::engine::{NamedStrategy, Options};
 use checker::game::strategy::Strategy;
 use checker::game::{Player, Priorities};
-use checker::network::Part;
 use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 
