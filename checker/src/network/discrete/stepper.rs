@@ -265,7 +265,8 @@ impl<'a> Stepper<'a> {
                 Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
                     return Err(error.into());
                 }
-                // The moves are then made without the cache, which shows whether the failure counts.
+                // The moves are then made without the cache, which shows whether the failure
+                // counts.
                 Err(_) => return Ok(Found::Failure),
             }
         }

@@ -248,8 +248,8 @@ impl<'a> Symbolic<'a> {
         Ok(self.fire_into(one, words, &mut effect)?.then_some(effect))
     }
 
-    /// The same for a move from a state with these words, which are copied to `target` first; `None`
-    /// also if nothing of the zone satisfies the guard.
+    /// The same for a move from a state with these words, which it copies to `target`; `None` also
+    /// if nothing of the zone satisfies the guard.
     pub fn fire_within(
         &mut self,
         one: MoveRef<'_>,
