@@ -98,14 +98,12 @@ PARTS = {
     "discrete_nodes": Part("game", ("engine/query/budgets.rs",)),
     "dives": Part("game", ("game/exploration/waiting.rs",)),
     "spoilers": Part("game"),
-    "lazy_zero_time": Part(
-        "game", ("game/exploration/lazy_zero_time.rs", "game/exploration/reserve.rs")
-    ),
+    "lazy_zero_time": Part("game", ("game/exploration/lazy_zero_time.rs",)),
     "lazy_safety": Part(
         "game", ("game/exploration/lazy_safety.rs", "game/exploration/held_moves.rs")
     ),
     "losing_untimed": Part("game", ("game/backward/losing_untimed.rs",)),
-    "losing_timed": Part("game", ("game/backward/losing_timed.rs", "game/exploration/schedule.rs")),
+    "losing_timed": Part("game", ("game/backward/losing_timed.rs",)),
     "relevance": Part("game"),
     "delayed_zones": Part("game"),
     "full_backward": Part("game", ("game/backward/full_backward.rs",)),

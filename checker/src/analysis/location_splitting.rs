@@ -17,8 +17,10 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::exec::{Context, EmittedConstraint, Interpreter};
-use crate::ir::{ClockAtom, ClockRange, Edge, FunctionId, Guard, Network, Shape, Update, Variable};
+use crate::exec::{Context, Interpreter};
+use crate::ir::{
+    ClockAtom, Edge, FixedConstraint, FunctionId, Guard, Network, Shape, Update, Variable,
+};
 
 use super::function_reads::read_words;
 use crate::tuning::Tuning;
@@ -461,24 +463,13 @@ struct Valuation<'a> {
 struct FunctionRun<'a> {
     result: Result<i32, ()>,
     state: &'a [i32],
-    constraints: &'a [EmittedConstraint],
+    constraints: &'a [FixedConstraint],
 }
 
 /// Adds the comparisons that a guard makes where it emits these constraints.
-fn add_atoms(guard: &Guard, emitted: &[EmittedConstraint], atoms: &mut Vec<ClockAtom>) {
-    let fixed = guard
-        .fixed
-        .iter()
-        .map(|&fixed| EmittedConstraint::from(fixed));
-    for constraint in fixed.chain(emitted.iter().copied()) {
-        let single = |first| ClockRange { first, count: 1 };
-        let atom = ClockAtom {
-            left: single(constraint.left),
-            right: single(constraint.right),
-            low: constraint.bound,
-            high: constraint.bound,
-            strict: constraint.strict,
-        };
+fn add_atoms(guard: &Guard, emitted: &[FixedConstraint], atoms: &mut Vec<ClockAtom>) {
+    for &constraint in guard.fixed.iter().chain(emitted) {
+        let atom = ClockAtom::from(constraint);
         if !atoms.contains(&atom) {
             atoms.push(atom);
         }

@@ -11,31 +11,9 @@ pub struct Context<'a> {
     /// The words of the state; updates change them in place.
     pub state: &'a mut [i32],
     /// The clock constraints that the call emitted, appended in order.
-    pub constraints: &'a mut Vec<EmittedConstraint>,
+    pub constraints: &'a mut Vec<FixedConstraint>,
     /// The clock assignments that the call emitted, appended in order.
     pub assignments: &'a mut Vec<EmittedAssignment>,
-}
-
-/// `left - right < bound`, or `<=` if not strict.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(C)]
-#[expect(missing_docs, reason = "the formula says it")]
-pub struct EmittedConstraint {
-    pub left: ClockId,
-    pub right: ClockId,
-    pub bound: i32,
-    pub strict: bool,
-}
-
-impl From<FixedConstraint> for EmittedConstraint {
-    fn from(fixed: FixedConstraint) -> EmittedConstraint {
-        EmittedConstraint {
-            left: fixed.left,
-            right: fixed.right,
-            bound: fixed.bound,
-            strict: fixed.strict,
-        }
-    }
 }
 
 /// `target := value`, or `target := source + value` if the source is not the reference clock.

@@ -19,7 +19,7 @@ mod validate;
 #[cfg(feature = "jit")]
 mod jit;
 
-pub use executor::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
+pub use executor::{Context, EmittedAssignment, Executor, RunTimeError};
 pub use external_words::LibraryError;
 pub use interpreter::Interpreter;
 #[cfg(feature = "jit")]

@@ -177,7 +177,10 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
             }
         }
         self.graph.symbolic.check_differences()?;
-        Ok(Solution::Won(self.winner(extent)))
+        if !self.is_won() && extent == Extent::Verdict {
+            self.avoid_unexpanded();
+        }
+        Ok(Solution::Won(self.winner()))
     }
 
     fn begin(&mut self, extent: Extent) {
@@ -208,16 +211,13 @@ impl<'g, 's, 'a> Solver<'g, 's, 'a> {
         }
     }
 
-    /// The winner, once nothing is left to do. The strategy of the evader avoids what was not
-    /// explored.
-    fn winner(&mut self, extent: Extent) -> Player {
+    /// Who has won, as far as it is known.
+    pub(in crate::game) fn winner(&self) -> Player {
         if self.is_won() {
-            return self.seeker;
+            self.seeker
+        } else {
+            self.seeker.opponent()
         }
-        if extent == Extent::Verdict {
-            self.avoid_unexpanded();
-        }
-        self.seeker.opponent()
     }
 
     /// Whether the seeker wins from the initial valuation.

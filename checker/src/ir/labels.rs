@@ -94,10 +94,31 @@ pub struct ClockAtom {
 }
 
 impl ClockAtom {
+    /// `left - right <= bound`, for a bound from the least to the greatest value.
+    pub fn weak(left: ClockRange, right: ClockRange, low: i32, high: i32) -> ClockAtom {
+        ClockAtom {
+            left,
+            right,
+            low,
+            high,
+            strict: false,
+        }
+    }
+
     /// Whether the comparison concerns two clocks.
     pub fn is_difference(&self) -> bool {
         let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
         is_clock(self.left) && is_clock(self.right)
+    }
+}
+
+impl From<FixedConstraint> for ClockAtom {
+    fn from(one: FixedConstraint) -> ClockAtom {
+        let (left, right) = (ClockRange::one(one.left), ClockRange::one(one.right));
+        ClockAtom {
+            strict: one.strict,
+            ..ClockAtom::weak(left, right, one.bound, one.bound)
+        }
     }
 }
 
@@ -108,6 +129,16 @@ pub struct ClockRange {
     pub first: ClockId,
     /// How many, at least 1.
     pub count: u32,
+}
+
+impl ClockRange {
+    /// The reference clock.
+    pub const REFERENCE: ClockRange = ClockRange::one(ClockId(0));
+
+    /// One clock.
+    pub const fn one(first: ClockId) -> ClockRange {
+        ClockRange { first, count: 1 }
+    }
 }
 
 /// What happens to words and clocks. First `function` runs; then the clocks of `fixed` are set.

@@ -50,6 +50,11 @@ pub struct Network {
 }
 
 impl Network {
+    /// The edge of a part of a move.
+    pub fn edge(&self, part: Part) -> &Edge {
+        &self.processes[part.process as usize].edges[part.edge as usize]
+    }
+
     /// The functions that taking an edge may run: guards and updates, in file order.
     pub fn functions_of_edges(&self) -> impl Iterator<Item = FunctionId> {
         let edges = self.processes.iter().flat_map(|process| &process.edges);
@@ -155,6 +160,20 @@ pub struct Location {
     pub edges: Vec<EdgeId>,
     /// Where it is declared.
     pub span: Span,
+}
+
+/// The part of one process in a move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Part {
+    /// Index of the process.
+    pub process: u32,
+    /// Index of the edge in its process.
+    pub edge: u32,
+    /// Index of the branch of the edge.
+    pub branch: u32,
+    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
+    /// binding fastest.
+    pub select: u32,
 }
 
 /// An edge; with a branch point, the entry together with its legs, or with one of them.

@@ -1,7 +1,7 @@
 //! Compiled queries.
 
 use super::ids::{ClockId, FunctionId, LocationId, ProcessId};
-use super::labels::ClockRange;
+use super::labels::{ClockAtom, ClockRange};
 use super::statistical::Statistical;
 use crate::diagnostics::Span;
 
@@ -176,6 +176,25 @@ impl Predicate {
         Predicate::Not(Box::new(self.clone()))
     }
 
+    /// The parts that are not put together of others.
+    pub fn leaves(&self) -> Vec<&Predicate> {
+        match self {
+            Predicate::Not(inner) => inner.leaves(),
+            Predicate::And(parts) | Predicate::Or(parts) => {
+                parts.iter().flat_map(Predicate::leaves).collect()
+            }
+            leaf => vec![leaf],
+        }
+    }
+
+    /// The clock comparisons in it.
+    pub fn comparisons(&self) -> impl Iterator<Item = &ClockPredicate> {
+        self.leaves().into_iter().filter_map(|leaf| match leaf {
+            Predicate::Clock(comparison) => Some(comparison),
+            _ => None,
+        })
+    }
+
     /// Whether the words of a state alone decide it.
     pub fn is_of_words(&self) -> bool {
         match self {
@@ -203,6 +222,17 @@ pub struct ClockPredicate {
     pub range: (i32, i32),
 }
 
+impl ClockPredicate {
+    /// The comparison for static analysis.
+    pub fn atom(&self) -> ClockAtom {
+        let (left, right) = (self.left.range(), self.right.range());
+        ClockAtom {
+            strict: self.strict,
+            ..ClockAtom::weak(left, right, self.range.0, self.range.1)
+        }
+    }
+}
+
 /// A clock in a query: known, or chosen by the words.
 #[derive(Clone, Copy, Debug)]
 pub enum ClockChoice {
@@ -210,4 +240,14 @@ pub enum ClockChoice {
     Fixed(ClockId),
     /// One of consecutive clocks: the function returns the offset from the first.
     Indexed(ClockRange, FunctionId),
+}
+
+impl ClockChoice {
+    /// The clocks that it may be.
+    pub fn range(self) -> ClockRange {
+        match self {
+            ClockChoice::Fixed(clock) => ClockRange::one(clock),
+            ClockChoice::Indexed(range, _) => range,
+        }
+    }
 }

@@ -28,7 +28,7 @@ pub use reduction::partial_order::PartialOrder;
 pub use reduction::scalar_swaps::Obstacle;
 pub(crate) use reduction::stubborn_sets::{Agenda, StubbornSets};
 pub use reduction::symmetry::{Permutation, Symmetry};
-pub use symbolic::clock_effect::ClockEffect;
+pub use symbolic::clock_effect::{ClockEffect, conjunction, conjunctions};
 pub use symbolic::predicate::Extent;
 pub use symbolic::restriction::{Allowed, Restriction};
 pub use symbolic::successor_cache::{KeptZone, KnownZone, MemoLimits};

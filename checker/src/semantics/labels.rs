@@ -69,7 +69,11 @@ impl Checker<'_> {
             ..Guard::default()
         };
         if !self.can_lower() {
-            guard.atoms = parts.iter().flat_map(fixed_constraints).map(atom).collect();
+            guard.atoms = parts
+                .iter()
+                .flat_map(fixed_constraints)
+                .map(ClockAtom::from)
+                .collect();
             return guard;
         }
         let mut rest = Vec::new();
@@ -78,7 +82,9 @@ impl Checker<'_> {
             if fixed.is_empty() {
                 rest.push(part);
             }
-            guard.atoms.extend(fixed.iter().copied().map(atom));
+            guard
+                .atoms
+                .extend(fixed.iter().copied().map(ClockAtom::from));
             guard.fixed.extend(fixed);
         }
         if rest.is_empty() {
@@ -449,20 +455,6 @@ fn fixed_constraints(expr: &Expr) -> Vec<FixedConstraint> {
         .collect()
 }
 
-fn atom(constraint: FixedConstraint) -> ClockAtom {
-    ClockAtom {
-        left: single(constraint.left),
-        right: single(constraint.right),
-        low: constraint.bound,
-        high: constraint.bound,
-        strict: constraint.strict,
-    }
-}
-
-fn single(first: ClockId) -> ClockRange {
-    ClockRange { first, count: 1 }
-}
-
 /// The clock and the value of `clock = constant`, if both are known and legal.
 fn fixed_reset(expr: &Expr) -> Option<(ClockId, i32)> {
     let Kind::AssignClock {
@@ -488,7 +480,7 @@ fn sets_clocks(expr: &Expr) -> bool {
 
 fn fixed_assignment(clock: ClockId, value: i32) -> ClockAssignment {
     ClockAssignment {
-        target: single(clock),
+        target: ClockRange::one(clock),
         value: AssignedValue::Integer(value, value),
     }
 }

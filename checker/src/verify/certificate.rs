@@ -25,13 +25,15 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{Network, Predicate, Urgency};
+use crate::ir::{ClockId, FixedConstraint, Network, Predicate, Urgency};
 
 use super::code::Combination;
 use super::moves::{Error, Part};
-use super::strategy::Constraint;
 use super::symbolic::{Possible, Symbolic, by_priority, guarded, without_all};
 use super::zone::{Comparison, Zone, is_exact};
+
+const MAY_LEAVE: &str =
+    "waits that may lead out of it, with a clock that stands still beside two that run,";
 
 /// The states with some words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +41,7 @@ pub struct States {
     /// The words.
     pub words: Vec<i32>,
     /// The zones, each as constraints that all hold; values from 0 are understood.
-    pub zones: Vec<Vec<Constraint>>,
+    pub zones: Vec<Vec<FixedConstraint>>,
 }
 
 /// What was checked.
@@ -116,6 +118,7 @@ pub fn verify(network: &Network, states: &[States], avoided: &Predicate) -> Resu
 
 /// The zones of an entry; `None` if it does not fit the network.
 fn zones(network: &Network, entry: &States, clocks: usize) -> Option<Vec<Zone>> {
+    let is_clock = |clock: ClockId| (clock.0 as usize) < clocks;
     let mut locations = network.processes.iter().zip(&entry.words);
     let fits = entry.words.len() == network.layout.words as usize
         && locations.all(|(process, &location)| {
@@ -125,7 +128,7 @@ fn zones(network: &Network, entry: &States, clocks: usize) -> Option<Vec<Zone>> 
             .zones
             .iter()
             .flatten()
-            .all(|one| one.left < clocks && one.right < clocks && one.left != one.right);
+            .all(|one| is_clock(one.left) && is_clock(one.right) && one.left != one.right);
     fits.then(|| {
         let zones = entry.zones.iter().map(|constraints| {
             Zone::universe(clocks).within(constraints.iter().map(Comparison::from))
@@ -181,22 +184,18 @@ impl ClosureCheck<'_> {
                 zone.future(&stopped).within(invariant.iter().copied())
             };
             let combinations = self.symbolic.combinations(&candidates, words, &around)?;
-            let urgent = combinations.iter();
-            let urgent = urgent.filter(|one| self.symbolic.is_urgent(one));
+            let urgent = combinations
+                .iter()
+                .filter(|one| self.symbolic.is_urgent(one));
             let barriers: Vec<Zone> = urgent
                 .flat_map(|one| guarded(&one.guard, &one.excluded, &around))
                 .collect();
             if !is_urgent {
-                for later in futures(&zone, &stopped, &barriers) {
-                    let later = later.within(invariant.iter().copied());
-                    if !later.is_covered(&own) {
-                        let what = "waits that may lead out of it, with a clock that stands still beside two that run,";
-                        return if is_exact(&stopped) {
-                            Ok(Some(Defect::DelayLeaves))
-                        } else {
-                            Err(Error::Unsupported(what))
-                        };
-                    }
+                let futures = futures(&zone, &stopped, &barriers).into_iter();
+                let futures = &mut futures.map(|later| later.within(invariant.iter().copied()));
+                if !futures.all(|later| later.is_covered(&own)) {
+                    let leaves = is_exact(&stopped).then_some(Defect::DelayLeaves);
+                    return leaves.ok_or(Error::Unsupported(MAY_LEAVE)).map(Some);
                 }
             }
             let possible = self.symbolic.possible(&combinations, words, &zone)?;
@@ -217,16 +216,21 @@ impl ClosureCheck<'_> {
                 return Ok(Some(Defect::Met));
             }
             self.coverage.moves += possible.len() as u64;
-            for (one, enabled) in possible.iter().zip(&enabled) {
-                for part in enabled {
-                    let entered = part.after(&one.effect.assignments);
-                    if !entered.is_covered(self.of(&one.effect.target)) {
-                        return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
-                    }
-                }
+            let mut moves = possible.iter().zip(&enabled);
+            if let Some((one, _)) = moves.find(|(one, enabled)| self.leaves(one, enabled)) {
+                return Ok(Some(Defect::MoveLeaves(one.parts.clone())));
             }
         }
         Ok(None)
+    }
+
+    /// Whether a move leads out of the certificate from where it is possible.
+    fn leaves(&self, one: &Possible, enabled: &[Zone]) -> bool {
+        let states = self.of(&one.effect.target);
+        let mut entered = enabled
+            .iter()
+            .map(|part| part.after(&one.effect.assignments));
+        entered.any(|zone| !zone.is_covered(states))
     }
 
     /// Where moves are possible.

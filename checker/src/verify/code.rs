@@ -15,12 +15,14 @@
 use std::cell::RefCell;
 
 use crate::cancellation;
-use crate::exec::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
+use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
+use crate::ir::{
+    ClockChoice, ClockId, ClockPredicate, Edge, FixedConstraint, FunctionId, Guard, Network,
+    Update, Urgency,
 };
-use crate::ir::{ClockId, Edge, FixedConstraint, FunctionId, Guard, Network, Update, Urgency};
 
 use super::moves::{Error, Part};
+use super::zone::Comparison;
 
 /// The work of looking at the edges of a process: see [`cancellation::work`].
 const UNITS_FOR_PROCESS: usize = 1 << 10;
@@ -30,7 +32,7 @@ pub(super) struct Code<'a> {
     network: &'a Network,
     interpreter: Interpreter,
     /// What the running call emits; kept to save allocations.
-    emitted: RefCell<(Vec<EmittedConstraint>, Vec<EmittedAssignment>)>,
+    emitted: RefCell<(Vec<FixedConstraint>, Vec<EmittedAssignment>)>,
 }
 
 /// An edge whose guard holds, by the words alone.
@@ -41,13 +43,6 @@ pub(super) struct Candidate {
     pub(super) sync: Option<(u32, bool)>,
     /// What the guard asks of the clocks.
     pub(super) guard: Vec<FixedConstraint>,
-}
-
-/// An edge that sends.
-struct Sender<'c> {
-    process: usize,
-    candidate: &'c Candidate,
-    channel: u32,
 }
 
 /// A combination of edges that are taken together.
@@ -98,7 +93,7 @@ impl<'a> Code<'a> {
 
     /// The edge of a part.
     pub(super) fn edge(&self, part: Part) -> &'a Edge {
-        &self.network.processes[part.process as usize].edges[part.edge as usize]
+        self.network.edge(part)
     }
 
     /// Whether time may pass in the location of a process.
@@ -156,13 +151,7 @@ impl<'a> Code<'a> {
             if self.call(function, values, &mut words.to_vec())? == 0 {
                 return Ok(None);
             }
-            let emitted = &self.emitted.borrow().0;
-            constraints.extend(emitted.iter().map(|one| FixedConstraint {
-                left: one.left,
-                right: one.right,
-                bound: one.bound,
-                strict: one.strict,
-            }));
+            constraints.extend_from_slice(&self.emitted.borrow().0);
         }
         Ok(Some(constraints))
     }
@@ -180,7 +169,8 @@ impl<'a> Code<'a> {
         let definition = &self.network.processes[process];
         for &edge in &definition.locations[words[process] as usize].edges {
             let definition = &definition.edges[edge.0 as usize];
-            for (select, values) in select_combinations(definition).iter().enumerate() {
+            for select in 0..select_count(definition) {
+                let values = &select_values(definition, select);
                 let Some(guard) = self.condition(&definition.guard, values, words)? else {
                     continue;
                 };
@@ -201,7 +191,7 @@ impl<'a> Code<'a> {
                     process: process as u32,
                     edge: edge.0,
                     branch: 0,
-                    select: select as u32,
+                    select,
                 };
                 found.push(Candidate { part, sync, guard });
             }
@@ -218,20 +208,13 @@ impl<'a> Code<'a> {
         is_possible: &IsPossible<'_>,
     ) -> Result<Vec<Combination>, Error> {
         let mut found = Vec::new();
-        for (process, edges) in candidates.iter().enumerate() {
-            for one in edges {
-                match one.sync {
-                    None => self.push(&[one], &[], &mut found)?,
-                    Some((channel, true)) => {
-                        let sender = Sender {
-                            process,
-                            candidate: one,
-                            channel,
-                        };
-                        self.synchronise(&sender, candidates, is_possible, &mut found)?;
-                    }
-                    Some((_, false)) => {}
+        for one in candidates.iter().flatten() {
+            match one.sync {
+                None => self.push(&[one], &[], &mut found)?,
+                Some((channel, true)) => {
+                    self.synchronise(one, channel, candidates, is_possible, &mut found)?;
                 }
+                Some((_, false)) => {}
             }
         }
         let is_committed = |process: usize| self.urgency(process, words) == Urgency::Committed;
@@ -246,7 +229,8 @@ impl<'a> Code<'a> {
 
     fn synchronise(
         &self,
-        sender: &Sender<'_>,
+        sender: &Candidate,
+        channel: u32,
         candidates: &[Vec<Candidate>],
         is_possible: &IsPossible<'_>,
         found: &mut Vec<Combination>,
@@ -254,17 +238,18 @@ impl<'a> Code<'a> {
         let receiving = |process: usize| -> Vec<&Candidate> {
             let edges = candidates[process].iter();
             edges
-                .filter(|one| one.sync == Some((sender.channel, false)))
+                .filter(|one| one.sync == Some((channel, false)))
                 .collect()
         };
-        let others = (0..candidates.len()).filter(|&process| process != sender.process);
-        if !self.network.channels[sender.channel as usize].broadcast {
+        let own = sender.part.process as usize;
+        let others = (0..candidates.len()).filter(|&process| process != own);
+        if !self.network.channels[channel as usize].broadcast {
             for receive in others.flat_map(receiving) {
-                self.push(&[sender.candidate, receive], &[], found)?;
+                self.push(&[sender, receive], &[], found)?;
             }
             return Ok(());
         }
-        let mut open = vec![(vec![sender.candidate], Vec::new())];
+        let mut open = vec![(vec![sender], Vec::new())];
         for choices in others.map(receiving).filter(|choices| !choices.is_empty()) {
             let may_abstain = choices.iter().all(|choice| !choice.guard.is_empty());
             let mut next = Vec::new();
@@ -382,6 +367,39 @@ impl<'a> Code<'a> {
         (of_channel, processes.max().unwrap_or(0))
     }
 
+    /// Whether a move is one of the controller.
+    pub(super) fn is_controllable(&self, parts: &[Part]) -> bool {
+        parts.iter().all(|&part| self.edge(part).controllable)
+    }
+
+    /// The clock that the words choose.
+    pub(super) fn chosen_clock(
+        &self,
+        choice: ClockChoice,
+        words: &[i32],
+    ) -> Result<ClockId, Error> {
+        Ok(match choice {
+            ClockChoice::Fixed(clock) => clock,
+            ClockChoice::Indexed(range, offset) => {
+                ClockId(range.first.0 + self.value(offset, words)? as u32)
+            }
+        })
+    }
+
+    /// The comparison that a predicate makes where these are the words.
+    pub(super) fn comparison(
+        &self,
+        predicate: &ClockPredicate,
+        words: &[i32],
+    ) -> Result<Comparison, Error> {
+        Ok(Comparison::new(
+            self.chosen_clock(predicate.left, words)?.0 as usize,
+            self.chosen_clock(predicate.right, words)?.0 as usize,
+            self.value(predicate.bound, words)?.into(),
+            predicate.strict,
+        ))
+    }
+
     /// The value of a function without parameters.
     pub(super) fn value(&self, function: FunctionId, words: &[i32]) -> Result<i32, Error> {
         self.call(function, &[], &mut words.to_vec())
@@ -403,6 +421,13 @@ impl<'a> Code<'a> {
     }
 }
 
+/// How many combinations of select values an edge has.
+fn select_count(edge: &Edge) -> u32 {
+    let counts = edge.select.iter();
+    let counts = counts.map(|select| i64::from(select.high) - i64::from(select.low) + 1);
+    counts.product::<i64>() as u32
+}
+
 /// The combination of the select values of an edge with this number.
 fn select_values(edge: &Edge, number: u32) -> Vec<i32> {
     let mut rest = i64::from(number);
@@ -414,22 +439,4 @@ fn select_values(edge: &Edge, number: u32) -> Vec<i32> {
     }
     values.reverse();
     values
-}
-
-/// All combinations of the select values of an edge, the last binding fastest.
-fn select_combinations(edge: &Edge) -> Vec<Vec<i32>> {
-    let mut combinations = vec![Vec::new()];
-    for select in &edge.select {
-        combinations = combinations
-            .iter()
-            .flat_map(|values: &Vec<i32>| {
-                (select.low..=select.high).map(|value| {
-                    let mut values = values.clone();
-                    values.push(value);
-                    values
-                })
-            })
-            .collect();
-    }
-    combinations
 }

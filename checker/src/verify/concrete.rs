@@ -15,16 +15,15 @@
 //!
 //! Cost: written to be read; every state allocates.
 
-use crate::ir::{
-    ClockChoice, ClockId, Edge, FixedConstraint, FunctionId, Network, Predicate, Urgency,
-};
+use crate::ir::{Edge, FixedConstraint, FunctionId, Network, Predicate, Urgency};
 
 use super::code::{Code, Combination};
 use super::moves::{Error, Move, Part, State};
+use super::zone::Comparison;
 
 /// The semantics of a network.
 pub struct Semantics<'a> {
-    code: Code<'a>,
+    pub(super) code: Code<'a>,
     ticks_per_unit: i64,
 }
 
@@ -138,7 +137,7 @@ impl<'a> Semantics<'a> {
         let channels = &self.network().channels;
         let is_urgent = |channel: u32| channels[channel as usize].urgent;
         Move {
-            controllable: one.parts.iter().all(|&part| self.edge(part).controllable),
+            controllable: self.code.is_controllable(&one.parts),
             channel: one.channel,
             is_urgent: one.channel.is_some_and(is_urgent),
             level: self.code.level(&one.parts, one.channel),
@@ -180,22 +179,8 @@ impl<'a> Semantics<'a> {
     }
 
     fn all_hold(&self, constraints: &[FixedConstraint], clocks: &[i64]) -> bool {
-        constraints
-            .iter()
-            .all(|one| self.constraint_holds(one.left, one.right, one.bound, one.strict, clocks))
-    }
-
-    fn constraint_holds(
-        &self,
-        left: ClockId,
-        right: ClockId,
-        bound: i32,
-        strict: bool,
-        clocks: &[i64],
-    ) -> bool {
-        let difference = clocks[left.0 as usize] - clocks[right.0 as usize];
-        let bound = i64::from(bound) * self.ticks_per_unit;
-        difference < bound || (!strict && difference == bound)
+        let mut comparisons = constraints.iter().map(Comparison::from);
+        comparisons.all(|one| one.holds(clocks, self.ticks_per_unit))
     }
 
     /// Whether a predicate of a query holds. `deadlock` is not supported.
@@ -220,10 +205,8 @@ impl<'a> Semantics<'a> {
                 Ok(state.words[process.0 as usize] == location.0 as i32)
             }
             Predicate::Clock(clock) => {
-                let left = self.chosen_clock(clock.left, state)?;
-                let right = self.chosen_clock(clock.right, state)?;
-                let bound = self.value(clock.bound, state)?;
-                Ok(self.constraint_holds(left, right, bound, clock.strict, &state.clocks))
+                let one = self.code.comparison(clock, &state.words)?;
+                Ok(one.holds(&state.clocks, self.ticks_per_unit))
             }
             Predicate::Deadlock => deadlock(),
             Predicate::Not(inner) => Ok(!holds(inner)?),
@@ -242,20 +225,6 @@ impl<'a> Semantics<'a> {
                     }
                 }
                 Ok(false)
-            }
-        }
-    }
-
-    /// The clock that a query means.
-    pub(super) fn chosen_clock(
-        &self,
-        choice: ClockChoice,
-        state: &State,
-    ) -> Result<ClockId, Error> {
-        match choice {
-            ClockChoice::Fixed(clock) => Ok(clock),
-            ClockChoice::Indexed(range, offset) => {
-                Ok(ClockId(range.first.0 + self.value(offset, state)? as u32))
             }
         }
     }

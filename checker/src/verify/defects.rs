@@ -313,6 +313,7 @@ impl Play<'_, '_> {
         if decisions.is_empty() {
             return Ok(Err(Defect::NoDecision));
         }
+        let step = |(one, target): &(&Move, State)| (Step::Move((*one).clone()), target.clone());
         let mut successors: Vec<(Step, State)> = Vec::new();
         let mut acts_first = false;
         for action in decisions.iter().filter_map(|one| one.action.as_ref()) {
@@ -321,17 +322,13 @@ impl Play<'_, '_> {
                 return Ok(Err(Defect::ImpossibleAction));
             }
             acts_first = self.rules.claim.owner == Owner::Environment;
-            let legs = meant.into_iter();
-            successors
-                .extend(legs.map(|(one, target)| (Step::Move((*one).clone()), target.clone())));
+            successors.extend(meant.into_iter().map(step));
         }
         if !acts_first {
             let Some(others) = self.rules.others(state, &possible) else {
                 return Ok(Err(Defect::ImpossibleAction));
             };
-            let others = others.into_iter();
-            let others = others.map(|(one, target)| (Step::Move((*one).clone()), target.clone()));
-            successors.extend(others);
+            successors.extend(others.into_iter().map(step));
         }
         if decisions.iter().any(|one| one.action.is_none()) {
             if let Some(later) = self.later(state, &moves)? {

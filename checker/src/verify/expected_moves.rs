@@ -4,10 +4,10 @@
 use crate::ir::Network;
 
 use super::moves::{Part, is_same_entry};
-use super::place::{Conjunction, Kind, Move, Piece, Place, parts_in, without_conjunctions};
+use super::place::{Conjunction, Kind, Move, Piece, Place, parts_in};
 use super::rules::{Decision, Owner, Rules};
 use super::stages;
-use super::symbolic::within_all;
+use super::symbolic::{within_all, without_conjunctions};
 use super::zone::{Comparison, Zone};
 
 /// The moves that are to be expected in a part of the piece with this index and kind, each with
@@ -21,7 +21,7 @@ pub(super) fn expected_moves(
 ) -> (Vec<(usize, Zone)>, Vec<Zone>) {
     let network = rules.semantics.network();
     let owner = rules.claim.owner;
-    let is_own = |one: &Move| one.controllable == (owner == Owner::Controller);
+    let is_own = |one: &Move| rules.claim.owns(one.controllable);
     let all = 0..known.moves.len();
     let own: Vec<usize> = match kind {
         Kind::Over | Kind::Turns(_) => return (Vec::new(), Vec::new()),
@@ -30,11 +30,10 @@ pub(super) fn expected_moves(
             let decisions = known.decisions.map(|all| &all.decisions[decision]);
             let action = decisions.and_then(|one| one.action.as_ref());
             let action: &[Part] = action.map_or(&[], Vec::as_slice);
-            let is_meant = |one: &Move| match owner {
-                Owner::Controller => is_same_entry(network, action, &one.parts),
-                Owner::Environment => *action == *one.parts,
+            let own = |&index: &usize| {
+                let one = &known.moves[index];
+                is_own(one) && rules.is_meant(action, &one.parts)
             };
-            let own = |&index: &usize| is_own(&known.moves[index]) && is_meant(&known.moves[index]);
             all.clone().filter(own).collect()
         }
         Kind::Proposes => stages::proposed(rules, known),

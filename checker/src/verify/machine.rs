@@ -119,9 +119,8 @@ pub(super) fn proposes(
     channel: Option<u32>,
 ) -> bool {
     let part = parts[0];
-    let edge = &network.processes[part.process as usize].edges[part.edge as usize];
     // Legs with channels are proposed by their entry.
-    let is_edge = match &edge.leg {
+    let is_edge = match &network.edge(part).leg {
         Some(leg) if !leg.follows_sync => true,
         _ => channel.is_none(),
     };

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::ir::{AssignedValue, ClockAtom, ClockChoice, ClockRange, Network, Predicate};
+use crate::ir::{AssignedValue, ClockAtom, ClockPredicate, Network, Predicate};
 
 use super::moves::{Error, State};
 use super::regions;
@@ -71,14 +71,9 @@ impl Moments {
     /// Those of a network and of the comparisons of predicates; an error if a comparison has too
     /// many possible bounds.
     pub(super) fn new(network: &Network, predicates: &[&Predicate]) -> Result<Moments, Error> {
-        let mut atoms = Vec::new();
-        for predicate in predicates {
-            collect(predicate, &mut atoms);
-        }
-        let has_differences = network.features.diagonals
-            || atoms
-                .iter()
-                .any(|atom| atom.left.first.0 != 0 && atom.right.first.0 != 0);
+        let mut atoms = atoms_of(predicates);
+        let has_differences =
+            network.features.diagonals || atoms.iter().any(ClockAtom::is_difference);
         atoms.extend(regions::atoms(network).cloned());
         let mut constants = BTreeSet::new();
         for atom in atoms {
@@ -107,10 +102,7 @@ impl Moments {
         if constants.len() > MOST_MOMENTS {
             return Err(Error::Unsupported("clock comparisons with too many values"));
         }
-        Ok(Moments {
-            constants,
-            compares_stopped: has_differences && network.features.stopwatches,
-        })
+        Ok(Moments::of_constants(network, constants, has_differences))
     }
 
     /// The stretches of a wait from a state, however long. Clock values must be even numbers of
@@ -184,54 +176,16 @@ impl Moments {
     }
 }
 
-/// The clock comparisons of a predicate.
-fn collect(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
-    let range = |choice: ClockChoice| match choice {
-        ClockChoice::Fixed(first) => ClockRange { first, count: 1 },
-        ClockChoice::Indexed(range, _) => range,
-    };
-    match predicate {
-        Predicate::Clock(clock) => atoms.push(ClockAtom {
-            left: range(clock.left),
-            right: range(clock.right),
-            low: clock.range.0,
-            high: clock.range.1,
-            strict: clock.strict,
-        }),
-        Predicate::Not(inner) => collect(inner, atoms),
-        Predicate::And(parts) | Predicate::Or(parts) => {
-            for part in parts {
-                collect(part, atoms);
-            }
-        }
-        Predicate::Data(_)
-        | Predicate::Constant(_)
-        | Predicate::Location(..)
-        | Predicate::Deadlock => {}
-    }
-}
-
 /// The greatest constant, in absolute value, that predicates compare clocks with, and whether they
 /// compare two clocks.
 pub(super) fn constants(predicates: &[&Predicate]) -> (i64, bool) {
-    let mut atoms = Vec::new();
-    for predicate in predicates {
-        collect(predicate, &mut atoms);
-    }
+    let atoms = atoms_of(predicates);
     let greatest = atoms.iter().map(regions::greatest_constant).max();
-    let has_differences = atoms
-        .iter()
-        .any(|atom| atom.left.first.0 != 0 && atom.right.first.0 != 0);
+    let has_differences = atoms.iter().any(ClockAtom::is_difference);
     (greatest.unwrap_or(0), has_differences)
 }
 
-/// Whether a predicate compares clocks or mentions `deadlock`: whether it may change while time
-/// passes.
-pub(super) fn depends_on_time(predicate: &Predicate) -> bool {
-    match predicate {
-        Predicate::Clock(_) | Predicate::Deadlock => true,
-        Predicate::Not(inner) => depends_on_time(inner),
-        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().any(depends_on_time),
-        Predicate::Data(_) | Predicate::Constant(_) | Predicate::Location(..) => false,
-    }
+fn atoms_of(predicates: &[&Predicate]) -> Vec<ClockAtom> {
+    let comparisons = predicates.iter().flat_map(|one| one.comparisons());
+    comparisons.map(ClockPredicate::atom).collect()
 }

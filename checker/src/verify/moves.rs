@@ -3,6 +3,8 @@
 use crate::exec::RunTimeError;
 use crate::ir::Network;
 
+pub use crate::ir::Part;
+
 /// Why a state could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
@@ -29,19 +31,6 @@ pub struct State {
     pub clocks: Vec<i64>,
 }
 
-/// One process's share in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values, the last binding fastest.
-    pub select: u32,
-}
-
 /// A move: the parts of its participants, the sender (or the only process) first.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Move {
@@ -63,8 +52,7 @@ pub struct Move {
 pub(super) fn entry(network: &Network, parts: &[Part]) -> Vec<(u32, u32, u32)> {
     let mut entry = Vec::with_capacity(parts.len());
     for part in parts {
-        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
-        let Some(leg) = &edge.leg else {
+        let Some(leg) = &network.edge(*part).leg else {
             entry.push((part.process, part.edge, part.select));
             continue;
         };

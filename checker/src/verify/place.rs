@@ -12,7 +12,9 @@ use crate::ir::{Network, Predicate, Urgency};
 
 use super::moves::{Error, Part, is_same_entry};
 use super::rules::{Aim, Decision, Decisions, Forcing, Owner, Rules};
-use super::symbolic::{Possible, Symbolic, by_priority, guarded, within_all, without_all};
+use super::symbolic::{
+    Possible, Symbolic, by_priority, guarded, within_all, without_all, without_conjunctions,
+};
 use super::zone::{Comparison, Zone};
 
 /// Comparisons that all hold, within the invariants.
@@ -63,6 +65,19 @@ pub(super) struct Piece {
     pub(super) rest: Rest,
     /// The same for what comes after a goal that is to recur.
     pub(super) outer: Rest,
+}
+
+impl Piece {
+    /// One of the first rank.
+    pub(super) fn new(kind: Kind, zones: Vec<Conjunction>, rest: &Rest, outer: &Rest) -> Piece {
+        Piece {
+            rank: 0,
+            zones,
+            kind,
+            rest: rest.clone(),
+            outer: outer.clone(),
+        }
+    }
 }
 
 /// Where a move leads to.
@@ -158,10 +173,7 @@ impl<'a> Place<'a> {
         };
         let piece = |rank: u32, zones: Vec<Conjunction>, kind: Kind| Piece {
             rank,
-            zones,
-            kind,
-            rest: rest.clone(),
-            outer: outer.clone(),
+            ..Piece::new(kind, zones, rest, outer)
         };
         let zones = |decision: &Decision| -> Vec<Conjunction> {
             let zones = decision.zones.iter();
@@ -234,13 +246,8 @@ impl<'a> Place<'a> {
         } else {
             Rest::Everything
         };
-        self.pieces.push(Piece {
-            rank: 0,
-            zones,
-            kind: Kind::Over,
-            outer: rest.clone(),
-            rest,
-        });
+        self.pieces
+            .push(Piece::new(Kind::Over, zones, &rest, &rest));
     }
 
     /// Adds the moves, and where time stops.
@@ -263,7 +270,7 @@ impl<'a> Place<'a> {
             let is_permissive = rules.claim.under.is_some_and(|(_, permissive)| permissive);
             self.oblige(under, is_permissive, hull);
             for one in &mut moves {
-                if is_controllable(symbolic, &one.parts) {
+                if symbolic.code.is_controllable(&one.parts) {
                     one.enabled =
                         allowed(rules.semantics.network(), one, under, is_permissive, hull);
                 }
@@ -273,7 +280,7 @@ impl<'a> Place<'a> {
             let zones = one.enabled.iter();
             let simple = simple.filter(|_| !has_priorities && under.is_none());
             self.moves.push(Move {
-                controllable: is_controllable(symbolic, &one.parts),
+                controllable: symbolic.code.is_controllable(&one.parts),
                 enabled: match simple {
                     Some(conjunction) => vec![conjunction],
                     None => zones.map(|zone| conjunction(zone, hull)).collect(),
@@ -460,11 +467,6 @@ impl<'a> Place<'a> {
     }
 }
 
-fn is_controllable(symbolic: &Symbolic<'_>, parts: &[Part]) -> bool {
-    let mut parts = parts.iter();
-    parts.all(|&part| symbolic.code.edge(part).controllable)
-}
-
 /// The decisions with the zones in which they count.
 fn counting<'d>(
     decisions: &'d Decisions,
@@ -527,19 +529,4 @@ pub(super) fn just_after(conjunction: &[Comparison]) -> Conjunction {
 pub(super) fn parts_in(zone: &Zone, conjunctions: &[Conjunction]) -> Vec<Zone> {
     let parts = conjunctions.iter().filter(|one| !zone.misses(one));
     parts.map(|one| zone.within(one.iter().copied())).collect()
-}
-
-/// What is left of zones where none of the conjunctions holds.
-pub(super) fn without_conjunctions(
-    mut zones: Vec<Zone>,
-    conjunctions: &[Conjunction],
-) -> Vec<Zone> {
-    for one in conjunctions {
-        if zones.is_empty() {
-            break;
-        }
-        let rest = zones.iter().flat_map(|zone| zone.without_conjunction(one));
-        zones = rest.collect();
-    }
-    zones
 }

@@ -6,9 +6,7 @@
 //! instant the environment is first. Where the strategy acts without a first moment, one is chosen
 //! for it. Moves, forced moves and ends of play are those of [`super::strategy`].
 
-use std::cmp::Ordering;
-
-use crate::ir::{Network, Predicate};
+use crate::ir::{ClockAtom, Network, Predicate};
 
 use super::choices::doubled;
 use super::concrete::Semantics;
@@ -106,9 +104,8 @@ fn constants_of(network: &Network, decisions: &Decisions) -> Moments {
         let bound = i64::from(one.bound);
         [bound, -bound]
     });
-    let has_differences = constraints
-        .iter()
-        .any(|one| one.left != 0 && one.right != 0);
+    let mut atoms = constraints.iter().map(|one| ClockAtom::from(**one));
+    let has_differences = atoms.any(|atom| atom.is_difference());
     Moments::of_constants(network, constants.collect(), has_differences)
 }
 
@@ -137,18 +134,10 @@ impl Window {
 
     /// Whether it contains a fraction of a half tick.
     pub fn contains(&self, numerator: i128, denominator: i128) -> bool {
-        let compared = |end: i64| numerator.cmp(&(i128::from(end) * denominator));
-        let is_after = match compared(self.first) {
-            Ordering::Less => false,
-            Ordering::Equal => !self.is_first_open,
-            Ordering::Greater => true,
-        };
-        let is_before = match self.last.map(compared) {
-            None | Some(Ordering::Less) => true,
-            Some(Ordering::Equal) => !self.is_last_open,
-            Some(Ordering::Greater) => false,
-        };
-        is_after && is_before
+        let end = |end: i64| i128::from(end) * denominator;
+        let is_after = |first| numerator > first || numerator == first && !self.is_first_open;
+        let is_before = |last| numerator < last || numerator == last && !self.is_last_open;
+        is_after(end(self.first)) && self.last.map(end).is_none_or(is_before)
     }
 }
 

@@ -17,7 +17,7 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{ClockChoice, Measure, Network, Predicate};
+use crate::ir::{Measure, Network, Predicate};
 
 use super::concrete::Semantics;
 use super::moments::{self, Moments};
@@ -157,12 +157,10 @@ pub fn replay(network: &Network, run: &Run, claim: &Claim<'_>) -> Result<Outcome
         Claim::Stays(open, keep) => vec![open, keep],
         Claim::Takes(predicate, ..) => vec![predicate],
     };
+    let violated = |defect, state| Outcome::Violated(Violation { defect, state });
     // An even number of ticks: there is one between each two moments.
     let Some(ticks_per_unit) = run.ticks_per_unit.checked_mul(2).filter(|&ticks| ticks > 0) else {
-        return Ok(Outcome::Violated(Violation {
-            defect: Defect::Malformed,
-            state: 0,
-        }));
+        return Ok(violated(Defect::Malformed, 0));
     };
     let mut replay = Replay {
         semantics: Semantics::new(network, ticks_per_unit),
@@ -178,10 +176,7 @@ pub fn replay(network: &Network, run: &Run, claim: &Claim<'_>) -> Result<Outcome
     let result = replay.run(run, claim, &predicates)?;
     let at_last = replay.states.len().saturating_sub(1);
     if let Err(defect) = result {
-        return Ok(Outcome::Violated(Violation {
-            defect,
-            state: at_last,
-        }));
+        return Ok(violated(defect, at_last));
     }
     let mut states = replay.states;
     for clock in states.iter_mut().flat_map(|state| &mut state.clocks) {
@@ -327,7 +322,7 @@ impl Replay<'_> {
         kept_from: Option<i64>,
     ) -> Result<Vec<i64>, Error> {
         let features = &self.semantics.network().features;
-        let is_kept = kept_from.is_some() && self.keep.is_some_and(moments::depends_on_time);
+        let is_kept = kept_from.is_some() && self.keep.is_some_and(|keep| !keep.is_of_words());
         let mut moments = match limit {
             Some(0) => vec![0],
             Some(limit) if !features.clock_guarded_urgent && !is_kept => vec![0, limit],
@@ -427,10 +422,7 @@ impl Replay<'_> {
         let value = match *measure {
             Measure::Integer(function) => unit * i64::from(self.semantics.value(function, end)?),
             Measure::Clock(choice) => {
-                let clock = match choice {
-                    ClockChoice::Fixed(clock) => clock,
-                    ClockChoice::Indexed(..) => self.semantics.chosen_clock(choice, end)?,
-                };
+                let clock = self.semantics.code.chosen_clock(choice, &end.words)?;
                 end.clocks[clock.0 as usize]
             }
         };

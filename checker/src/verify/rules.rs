@@ -6,21 +6,12 @@
 
 use std::collections::HashMap;
 
-use crate::ir::{Network, Predicate};
+use crate::ir::{FixedConstraint, Network, Predicate};
 
 use super::concrete::Semantics;
 use super::machine::Machine;
 use super::moves::{Error, Move, Part, State, is_same_entry};
-
-/// `left - right < bound`, or `<=` if not strict; clocks by index, 0 for the reference clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(missing_docs, reason = "the formula says it")]
-pub struct Constraint {
-    pub left: usize,
-    pub right: usize,
-    pub bound: i32,
-    pub strict: bool,
-}
+use super::zone::Comparison;
 
 /// What to do in some zones.
 #[derive(Clone, Debug)]
@@ -29,20 +20,16 @@ pub struct Decision {
     /// costs time alone.
     pub rank: u32,
     /// Where it applies: in one of these conjunctions.
-    pub zones: Vec<Vec<Constraint>>,
+    pub zones: Vec<Vec<FixedConstraint>>,
     /// The move to take; `None` is to wait. For a move of the controller only the edges and their
     /// `select` values count: the environment picks the branches.
     pub action: Option<Vec<Part>>,
 }
 
 impl Decision {
-    /// Whether its zones contain clock values in ticks.
+    /// Whether it applies to these clock values, in ticks.
     fn applies(&self, clocks: &[i64], ticks_per_unit: i64) -> bool {
-        let holds = |one: &Constraint| {
-            let difference = clocks[one.left] - clocks[one.right];
-            let bound = i64::from(one.bound) * ticks_per_unit;
-            difference < bound || (!one.strict && difference == bound)
-        };
+        let holds = |one: &FixedConstraint| Comparison::from(one).holds(clocks, ticks_per_unit);
         self.zones.iter().any(|zone| zone.iter().all(holds))
     }
 }
@@ -74,6 +61,13 @@ impl Decisions {
         let applying = decisions.filter(|(_, decision)| decision.applies(clocks, ticks_per_unit));
         let most = if is_permissive { usize::MAX } else { 1 };
         applying.map(|(index, _)| index).take(most).collect()
+    }
+
+    /// The same decisions themselves.
+    fn at(&self, clocks: &[i64], ticks_per_unit: i64, is_permissive: bool) -> Vec<&Decision> {
+        let indices = self.indices_at(clocks, ticks_per_unit, is_permissive);
+        let indices = indices.into_iter();
+        indices.map(|index| &self.decisions[index]).collect()
     }
 }
 
@@ -142,6 +136,11 @@ impl Claim<'_> {
     /// owner.
     pub(super) fn must_end(&self) -> bool {
         (self.owner == Owner::Controller) == (self.aim != Aim::Keep)
+    }
+
+    /// Whether a move is one of the owner of the strategy.
+    pub(super) fn owns(&self, controllable: bool) -> bool {
+        controllable == (self.owner == Owner::Controller)
     }
 }
 
@@ -245,15 +244,13 @@ impl<'a> Rules<'a> {
 
     /// The decisions that the controller is allowed; none is all.
     fn allowed(&self, state: &State) -> Vec<&'a Decision> {
-        let words = identity(self.semantics.network(), &state.words);
-        let (Some(decisions), Some((_, is_permissive))) = (self.under.get(words), self.claim.under)
-        else {
-            return Vec::new();
-        };
         let unit = self.semantics.ticks_per_unit();
-        let indices = decisions.indices_at(&state.clocks, unit, is_permissive);
-        let indices = indices.into_iter();
-        indices.map(|index| &decisions.decisions[index]).collect()
+        match (self.allowed_of(&state.words), self.claim.under) {
+            (Some(decisions), Some((_, is_permissive))) => {
+                decisions.at(&state.clocks, unit, is_permissive)
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// Whether the controller is not allowed to wait.
@@ -268,9 +265,12 @@ impl<'a> Rules<'a> {
         self.under.get(words).copied()
     }
 
-    /// Whether the owner of the strategy makes the move.
-    pub(super) fn is_own(&self, one: &Move) -> bool {
-        one.controllable == (self.claim.owner == Owner::Controller)
+    /// Whether an action of the strategy means the move with these parts.
+    pub(super) fn is_meant(&self, action: &[Part], parts: &[Part]) -> bool {
+        match self.claim.owner {
+            Owner::Controller => is_same_entry(self.semantics.network(), action, parts),
+            Owner::Environment => action == parts,
+        }
     }
 
     /// The possible moves that an action of the owner stands for: of the controller's all with the
@@ -280,12 +280,11 @@ impl<'a> Rules<'a> {
         action: &[Part],
         possible: &'p [(&'m Move, State)],
     ) -> Vec<&'p (&'m Move, State)> {
-        let is_meant = |one: &Move| match self.claim.owner {
-            Owner::Controller => is_same_entry(self.semantics.network(), action, &one.parts),
-            Owner::Environment => action == one.parts,
-        };
-        let own = possible.iter().filter(|(one, _)| self.is_own(one));
-        own.filter(|(one, _)| is_meant(one)).collect()
+        let own = possible
+            .iter()
+            .filter(|(one, _)| self.claim.owns(one.controllable));
+        own.filter(|(one, _)| self.is_meant(action, &one.parts))
+            .collect()
     }
 
     /// The possible moves of the opponent, where the owner picks their branches those that it
@@ -295,7 +294,9 @@ impl<'a> Rules<'a> {
         state: &State,
         possible: &'p [(&'m Move, State)],
     ) -> Option<Vec<&'p (&'m Move, State)>> {
-        let others = possible.iter().filter(|(one, _)| !self.is_own(one));
+        let others = possible
+            .iter()
+            .filter(|(one, _)| !self.claim.owns(one.controllable));
         let others: Vec<_> = others.collect();
         let legs = self
             .decisions_of(&state.words)
@@ -371,13 +372,9 @@ impl<'a> Rules<'a> {
 
     /// The decisions that apply.
     pub(super) fn decisions(&self, state: &State) -> Vec<&'a Decision> {
-        let Some(decisions) = self.decisions_of(&state.words) else {
-            return Vec::new();
-        };
-        let unit = self.semantics.ticks_per_unit();
-        let indices = decisions.indices_at(&state.clocks, unit, self.claim.is_permissive);
-        let indices = indices.into_iter();
-        indices.map(|index| &decisions.decisions[index]).collect()
+        let (unit, is_permissive) = (self.semantics.ticks_per_unit(), self.claim.is_permissive);
+        let decisions = self.decisions_of(&state.words);
+        decisions.map_or_else(Vec::new, |all| all.at(&state.clocks, unit, is_permissive))
     }
 
     /// All decisions for words.

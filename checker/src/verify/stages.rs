@@ -7,9 +7,9 @@
 
 use super::machine::{Machine, proposes};
 use super::moves::Error;
-use super::place::{Conjunction, Kind, Place, conjunction, parts_in, without_conjunctions};
+use super::place::{Conjunction, Kind, Place, conjunction, parts_in};
 use super::rules::Rules;
-use super::symbolic::{Symbolic, within_all, without_all};
+use super::symbolic::{Symbolic, within_all, without_all, without_conjunctions};
 use super::zone::Zone;
 
 /// The indices of the moves of a place that the machine proposes there.

@@ -29,7 +29,7 @@
 //! From which states the owner wins is computed on sets of clock values ([`super::winning`]). Where
 //! it does not win from where play begins, a run over regions shows it ([`super::defects`]).
 
-use crate::ir::Network;
+use crate::ir::{ClockAtom, Network};
 
 use super::defects;
 use super::effort::Effort;
@@ -40,7 +40,7 @@ use super::timed::{Timed, least_multiple};
 use super::winning::Winning;
 
 pub use super::outcome::{Coverage, Defect, Kind, Outcome, Step, Violation};
-pub use super::rules::{Aim, Claim, Constraint, Decision, Decisions, Forcing, Owner};
+pub use super::rules::{Aim, Claim, Decision, Decisions, Forcing, Owner};
 
 /// Where play begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,7 +61,8 @@ fn regions(network: &Network, strategy: &[Decisions], claim: &Claim<'_>) -> Resu
     let mut zones = all.flat_map(|decision| decision.zones.iter().flatten());
     let constants = zones.clone().map(|one| i64::from(one.bound).abs());
     let constant = constants.max().unwrap_or(0).max(claim.constant);
-    let has_differences = claim.has_differences || zones.any(|one| one.left != 0 && one.right != 0);
+    let has_differences =
+        claim.has_differences || zones.any(|one| ClockAtom::from(*one).is_difference());
     Regions::new(network, constant, has_differences)
 }
 

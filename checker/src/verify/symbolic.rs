@@ -3,7 +3,7 @@
 
 use crate::cancellation;
 use crate::exec::EmittedAssignment;
-use crate::ir::{ClockChoice, ClockId, FixedConstraint, Network, Predicate};
+use crate::ir::{FixedConstraint, Network, Predicate};
 
 use super::code::{Candidate, Code, Combination};
 use super::moves::{Error, Part};
@@ -145,15 +145,7 @@ impl<'a> Symbolic<'a> {
             Predicate::Location(process, location) => {
                 all_if(words[process.0 as usize] == location.0 as i32)
             }
-            Predicate::Clock(clock) => {
-                let one = Comparison::new(
-                    self.clock(clock.left, words)?,
-                    self.clock(clock.right, words)?,
-                    self.code.value(clock.bound, words)?.into(),
-                    clock.strict,
-                );
-                vec![zone.within([one])]
-            }
+            Predicate::Clock(clock) => vec![zone.within([self.code.comparison(clock, words)?])],
             Predicate::Not(inner) => without_all(all(), &self.part(inner, words, zone, deadlock)?),
             Predicate::And(parts) => {
                 let mut rest = all();
@@ -176,16 +168,6 @@ impl<'a> Symbolic<'a> {
             }
             Predicate::Deadlock => deadlock(zone)?,
         })
-    }
-
-    fn clock(&self, choice: ClockChoice, words: &[i32]) -> Result<usize, Error> {
-        let clock = match choice {
-            ClockChoice::Fixed(ClockId(clock)) => clock,
-            ClockChoice::Indexed(range, offset) => {
-                range.first.0 + self.code.value(offset, words)? as u32
-            }
-        };
-        Ok(clock as usize)
     }
 
     /// The clock values at the start.
@@ -236,13 +218,24 @@ pub(super) fn without_covered(zones: Vec<Zone>) -> Vec<Zone> {
     kept
 }
 
-/// What is left of zones without others.
-pub(super) fn without_all(mut zones: Vec<Zone>, others: &[Zone]) -> Vec<Zone> {
-    for other in others {
+/// What is left of zones outside of others.
+pub(super) fn without_all(zones: Vec<Zone>, others: &[Zone]) -> Vec<Zone> {
+    let others = others.iter().filter(|other| !other.is_empty());
+    without_conjunctions(zones, others.map(Zone::comparisons))
+}
+
+/// What is left of zones where none of the conjunctions holds.
+pub(super) fn without_conjunctions<C: AsRef<[Comparison]>>(
+    mut zones: Vec<Zone>,
+    conjunctions: impl IntoIterator<Item = C>,
+) -> Vec<Zone> {
+    for one in conjunctions {
         if zones.is_empty() {
             break;
         }
-        zones = zones.iter().flat_map(|zone| zone.without(other)).collect();
+        let rest = zones.iter();
+        let rest = rest.flat_map(|zone| zone.without_conjunction(one.as_ref()));
+        zones = rest.collect();
     }
     zones
 }
@@ -256,12 +249,7 @@ pub(super) fn guarded(
     let within = zone.within(guard.iter().map(Comparison::from));
     let mut parts = vec![within];
     parts.retain(|part| !part.is_empty());
-    for conjunction in excluded {
-        let conjunction: Vec<Comparison> = conjunction.iter().map(Comparison::from).collect();
-        let rest = parts
-            .iter()
-            .flat_map(|part| part.without_conjunction(&conjunction));
-        parts = rest.collect();
-    }
-    parts
+    let excluded = excluded.iter();
+    let excluded = excluded.map(|one| one.iter().map(Comparison::from).collect::<Vec<_>>());
+    without_conjunctions(parts, excluded)
 }

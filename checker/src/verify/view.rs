@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::place::{Conjunction, Kind, Piece, Place, Rest, just_after, without_conjunctions};
-use super::symbolic::within_all;
+use super::place::{Conjunction, Kind, Piece, Place, Rest, just_after};
+use super::symbolic::{within_all, without_conjunctions};
 use super::zone::{Comparison, Zone};
 
 /// When a state is looked at.
@@ -184,12 +184,7 @@ impl<'v, 'a> View<'v, 'a> {
     }
 
     fn outside(&self, piece: &Piece, zones: Vec<Zone>) -> Vec<Zone> {
-        let conjunctions = piece.zones.iter().map(|one| self.at_moment(one));
-        conjunctions.fold(zones, |zones, one| {
-            let rest = zones.iter();
-            rest.flat_map(|zone| zone.without_conjunction(&one))
-                .collect()
-        })
+        without_conjunctions(zones, piece.zones.iter().map(|one| self.at_moment(one)))
     }
 
     fn rest_in(&self, piece: &Piece, zones: &[Zone]) -> Vec<Zone> {
@@ -207,7 +202,7 @@ impl<'v, 'a> View<'v, 'a> {
         match self.rest(piece) {
             Rest::Nothing => zones,
             Rest::Everything => self.outside(piece, zones),
-            Rest::Parts(parts) => without_conjunctions(zones, &self.parts_at_moment(parts)),
+            Rest::Parts(parts) => without_conjunctions(zones, self.parts_at_moment(parts)),
         }
     }
 

@@ -37,13 +37,10 @@ use super::expected_moves::expected_moves;
 use super::machine::Machine;
 use super::moves::Error;
 use super::outcome::Coverage;
-use super::place::{
-    Conjunction, Kind, Move, Piece, Place, Rest, Target, conjunction, parts_in,
-    without_conjunctions,
-};
+use super::place::{Conjunction, Kind, Move, Piece, Place, Rest, Target, conjunction, parts_in};
 use super::rules::{Aim, Owner, Rules};
 use super::stages;
-use super::symbolic::{Symbolic, without_all, without_covered};
+use super::symbolic::{Symbolic, without_all, without_conjunctions, without_covered};
 use super::view::{Moment, Round, View};
 use super::waits::{last_moments, reaching};
 use super::zone::{Comparison, Zone};
@@ -148,13 +145,8 @@ impl<'r, 'a> Winning<'r, 'a> {
         known.stage = stage;
         if let Some(machine) = &self.rules.machine {
             let pieces = stages::pieces(self.rules, machine, &self.symbolic, &known)?;
-            let pieces = pieces.into_iter().map(|(zones, kind)| Piece {
-                rank: 0,
-                zones,
-                kind,
-                rest: rest.clone(),
-                outer: outer.clone(),
-            });
+            let pieces = pieces.into_iter();
+            let pieces = pieces.map(|(zones, kind)| Piece::new(kind, zones, &rest, &outer));
             known.pieces.extend(pieces);
         }
         Ok(known)
@@ -171,13 +163,10 @@ impl<'r, 'a> Winning<'r, 'a> {
             // Whether play comes to it is another question.
             Err(_) => {
                 let mut failing = Place::unknown(words.clone());
-                failing.pieces.push(Piece {
-                    rank: 0,
-                    zones: vec![Box::default()],
-                    kind: Kind::Over,
-                    rest: Rest::Everything,
-                    outer: Rest::Everything,
-                });
+                let (lost, whole) = (&Rest::Everything, vec![Box::default()]);
+                failing
+                    .pieces
+                    .push(Piece::new(Kind::Over, whole, lost, lost));
                 failing
             }
         };
@@ -216,8 +205,7 @@ impl<'r, 'a> Winning<'r, 'a> {
                 self.coverage.goals += u64::from(is_won);
                 let (expected, _) = expected_moves(self.rules, known, number, kind, &zone);
                 for (index, _) in expected {
-                    let is_own = known.moves[index].controllable
-                        == (self.rules.claim.owner == Owner::Controller);
+                    let is_own = self.rules.claim.owns(known.moves[index].controllable);
                     if is_own && matches!(kind, Kind::Acts(_) | Kind::Proposes) {
                         self.coverage.own_moves += 1;
                     } else {
@@ -247,7 +235,7 @@ impl<'r, 'a> Winning<'r, 'a> {
         effort: &mut Effort<'_>,
     ) -> Result<Result<bool, GivenUp>, Error> {
         loop {
-            if let Err(why) = self.settle(effort)? {
+            if let Err(why) = self.settle(self.starts_won(Round::Inner), effort)? {
                 return Ok(Err(why));
             }
             let wins = self.wins(start.0, start.1);
@@ -282,7 +270,11 @@ impl<'r, 'a> Winning<'r, 'a> {
     }
 
     /// Judges all pieces until nothing changes any more, those of small ranks first.
-    fn settle(&mut self, effort: &mut Effort<'_>) -> Result<Result<(), GivenUp>, Error> {
+    fn settle(
+        &mut self,
+        is_growing: bool,
+        effort: &mut Effort<'_>,
+    ) -> Result<Result<(), GivenUp>, Error> {
         let mut order: Vec<(u32, u32, u32)> = Vec::new();
         for (place, known) in self.places.iter().enumerate() {
             for (piece, one) in known.pieces.iter().enumerate() {
@@ -293,7 +285,6 @@ impl<'r, 'a> Winning<'r, 'a> {
         }
         order.sort_unstable();
         let mut is_due = vec![true; self.places.len()];
-        let is_growing = self.starts_won(Round::Inner);
         loop {
             let mut is_changed = vec![false; self.places.len()];
             for &(_, place, piece) in &order {
@@ -563,37 +554,11 @@ impl<'r, 'a> Winning<'r, 'a> {
             })
             .collect();
         for (place, zones) in self.places.iter_mut().zip(won) {
-            place.pieces = vec![Piece {
-                rank: 0,
-                zones,
-                kind: Kind::Anything,
-                rest: Rest::Nothing,
-                outer: Rest::Nothing,
-            }];
+            let won = &Rest::Nothing;
+            place.pieces = vec![Piece::new(Kind::Anything, zones, won, won)];
         }
-        let settled = self.settle_everything(effort)?;
+        let settled = self.settle(true, effort)?;
         Ok(settled.map(|()| self.wins(start.0, start.1)))
-    }
-
-    fn settle_everything(&mut self, effort: &mut Effort<'_>) -> Result<Result<(), GivenUp>, Error> {
-        loop {
-            let mut is_changed = false;
-            for place in 0..self.places.len() {
-                if let Some(why) = effort.is_over(self.judged) {
-                    return Ok(Err(why));
-                }
-                let rest = Rest::of(self.judge(place, 0));
-                let hull = self.places[place].hull(self.symbolic.clocks);
-                let piece = &mut self.places[place].pieces[0];
-                if grows(&hull, &piece.zones, &piece.rest, &rest) {
-                    piece.rest = rest;
-                    is_changed = true;
-                }
-            }
-            if !is_changed {
-                return Ok(Ok(()));
-            }
-        }
     }
 }
 

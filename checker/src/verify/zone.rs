@@ -10,8 +10,6 @@ use crate::cancellation;
 use crate::exec::EmittedAssignment;
 use crate::ir::FixedConstraint;
 
-use super::rules::Constraint;
-
 /// `difference < value`, or `<=` if weak, as `2 value`, or `2 value + 1`: ordered from tight to
 /// loose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -158,12 +156,6 @@ impl From<&FixedConstraint> for Comparison {
             one.bound.into(),
             one.strict,
         )
-    }
-}
-
-impl From<&Constraint> for Comparison {
-    fn from(one: &Constraint) -> Comparison {
-        Comparison::new(one.left, one.right, one.bound.into(), one.strict)
     }
 }
 

@@ -146,6 +146,20 @@ impl Bound {
         Bound(raw)
     }
 
+    /// The same bound with `<`, if it is finite.
+    pub(super) fn made_strict(self) -> Bound {
+        if self.is_finite() {
+            Bound(self.0 & !1)
+        } else {
+            self
+        }
+    }
+
+    /// The same bound with `<=`. Infinity stays what it is.
+    pub(super) fn made_weak(self) -> Bound {
+        Bound(self.0 | 1)
+    }
+
     /// This bound moved by a constant; infinity stays.
     #[must_use]
     pub fn shifted(self, value: i32) -> Bound {

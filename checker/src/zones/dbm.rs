@@ -208,7 +208,8 @@ pub fn constrain_all(zone: &mut [Bound], dimension: usize, constraints: &[Constr
     }
 }
 
-fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -> bool {
+/// The same for one constraint.
+pub(super) fn constrain_by(zone: &mut [Bound], dimension: usize, constraint: &Constraint) -> bool {
     let Constraint { left, right, bound } = *constraint;
     constrain(zone, dimension, left, right, bound)
 }

@@ -55,6 +55,11 @@ impl Federation {
         federation
     }
 
+    /// All valuations.
+    pub fn universe(dimension: usize) -> Federation {
+        Federation::of_zone(dimension, Zone::universe(dimension).bounds())
+    }
+
     /// The number of clocks, the reference clock included.
     pub fn dimension(&self) -> usize {
         self.dimension
@@ -63,6 +68,12 @@ impl Federation {
     /// The zones, none of them empty.
     pub fn zones(&self) -> std::slice::ChunksExact<'_, Bound> {
         self.bounds.chunks_exact(self.size())
+    }
+
+    /// Copies of the zones.
+    pub fn to_zones(&self) -> impl Iterator<Item = Zone> {
+        let zones = self.zones();
+        zones.map(|zone| Zone::from_bounds(self.dimension, zone))
     }
 
     /// The number of zones in this description of the set.
@@ -246,11 +257,11 @@ impl Federation {
                 let part = self.bounds.len();
                 self.bounds.extend_from_within(start..start + size);
                 let outside = cut.negated();
-                if !dbm::constrain_all(&mut self.bounds[part..], dimension, &[outside]) {
+                if !dbm::constrain_by(&mut self.bounds[part..], dimension, &outside) {
                     self.bounds.truncate(part);
                 }
                 let rest = &mut self.bounds[start..start + size];
-                if !dbm::constrain_all(rest, dimension, &[cut]) {
+                if !dbm::constrain_by(rest, dimension, &cut) {
                     break;
                 }
             }
@@ -263,6 +274,19 @@ impl Federation {
         for zone in other.zones() {
             self.subtract_zone(zone);
         }
+    }
+
+    /// What is left of it outside of another one.
+    #[must_use]
+    pub fn minus(mut self, other: &Federation) -> Federation {
+        self.subtract(other);
+        self
+    }
+
+    /// All valuations that are not in it.
+    #[must_use]
+    pub fn complement(&self) -> Federation {
+        Federation::universe(self.dimension).minus(self)
     }
 
     /// Whether every valuation of the zone is in the federation; exact.
@@ -526,17 +550,10 @@ impl<'a> Subtrahend<'a> {
         while let Some(cut) = deepest_cut(&rest, dimension, &self.constraints) {
             let outside = cut.negated();
             part.copy_from_slice(&rest);
-            let has_part = dbm::constrain(
-                &mut part,
-                dimension,
-                outside.left,
-                outside.right,
-                outside.bound,
-            );
-            if has_part && !visit(&part) {
+            if dbm::constrain_by(&mut part, dimension, &outside) && !visit(&part) {
                 return false;
             }
-            if !dbm::constrain(&mut rest, dimension, cut.left, cut.right, cut.bound) {
+            if !dbm::constrain_by(&mut rest, dimension, &cut) {
                 break;
             }
         }

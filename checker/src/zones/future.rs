@@ -59,8 +59,7 @@ pub fn successors(from: &Federation, bad: &Federation, barriers: &Barriers) -> F
     if barriers.open.is_empty() {
         return reached;
     }
-    let mut waiting = reached.clone();
-    waiting.subtract(&barriers.stops);
+    let waiting = reached.clone().minus(&barriers.stops);
     for part in &barriers.open {
         reached.unite(&running_on(&waiting, bad, part));
     }
@@ -80,8 +79,7 @@ fn up_to(from: &Federation, bad: &Federation, stops: &Federation) -> Federation 
         for barrier in stops.zones() {
             lost.unite(&lost_to_barrier(zone, &future, barrier, dimension));
         }
-        let mut reached = Federation::of_zone(dimension, &future);
-        reached.subtract(&lost);
+        let reached = Federation::of_zone(dimension, &future).minus(&lost);
         result.unite(&reached);
     }
     result
@@ -124,7 +122,7 @@ fn staying_in(from: &Federation, bad: &Federation, part: &Federation) -> Federat
     if from.is_empty() {
         return from.clone();
     }
-    let mut left = outside(part);
+    let mut left = part.complement();
     left.unite(bad);
     up_to(from, &left, &Federation::empty(part.dimension()))
 }
@@ -149,7 +147,7 @@ fn running_into(to: &Federation, part: &Federation, stops: &Federation) -> Feder
     if ends.is_empty() {
         return entries;
     }
-    let inside = past::predecessors(&ends, &outside(part), &ClockSet::EMPTY);
+    let inside = past::predecessors(&ends, &part.complement(), &ClockSet::EMPTY);
     for piece in part.zones() {
         let edge = lower_edge(piece, dimension);
         let mut within = inside.clone();
@@ -175,8 +173,7 @@ fn back_to(to: &Federation, stops: &Federation) -> Federation {
         for barrier in stops.zones() {
             lost.unite(&stopped_before(zone, &past, barrier, dimension));
         }
-        let mut reaching = Federation::of_zone(dimension, &past);
-        reaching.subtract(&lost);
+        let reaching = Federation::of_zone(dimension, &past).minus(&lost);
         result.unite(&reaching);
     }
     result
@@ -243,18 +240,10 @@ fn future_of(zone: &[Bound], dimension: usize) -> Box<[Bound]> {
 fn strictly_after(zone: &[Bound], dimension: usize) -> Box<[Bound]> {
     let mut after = future_of(zone, dimension);
     for bound in &mut after[1..dimension] {
-        *bound = Bound(bound.0 & !1);
+        *bound = bound.made_strict();
     }
     debug_assert!(!dbm::is_empty(&after));
     after
-}
-
-/// All valuations that are not in the federation.
-fn outside(federation: &Federation) -> Federation {
-    let dimension = federation.dimension();
-    let mut rest = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
-    rest.subtract(federation);
-    rest
 }
 
 /// The valuations from which every short enough delay leads into the zone.
@@ -266,7 +255,7 @@ fn lower_edge(zone: &[Bound], dimension: usize) -> Federation {
 fn strictly_before(zone: &[Bound], dimension: usize) -> Zone {
     let mut before = Zone::from_bounds(dimension, zone);
     before.down(&ClockSet::EMPTY);
-    let uppers = (1..dimension).map(|left| (left, strict(zone[left * dimension])));
+    let uppers = (1..dimension).map(|left| (left, zone[left * dimension].made_strict()));
     let uppers: Vec<(usize, Bound)> = uppers.filter(|one| one.1.is_finite()).collect();
     for (left, bound) in uppers {
         if !before.constrain(left, 0, bound) {
@@ -274,13 +263,4 @@ fn strictly_before(zone: &[Bound], dimension: usize) -> Zone {
         }
     }
     before
-}
-
-/// The strict bound with the same constant; infinity stays.
-fn strict(bound: Bound) -> Bound {
-    if bound.is_infinite() {
-        bound
-    } else {
-        Bound(bound.0 & !1)
-    }
 }

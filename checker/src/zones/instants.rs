@@ -19,38 +19,22 @@ use super::{Bound, ClockSet, dbm};
 /// The valuations from which every small enough delay leads into the federation.
 #[must_use]
 pub fn before(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, &weak, &strict)
+    moved(federation, stopped, Bound::made_weak, Bound::made_strict)
 }
 
 /// The valuations that every small enough delay has just led out of the federation, or further
 /// within it.
 #[must_use]
 pub fn after(federation: &Federation, stopped: &ClockSet) -> Federation {
-    moved(federation, stopped, &strict, &weak)
-}
-
-fn weak(bound: Bound) -> Bound {
-    if bound.is_finite() {
-        Bound(bound.0 | 1)
-    } else {
-        bound
-    }
-}
-
-fn strict(bound: Bound) -> Bound {
-    if bound.is_finite() {
-        Bound(bound.0 & !1)
-    } else {
-        bound
-    }
+    moved(federation, stopped, Bound::made_strict, Bound::made_weak)
 }
 
 /// Replaces the bounds from below and from above in each zone, and closes it again.
 fn moved(
     federation: &Federation,
     stopped: &ClockSet,
-    from_below: &dyn Fn(Bound) -> Bound,
-    from_above: &dyn Fn(Bound) -> Bound,
+    from_below: fn(Bound) -> Bound,
+    from_above: fn(Bound) -> Bound,
 ) -> Federation {
     let dimension = federation.dimension();
     let mut result = Federation::empty(dimension);

@@ -48,8 +48,7 @@ pub fn predecessors(good: &Federation, bad: &Federation, stopped: &ClockSet) -> 
         if lost.zone_count() > WORTH_REDUCING {
             lost.reduce();
         }
-        let mut safe = Federation::of_zone(dimension, &good.past);
-        safe.subtract(&lost);
+        let safe = Federation::of_zone(dimension, &good.past).minus(&lost);
         result.unite(&safe);
     }
     result

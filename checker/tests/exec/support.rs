@@ -1,11 +1,9 @@
 //! Engines side by side, and a short way to write code.
 
-use checker::exec::{
-    Context, EmittedAssignment, EmittedConstraint, Executor, Interpreter, RunTimeError,
-};
+use checker::exec::{Context, EmittedAssignment, Executor, Interpreter, RunTimeError};
 use checker::ir::{
-    Address, Base, Block, Function, FunctionId, Instruction, Overflow, Register, RegisterType,
-    SiteId, Terminator,
+    Address, Base, Block, FixedConstraint, Function, FunctionId, Instruction, Overflow, Register,
+    RegisterType, SiteId, Terminator,
 };
 
 /// Everything that a call leaves behind.
@@ -16,7 +14,7 @@ pub(crate) struct Outcome {
     /// The words of the state; empty after an error, when they are of no use.
     pub state: Vec<i32>,
     /// The emitted constraints; empty after an error.
-    pub constraints: Vec<EmittedConstraint>,
+    pub constraints: Vec<FixedConstraint>,
     /// The emitted assignments; empty after an error.
     pub assignments: Vec<EmittedAssignment>,
     /// The first place where a result wrapped round.

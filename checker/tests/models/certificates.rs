@@ -3,6 +3,7 @@
 use checker::engine::answer::Certificate;
 use checker::engine::evidence::certificate::verify;
 use checker::engine::{Answer, LoadedModel, Options, Rules, Verdict};
+use checker::ir::{ClockId, FixedConstraint};
 use checker::verify::certificate::States;
 
 use crate::checks::{ask, goal_of, interpreted, load};
@@ -114,9 +115,9 @@ fn time_that_leads_out_is_caught() {
         |states| {
             // Both trains away: all times from 0 on; no longer beyond 7.
             for constraints in &mut states[0].zones {
-                constraints.push(checker::verify::strategy::Constraint {
-                    left: 1,
-                    right: 0,
+                constraints.push(FixedConstraint {
+                    left: ClockId(1),
+                    right: ClockId(0),
                     bound: 7,
                     strict: false,
                 });
@@ -148,7 +149,7 @@ fn other_words_and_clocks_are_refused() {
             .iter_mut()
             .flat_map(|state| &mut state.zones)
             .flatten();
-        constraints.next().expect("some zone has a constraint").left = 9;
+        constraints.next().expect("some zone has a constraint").left = ClockId(9);
     };
     check_violation(other_clock, "does not fit");
     check_violation(|states| states.push(states[0].clone()), "the same words");

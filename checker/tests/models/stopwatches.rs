@@ -16,7 +16,7 @@ use std::time::Duration;
 use checker::engine::evidence::certificate::verify;
 use checker::engine::evidence::witness::Proof;
 use checker::engine::{Answer, Limits, LoadedModel, Options, Verdict};
-use checker::ir::Predicate;
+use checker::ir::{ClockId, Predicate};
 use checker::search::optimum::extremum::{Extreme, Extremes};
 use checker::verify::certificate::States;
 use checker::verify::{Semantics, State};
@@ -221,7 +221,8 @@ fn is_inside(states: &[States], state: &State) -> bool {
     same.is_some_and(|one| {
         one.zones.iter().any(|zone| {
             zone.iter().all(|one| {
-                let difference = state.clocks[one.left] - state.clocks[one.right];
+                let value = |clock: ClockId| state.clocks[clock.0 as usize];
+                let difference = value(one.left) - value(one.right);
                 let bound = i64::from(one.bound) * TICKS;
                 difference < bound || (!one.strict && difference == bound)
             })

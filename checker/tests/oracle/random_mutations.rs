@@ -10,7 +10,7 @@ use checker::game::strategy::{Selection, Start, Way};
 use checker::game::{Forced, Player, Priorities};
 use checker::ir;
 use checker::syntax::ast::QueryText;
-use checker::verify::strategy::{Constraint, Decision, Decisions, Outcome};
+use checker::verify::strategy::{Decision, Decisions, Outcome};
 use checker::verify::timed::Timed;
 use checker::verify::{Effort, Part, Regions, Semantics};
 use proptest::test_runner::TestCaseError;
@@ -51,8 +51,9 @@ impl Closed<'_> {
 
     fn applies(&self, node: &Node, decision: &Decision) -> bool {
         let ticks = self.graph.ticks;
-        let holds = |one: &Constraint| {
-            let difference = node.state.clocks[one.left] - node.state.clocks[one.right];
+        let holds = |one: &ir::FixedConstraint| {
+            let value = |clock: ir::ClockId| node.state.clocks[clock.0 as usize];
+            let difference = value(one.left) - value(one.right);
             let bound = i64::from(one.bound) * ticks;
             difference < bound || !one.strict && difference == bound
         };
@@ -247,9 +248,8 @@ fn end_of(network: &ir::Network, graph: &Graph, constant: i64, way: &Way) -> Opt
     let semantics = Semantics::new(network, way.ticks_per_unit);
     let mut state = semantics.initial().ok()?;
     for (wait, parts) in &way.moves {
-        let parts: Vec<_> = parts.iter().map(|&part| part.into()).collect();
         state = semantics.after(&state, *wait).ok()?;
-        state = semantics.take(&state, &parts).ok()??;
+        state = semantics.take(&state, parts).ok()??;
     }
     let end = Timed {
         state: semantics.after(&state, way.wait).ok()?,

@@ -13,17 +13,15 @@ use std::ops::Range;
 use serde_json::{Value as Json, json};
 
 use crate::cancellation::{self, Cut, Room};
-use crate::ir::{Network, Predicate, QueryKind};
-use crate::network::{Failure, Symbolic};
+use crate::ir::{ClockId, FixedConstraint, Network, Predicate, QueryKind};
+use crate::network::{Failure, Symbolic, conjunction};
 use crate::search::limits::{Counters, Watch};
 use crate::search::optimum::best_first::{BestFirst, Measure};
 use crate::search::{Outcome, StopReason};
 use crate::verify;
 use crate::verify::certificate::{self, Defect, States};
-use crate::verify::strategy::Constraint;
 
 use super::checked::{Checked, Unreadable};
-use super::strategy_check;
 use crate::engine::answer::Certificate;
 use crate::engine::format::json::written;
 use crate::engine::format::json_reader::{integer, only};
@@ -76,7 +74,7 @@ pub(crate) fn reached(
         let mut room = Room::default();
         let states = search.into_reached().into_iter().map(|(words, zones)| {
             let zones = zones.iter();
-            let zones = zones.map(|zone| strategy_check::constraints(zone.bounds(), dimension));
+            let zones = zones.map(|zone| conjunction(zone.bounds(), dimension));
             let zones: Vec<_> = zones.collect();
             // The zones that these are made of count still.
             let constraints = zones.iter().map(|zone| size_of_val(&**zone));
@@ -120,7 +118,7 @@ impl Certificate {
             let zones = state.zones.iter().map(|zone| {
                 let constraints = zone.iter();
                 let constraints = constraints
-                    .map(|one| json!([one.left, one.right, one.bound, u8::from(one.strict)]));
+                    .map(|one| json!([one.left.0, one.right.0, one.bound, u8::from(one.strict)]));
                 Json::Array(constraints.collect())
             });
             let line = json!({ "words": state.words, "zones": zones.collect::<Vec<_>>() });
@@ -227,7 +225,7 @@ fn violation_lines(network: &Network, defect: &Defect, words: &[i32]) -> Vec<Str
     }
     if let Defect::MoveLeaves(parts) = defect {
         let parts = parts.iter();
-        let texts = parts.map(|&part| text::part_text(network, part.into()));
+        let texts = parts.map(|&part| text::part_text(network, part));
         lines.extend(texts.map(|text| format!("    {text}")));
     }
     lines
@@ -240,9 +238,9 @@ fn state_of(line: &Json) -> Option<States> {
             let [left, right, bound, strict] = one.as_array()?.as_slice() else {
                 return None;
             };
-            Some(Constraint {
-                left: usize::try_from(integer(left)?).ok()?,
-                right: usize::try_from(integer(right)?).ok()?,
+            Some(FixedConstraint {
+                left: ClockId(u32::try_from(integer(left)?).ok()?),
+                right: ClockId(u32::try_from(integer(right)?).ok()?),
                 bound: integer(bound)?,
                 strict: match strict.as_u64()? {
                     0 => false,

@@ -3,18 +3,16 @@
 use crate::game::strategy::closed_loop;
 use crate::game::strategy::{Decision, Selection, Start, Strategy, Under, Way};
 use crate::game::{Forced, Player, Priorities};
-use crate::ir::{Control, Network, Objective, Predicate};
-use crate::network::Part;
+use crate::ir::{ClockAtom, Control, Network, Objective, Part, Predicate};
+use crate::network::conjunctions;
 use crate::network::symbolic::predicate;
 use crate::search::StopReason;
 use crate::verify::replay::{self, End, Moment, Run};
 use crate::verify::strategy::{
-    self, Aim, Claim, Constraint, Coverage, Decisions, Defect, Forcing, Origin, Owner, Step,
-    Violation,
+    self, Aim, Claim, Coverage, Decisions, Defect, Forcing, Origin, Owner, Step, Violation,
 };
 use crate::verify::timed::Timed;
 use crate::verify::{self, Effort, GivenUp, Semantics, State, regions};
-use crate::zones::{Bound, Federation, minimal};
 
 use crate::engine::answer::Verification;
 use crate::engine::format::text;
@@ -132,7 +130,7 @@ pub(crate) fn follow(
 ) -> Result<Option<(Run, Vec<State>)>, verify::Error> {
     let steps = way.moves.iter().map(|(wait, parts)| replay::Step {
         wait: *wait,
-        parts: parts.iter().map(|&one| one.into()).collect(),
+        parts: parts.clone(),
     });
     let run = Run {
         ticks_per_unit: way.ticks_per_unit,
@@ -251,9 +249,7 @@ pub(crate) fn claim(
 pub(crate) fn constants<'p>(predicates: impl Iterator<Item = &'p Predicate>) -> (i64, bool) {
     let atoms: Vec<_> = predicates.flat_map(predicate::atoms).collect();
     let constant = atoms.iter().map(regions::greatest_constant).max();
-    let has_differences = atoms
-        .iter()
-        .any(|atom| atom.left.first.0 != 0 && atom.right.first.0 != 0);
+    let has_differences = atoms.iter().any(ClockAtom::is_difference);
     (constant.unwrap_or(0), has_differences)
 }
 
@@ -276,54 +272,11 @@ pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
 }
 
 fn decision(decision: &Decision) -> strategy::Decision {
-    let action = decision.action.as_ref();
     strategy::Decision {
         rank: decision.rank,
-        zones: zones(&decision.zones),
-        action: action.map(|parts| parts.iter().map(|&one| one.into()).collect()),
+        zones: conjunctions(&decision.zones),
+        action: decision.action.clone(),
     }
-}
-
-impl From<Part> for verify::Part {
-    fn from(part: Part) -> verify::Part {
-        verify::Part {
-            process: part.process,
-            edge: part.edge,
-            branch: part.branch,
-            select: part.select,
-        }
-    }
-}
-
-impl From<verify::Part> for Part {
-    fn from(part: verify::Part) -> Part {
-        Part {
-            process: part.process,
-            edge: part.edge,
-            branch: part.branch,
-            select: part.select,
-        }
-    }
-}
-
-fn zones(federation: &Federation) -> Vec<Vec<Constraint>> {
-    let dimension = federation.dimension();
-    let zones = federation.zones();
-    zones.map(|zone| constraints(zone, dimension)).collect()
-}
-
-/// The fewest constraints that make a zone.
-pub(super) fn constraints(zone: &[Bound], dimension: usize) -> Vec<Constraint> {
-    let mut constraints = Vec::new();
-    minimal::for_each_minimal(zone, dimension, |one| {
-        constraints.push(Constraint {
-            left: one.left,
-            right: one.right,
-            bound: one.bound.value(),
-            strict: one.bound.is_strict(),
-        });
-    });
-    constraints
 }
 
 /// What a check covered, or what is wrong, for the user: one line, then those of the run. `stop` is
@@ -400,9 +353,9 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
     lines
 }
 
-fn part_text(network: &Network, part: verify::Part) -> String {
+fn part_text(network: &Network, part: Part) -> String {
     let process = &network.processes[part.process as usize];
-    let edge = &process.edges[part.edge as usize];
+    let edge = network.edge(part);
     let target = edge.branches[part.branch as usize].target;
     format!(
         "{}.{} → {}",

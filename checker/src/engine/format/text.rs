@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use crate::cancellation;
 use crate::engine::evidence::witness::{Missing, Proof, Witness};
 use crate::engine::loaded_model::LoadedModel;
-use crate::ir::{Branch, Edge, EdgeId, EdgeLabels, Network, RunTimeErrorKind, Shape};
+use crate::ir::{Branch, EdgeId, EdgeLabels, Network, RunTimeErrorKind, Shape};
 use crate::network::discrete::selects::{select_count, select_values};
 use crate::network::{Failure, Part};
 use crate::search::Trace;
@@ -175,7 +175,7 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
 
 /// An edge as `P.a->P.b { guard, sync, update }`, with the select values.
 pub fn part_text(network: &Network, part: Part) -> String {
-    let edge = edge_of(network, part);
+    let edge = network.edge(part);
     let branch = &edge.branches[part.branch as usize];
     edge_text(network, part, &edge.labels, edge.select.len(), [branch])
 }
@@ -184,7 +184,7 @@ pub fn part_text(network: &Network, part: Part) -> String {
 /// labels are those of the edge to the branch point.
 pub fn entry_text(network: &Network, part: Part) -> String {
     let process = &network.processes[part.process as usize];
-    let edge = edge_of(network, part);
+    let edge = network.edge(part);
     let (labels, bindings) = match &edge.leg {
         Some(leg) => (&leg.entry, leg.bindings),
         None => (&edge.labels, edge.select.len()),
@@ -192,10 +192,6 @@ pub fn entry_text(network: &Network, part: Part) -> String {
     let edges = process.edges_of_entry(EdgeId(part.edge));
     let branches = edges.flat_map(|edge| &edge.branches);
     edge_text(network, part, labels, bindings, branches)
-}
-
-fn edge_of(network: &Network, part: Part) -> &Edge {
-    &network.processes[part.process as usize].edges[part.edge as usize]
 }
 
 /// An edge with these labels, the values of its first `bindings`, and these ends.
@@ -207,7 +203,7 @@ fn edge_text<'n>(
     branches: impl IntoIterator<Item = &'n Branch>,
 ) -> String {
     let process = &network.processes[part.process as usize];
-    let edge = edge_of(network, part);
+    let edge = network.edge(part);
     let name = |location: u32| {
         format!(
             "{}.{}",
@@ -255,7 +251,7 @@ fn edge_text<'n>(
 
 /// The select bindings of a part.
 pub fn selects(network: &Network, part: Part) -> Vec<(&str, i32)> {
-    let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+    let edge = network.edge(part);
     if select_count(edge) == 0 {
         return Vec::new();
     }
@@ -344,7 +340,7 @@ pub fn run_text(network: &Network, run: &Run, states: &[State]) -> String {
                 let _ = writeln!(text, "  wait {}", fraction(step.wait, unit));
             }
             for part in &step.parts {
-                let _ = writeln!(text, "  {}", part_text(network, (*part).into()));
+                let _ = writeln!(text, "  {}", part_text(network, *part));
             }
         }
     }

@@ -107,15 +107,6 @@ fn best(
 /// there are bounds.
 fn time_atom(network: &Network, clock: usize) -> ClockAtom {
     let longest = Bound::reach(greatest_constant(network));
-    let range = |clock: usize| ClockRange {
-        first: ClockId(clock as u32),
-        count: 1,
-    };
-    ClockAtom {
-        left: range(clock),
-        right: range(0),
-        low: longest,
-        high: longest,
-        strict: false,
-    }
+    let clock = ClockRange::one(ClockId(clock as u32));
+    ClockAtom::weak(clock, ClockRange::REFERENCE, longest, longest)
 }

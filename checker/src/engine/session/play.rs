@@ -178,7 +178,7 @@ impl Follower {
             let described = indices.iter().map(|&one| {
                 let action = decisions.decisions[one].action.as_ref();
                 json!({
-                    "edges": action.map(|parts| edges(network, parts)),
+                    "edges": action.map(|parts| json::parts(network, parts)),
                     "rank": ranked[one].rank,
                 })
             });
@@ -207,12 +207,6 @@ impl Follower {
         let result = model.verify_strategy(&text, played, rules, effort)?;
         Ok(Checked::of_strategy(model.network(), &result))
     }
-}
-
-/// The edges of a move.
-fn edges(network: &Network, parts: &[Part]) -> Json {
-    let parts = parts.iter().map(|&one| json::part(network, one.into()));
-    parts.collect()
 }
 
 fn identity<'w>(network: &Network, words: &'w [i32]) -> &'w [i32] {
@@ -481,13 +475,13 @@ impl Play {
         let timings = |moves: &[Timing]| {
             let moves = moves.iter().map(|one| {
                 let windows = one.windows.iter().map(window);
-                json!({ "edges": edges(network, &one.parts), "windows": windows.collect::<Vec<_>>() })
+                json!({ "edges": json::parts(network, &one.parts), "windows": windows.collect::<Vec<_>>() })
             });
             moves.collect::<Vec<_>>()
         };
         let next = match &situation.next {
             Next::Acts { action, .. } => {
-                json!({ "kind": "acts", "edges": edges(network, action) })
+                json!({ "kind": "acts", "edges": json::parts(network, action) })
             }
             Next::Won(winner, ending) => json!({
                 "kind": "won",

@@ -5,11 +5,11 @@ use crate::cancellation;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::external_words::{ExternalWords, ends_text};
 use crate::exec::libraries;
-use crate::exec::{EmittedAssignment, EmittedConstraint, RunTimeError, arithmetic};
+use crate::exec::{EmittedAssignment, RunTimeError, arithmetic};
 use crate::ir::{
     Address, ClockId, ClockOperand, Distribution, ExternalArgument, ExternalId, ExternalParameter,
-    Instruction, MathFunction, Overflow, Register, RegisterType, RunTimeErrorKind, STREAM_WORDS,
-    SiteId, Stream,
+    FixedConstraint, Instruction, MathFunction, Overflow, Register, RegisterType, RunTimeErrorKind,
+    STREAM_WORDS, SiteId, Stream,
 };
 
 use super::machine::Activation;
@@ -402,7 +402,7 @@ impl Execution<'_, '_> {
                 ..
             } => {
                 let bound = within_clock_limit(self.integer(active, bound))?;
-                self.context.constraints.push(EmittedConstraint {
+                self.context.constraints.push(FixedConstraint {
                     left: self.clock(active, left),
                     right: self.clock(active, right),
                     bound: if negate_bound { -bound } else { bound },

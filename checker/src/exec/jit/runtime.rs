@@ -9,11 +9,10 @@ use crate::builtins::{IntegerResult, MOST_PARAMETERS};
 use crate::cancellation;
 use crate::exec::executor::ROUNDS_BETWEEN_LOOKS;
 use crate::exec::external_words::{ExternalWords, ends_text};
-use crate::exec::{
-    Context, EmittedAssignment, EmittedConstraint, ROUND_LIMIT, RunTimeError, Wraps, arithmetic,
-};
+use crate::exec::{Context, EmittedAssignment, ROUND_LIMIT, RunTimeError, Wraps, arithmetic};
 use crate::ir::{
-    ClockId, Distribution, ExternalParameter, RunTimeErrorKind, STREAM_WORDS, SiteId, Stream,
+    ClockId, Distribution, ExternalParameter, FixedConstraint, RunTimeErrorKind, STREAM_WORDS,
+    SiteId, Stream,
 };
 
 use super::external::External;
@@ -32,7 +31,7 @@ pub(super) struct NativeContext<'call> {
     /// The first site where a result wrapped round in this call, or [`Wraps::NOWHERE`]. Compiled
     /// code writes it.
     pub(super) wrapped: u32,
-    constraints: &'call mut Vec<EmittedConstraint>,
+    constraints: &'call mut Vec<FixedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
 
@@ -175,7 +174,7 @@ pub(super) extern "C" fn emit_constraint(
     bound: i32,
     strict: i32,
 ) {
-    context.constraints.push(EmittedConstraint {
+    context.constraints.push(FixedConstraint {
         left: ClockId(left),
         right: ClockId(right),
         bound,

@@ -61,9 +61,7 @@ impl Solver<'_, '_, '_> {
             let missed = missed.unwrap_or_else(|| self.complement(edge.target, hit));
             return self.before(edge, &missed);
         }
-        let mut missing = self.enabled(edge);
-        missing.subtract(&self.before(edge, hit));
-        missing
+        self.enabled(edge).minus(&self.before(edge, hit))
     }
 
     /// The other valuations of a node.
@@ -71,11 +69,7 @@ impl Solver<'_, '_, '_> {
         match part {
             Win::Nothing => Win::Everything,
             Win::Everything => Win::Nothing,
-            Win::Part(part) => {
-                let mut rest = self.whole(node);
-                rest.subtract(part);
-                Win::Part(rest)
-            }
+            Win::Part(part) => Win::Part(self.whole(node).minus(part)),
         }
     }
 

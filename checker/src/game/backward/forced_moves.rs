@@ -22,8 +22,7 @@ impl Solver<'_, '_, '_> {
         }
         let mut all = Federation::empty(self.graph.dimension());
         for (component, stop) in &situation.stops {
-            let mut stop = stop.intersection(&opponent);
-            stop.subtract(bad);
+            let mut stop = stop.intersection(&opponent).minus(bad);
             for (mover, edge) in &situation.movers {
                 let blocks = match (self.forced, *component) {
                     (Forced::Neutral, _) => false,
@@ -82,11 +81,9 @@ impl Solver<'_, '_, '_> {
     /// The valuations of a node in which a player has a move.
     pub(super) fn enabled_moves(&self, node: u32, player: Player) -> Federation {
         let mut enabled = Federation::empty(self.graph.dimension());
-        for index in self.graph.edges_of(node) {
-            let edge = &self.graph.edges[index];
-            if player.owns(edge.controllable) {
-                enabled.unite(&self.enabled(edge));
-            }
+        let edges = self.graph.edges_from(node).iter();
+        for edge in edges.filter(|edge| player.owns(edge.controllable)) {
+            enabled.unite(&self.enabled(edge));
         }
         enabled
     }
@@ -117,7 +114,7 @@ impl Solver<'_, '_, '_> {
         words: &mut [i32],
     ) -> Result<Vec<(Vec<u32>, usize)>, Failure> {
         let mut has_owner = [false; 2];
-        for edge in &self.graph.edges[self.graph.edges_of(node)] {
+        for edge in self.graph.edges_from(node) {
             has_owner[usize::from(edge.controllable)] = true;
         }
         if has_owner != [true; 2] || self.forced == Forced::Neutral {

@@ -17,7 +17,6 @@ use crate::search::limits::{StopReason, Watch, states_between_checks};
 
 use crate::game::backward::account::LOOK_EVERY;
 use crate::game::backward::propagation::MOST_TASKS;
-use crate::game::backward::winning_sets::Win;
 use crate::game::forward::graph::Graph;
 use crate::game::forward::node::NONE;
 use crate::game::solver::Solver;
@@ -87,11 +86,7 @@ impl Solver<'_, '_, '_> {
         if let Some(reason) = self.sweep(watch)? {
             return Ok(Solution::Stopped(reason));
         }
-        Ok(Solution::Won(if self.is_won() {
-            self.seeker
-        } else {
-            self.seeker.opponent()
-        }))
+        Ok(Solution::Won(self.winner()))
     }
 
     /// Expands all nodes that can be reached, without computing what they win.
@@ -139,9 +134,7 @@ impl Solver<'_, '_, '_> {
             }
             let mut tasks = Vec::new();
             for node in batch {
-                let is_settled =
-                    self.is_decided(node) || matches!(self.won.win[node as usize], Win::Everything);
-                if is_settled || !self.graph.nodes[node as usize].is_expanded {
+                if !self.may_gain(node) {
                     continue;
                 }
                 match self.quick(node) {

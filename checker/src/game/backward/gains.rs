@@ -3,7 +3,6 @@
 use crate::zones::Federation;
 
 use super::winning_sets::{Gained, Win};
-use crate::game::forward::node::{Edge, NONE};
 use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
@@ -62,13 +61,8 @@ impl Solver<'_, '_, '_> {
         }
         self.on_gain(node);
         self.won.replace_win(node as usize, win);
-        let mut edge = self.graph.nodes[node as usize].first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            self.agenda.mark(source);
-            edge = next_in;
+        for edge in self.graph.edges_into(node) {
+            self.agenda.mark(edge.source);
         }
     }
 }

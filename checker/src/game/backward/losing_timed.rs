@@ -26,7 +26,7 @@ use crate::zones::federation::table_bytes;
 use crate::game::Player;
 use crate::game::backward::winning_sets::Win;
 use crate::game::backward::winning_sets::wins_bytes;
-use crate::game::exploration::schedule::LookAhead;
+use crate::game::exploration::LookAhead;
 use crate::game::solver::Solver;
 
 /// Prospects are computed again when the number of explored states is this many times the number at
@@ -59,7 +59,7 @@ impl Solver<'_, '_, '_> {
         &mut self,
         watch: &mut dyn Watch,
     ) -> Result<LookAhead, Failure> {
-        if self.exploration.held.uses_weak || !self.exploration.held.is_undefended() {
+        if self.exploration.held.uses_weak || self.exploration.held.undefended.is_empty() {
             return Ok(LookAhead::Settled);
         }
         if self.graph.symbolic.tuning().losing_timed
@@ -133,7 +133,7 @@ impl Solver<'_, '_, '_> {
     /// Adds the prospects to what is won, unless a limit ends this before.
     fn add_prospects(&mut self, watch: &mut dyn Watch) -> Result<Option<StopReason>, Failure> {
         let reserve = std::mem::take(&mut self.exploration.reserve);
-        let holds = self.exploration.held.take_held_moves();
+        let holds = std::mem::take(&mut self.exploration.held.holds);
         self.exploration.schedule.is_running = true;
         for node in 0..self.graph.nodes.len() as u32 {
             if self.is_unexplored(node) {
@@ -142,7 +142,7 @@ impl Solver<'_, '_, '_> {
         }
         let reason = self.propagate(watch);
         self.exploration.schedule.is_running = false;
-        self.exploration.held.restore_held_moves(holds);
+        self.exploration.held.holds = holds;
         self.exploration.reserve = reserve;
         reason
     }
@@ -183,11 +183,7 @@ impl Solver<'_, '_, '_> {
         if held.is_empty() {
             return None;
         }
-        let threatening = match &prospects.win[node as usize] {
-            Win::Nothing => return None,
-            Win::Everything => self.whole(node),
-            Win::Part(part) => part.clone(),
-        };
+        let threatening = self.federation_of(node, &prospects.win[node as usize]);
         let threatened = self.new_part(node, &threatening)?;
         let aims = self.aims(node, &prospects.win, &prospects.attackers);
         let (index, strength) = self.strongest(&held, aims, &threatened)?;

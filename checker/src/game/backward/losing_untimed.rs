@@ -23,7 +23,6 @@
 //! This finds the same nodes but for those that lead to each other on cycles.
 
 use crate::game::backward::winning_sets::Win;
-use crate::game::forward::node::{Edge, NONE};
 use crate::game::solver::Solver;
 use crate::game::{Forced, Player};
 
@@ -39,16 +38,9 @@ impl Solver<'_, '_, '_> {
             may_be_won[node as usize] = true;
         }
         while let Some(node) = waiting.pop() {
-            let mut edge = self.graph.nodes[node as usize].first_in;
-            while edge != NONE {
-                let Edge {
-                    source,
-                    next_in,
-                    controllable,
-                    ..
-                } = self.graph.edges[edge as usize];
-                edge = next_in;
-                let is_useful = self.seeker.owns(controllable)
+            for edge in self.graph.edges_into(node) {
+                let source = edge.source;
+                let is_useful = self.seeker.owns(edge.controllable)
                     || self.may_stop(source)
                         && !self.may_escape(source, |node| !may_be_won[node as usize]);
                 if is_useful
@@ -84,14 +76,7 @@ impl Solver<'_, '_, '_> {
             let may_win = &mut self.exploration.may_win;
             may_win.resize(self.graph.nodes.len().max(may_win.len()), true);
             may_win[node as usize] = false;
-            let mut edge = self.graph.nodes[node as usize].first_in;
-            while edge != NONE {
-                let Edge {
-                    source, next_in, ..
-                } = self.graph.edges[edge as usize];
-                asked.push(source);
-                edge = next_in;
-            }
+            asked.extend(self.graph.edges_into(node).map(|edge| edge.source));
         }
     }
 
@@ -105,7 +90,7 @@ impl Solver<'_, '_, '_> {
     fn leads_to_a_win(&self, node: u32) -> bool {
         let is_lost = |node| self.is_lost(node);
         let is_forced = || self.may_stop(node) && !self.may_escape(node, is_lost);
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let mut edges = self.graph.edges_from(node).iter();
         self.may_win_here(node)
             || edges.any(|edge| {
                 !is_lost(edge.target) && (self.seeker.owns(edge.controllable) || is_forced())
@@ -133,7 +118,7 @@ impl Solver<'_, '_, '_> {
     /// Whether the evader has a move that is possible everywhere in a node and leads to one that
     /// cannot be won, or may leave the move to the environment.
     fn may_escape(&self, node: u32, is_lost: impl Fn(u32) -> bool) -> bool {
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let mut edges = self.graph.edges_from(node).iter();
         edges.any(|edge| {
             let is_own = self.seeker.owns(edge.controllable);
             edge.is_total

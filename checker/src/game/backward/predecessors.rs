@@ -28,7 +28,7 @@ impl Solver<'_, '_, '_> {
     /// The situation in a node, reduced to what decides what is won there: stopped time matters
     /// only for a player who may be forced.
     pub(super) fn situation_for_win(&mut self, node: u32) -> Result<Situation, Failure> {
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let mut edges = self.graph.edges_from(node).iter();
         let may_be_forced = edges.any(|edge| !self.seeker.owns(edge.controllable));
         self.situation_with(node, may_be_forced)
     }
@@ -84,17 +84,14 @@ impl Solver<'_, '_, '_> {
         let mut good = self.known(node);
         let goal = self.goal(node);
         let mut bad = self.broken(node);
-        for index in self.graph.edges_of(node) {
-            let edge = self.graph.edges[index];
+        for edge in self.graph.edges_from(node) {
             if edge.is_leg {
                 continue;
             }
             if edge.controllable {
-                let before = self.before(&edge, &self.won.win[edge.target as usize]);
-                good.unite(&before);
+                good.unite(&self.before(edge, &self.won.win[edge.target as usize]));
             } else {
-                let spoiling = self.spoiling(&edge);
-                bad.unite(&spoiling);
+                bad.unite(&self.spoiling(edge));
             }
         }
         for legs in self.graph.branch_points.of(node) {
@@ -126,19 +123,16 @@ impl Solver<'_, '_, '_> {
                 continue;
             }
             if edge.controllable {
-                let spoiling = self.spoiling(&edge);
-                escape.unite(&spoiling);
+                escape.unite(&self.spoiling(&edge));
             } else {
-                let before = self.before(&edge, &self.won.win[edge.target as usize]);
-                now.unite(&before);
+                now.unite(&self.before(&edge, &self.won.win[edge.target as usize]));
             }
         }
         for legs in self.graph.branch_points.of(node) {
             escape.unite(&self.spoiling_all(legs));
         }
         now.subtract(&goal);
-        let mut good = self.forced_controller(node, situation);
-        good.subtract(&escape);
+        let mut good = self.forced_controller(node, situation).minus(&escape);
         good.unite(&now);
         good.unite(&self.known(node));
         escape.subtract(&now);

@@ -6,7 +6,7 @@ use crate::search::limits::{StopReason, Watch};
 
 use super::parallel::Task;
 use super::winning_sets::{Gained, Win};
-use crate::game::forward::node::Standing;
+use crate::game::forward::node::{Edge, Standing};
 use crate::game::solver::Solver;
 use crate::game::{AfterGoal, Player};
 
@@ -81,9 +81,7 @@ impl Solver<'_, '_, '_> {
     pub(in crate::game) fn propagate_words(&mut self, watch: &mut dyn Watch) -> Option<StopReason> {
         let mut until_look = UPDATES_BETWEEN_LOOKS;
         while let Some(node) = self.agenda.next_update() {
-            let is_settled =
-                self.is_decided(node) || matches!(self.won.win[node as usize], Win::Everything);
-            if is_settled || !self.graph.nodes[node as usize].is_expanded {
+            if !self.may_gain(node) {
                 continue;
             }
             let decision = self.quick(node);
@@ -107,14 +105,20 @@ impl Solver<'_, '_, '_> {
         None
     }
 
+    /// Whether more may be won of a node, and what lies behind it is known.
+    pub(super) fn may_gain(&self, node: u32) -> bool {
+        self.graph.nodes[node as usize].is_expanded
+            && !self.is_decided(node)
+            && !matches!(self.won.win[node as usize], Win::Everything)
+    }
+
     /// Decides without zones whether the node is won as a whole (`true`) or nothing new is won
     /// (`false`); `None` if zones are needed.
     pub(super) fn quick(&self, node: u32) -> Option<bool> {
         let mut can_move = false;
         let mut is_spoiled = false;
         let mut has_evader = false;
-        for index in self.graph.edges_of(node) {
-            let edge = &self.graph.edges[index];
+        for edge in self.graph.edges_from(node) {
             let is_own = self.seeker.owns(edge.controllable);
             match (&self.won.win[edge.target as usize], is_own) {
                 (Win::Part(_), _) => return None,
@@ -146,17 +150,15 @@ impl Solver<'_, '_, '_> {
         if can_move && (!is_spoiled || self.seeker == Player::Environment) {
             return Some(true);
         }
-        let wins_nothing = |index: usize| {
-            let edge = &self.graph.edges[index];
-            !matches!(self.won.win[edge.target as usize], Win::Everything)
-        };
+        let wins_nothing =
+            |edge: &Edge| !matches!(self.won.win[edge.target as usize], Win::Everything);
         // A player that is obliged to move and cannot has lost.
         if self.seeker == Player::Environment && self.is_obliged(node) {
             return None;
         }
         // Without a winning move, and without an evader that could be forced, nothing can be
         // gained.
-        if self.graph.edges_of(node).all(wins_nothing) && (!has_evader || is_spoiled) {
+        if self.graph.edges_from(node).iter().all(wins_nothing) && (!has_evader || is_spoiled) {
             return Some(false);
         }
         None

@@ -12,7 +12,6 @@ use crate::cancellation::{self, Cut};
 use crate::network::Failure;
 use crate::search::limits::Watch;
 
-use crate::game::backward::winning_sets::Win;
 use crate::game::solver::Solver;
 
 /// Computations between two checks of the limits.
@@ -57,10 +56,7 @@ impl Solver<'_, '_, '_> {
             }
             let mut gained = Vec::new();
             for node in nodes {
-                let is_settled = self.is_decided(node)
-                    || matches!(self.won.win[node as usize], Win::Everything)
-                    || !self.graph.nodes[node as usize].is_expanded;
-                if is_settled {
+                if !self.may_gain(node) {
                     continue;
                 }
                 match self.quick(node) {

@@ -14,11 +14,7 @@ impl Solver<'_, '_, '_> {
         for node in self.won.win.len()..self.graph.nodes.len() {
             let win = self.target_in(node as u32);
             let rest = match &win {
-                Win::Part(part) => {
-                    let mut rest = self.whole(node as u32);
-                    rest.subtract(part);
-                    Some(rest)
-                }
+                Win::Part(part) => Some(self.whole(node as u32).minus(part)),
                 Win::Nothing | Win::Everything => None,
             };
             self.won.add_node(win, rest);
@@ -55,11 +51,7 @@ impl Solver<'_, '_, '_> {
             (Standing::Mixed, Player::Environment) => self.broken(node),
             _ => return Win::Nothing,
         };
-        if part.is_empty() {
-            Win::Nothing
-        } else {
-            Win::Part(part)
-        }
+        Win::of(part)
     }
 
     /// Whether the words alone decide the winner in a node.
@@ -87,15 +79,10 @@ impl Solver<'_, '_, '_> {
     /// Where the goal holds, or where the target is, in a node that is neither a goal nor broken as
     /// a whole.
     pub(in crate::game) fn goal(&self, node: u32) -> Federation {
-        let dimension = self.graph.dimension();
         if let Some(targets) = &self.sought.targets {
-            return match &targets[node as usize] {
-                Win::Nothing => Federation::empty(dimension),
-                Win::Everything => self.whole(node),
-                Win::Part(part) => part.clone(),
-            };
+            return self.federation_of(node, &targets[node as usize]);
         }
-        let none = || Federation::empty(dimension);
+        let none = || Federation::empty(self.graph.dimension());
         if self.sought.after_goal == AfterGoal::IsLikeBefore {
             return none();
         }

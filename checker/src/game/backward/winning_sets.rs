@@ -163,6 +163,15 @@ impl WinningSets {
 }
 
 impl Win {
+    /// A part that is not everything.
+    pub(in crate::game) fn of(part: Federation) -> Win {
+        if part.is_empty() {
+            Win::Nothing
+        } else {
+            Win::Part(part)
+        }
+    }
+
     /// The bytes that it takes, without the value itself.
     pub(super) fn heap_bytes(&self) -> u64 {
         match self {

@@ -4,7 +4,7 @@ use crate::network::Failure;
 
 use crate::game::AfterGoal;
 use crate::game::backward::winning_sets::Win;
-use crate::game::forward::node::{Edge, NONE, Standing};
+use crate::game::forward::node::{Edge, Standing};
 use crate::game::solver::Solver;
 
 impl Solver<'_, '_, '_> {
@@ -69,7 +69,7 @@ impl Solver<'_, '_, '_> {
     /// If more of a node may be won, moves forward in the list the nodes that the evader may move
     /// to from there.
     pub(in crate::game) fn note_spoilers(&mut self, node: u32) {
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let mut edges = self.graph.edges_from(node).iter();
         if edges.all(|edge| matches!(self.won.win[edge.target as usize], Win::Nothing)) {
             return;
         }
@@ -106,23 +106,14 @@ impl Solver<'_, '_, '_> {
 
     /// A predecessor that is not won everywhere yet.
     fn open_predecessor(&self, node: u32) -> Option<u32> {
-        let mut edge = self.graph.nodes[node as usize].first_in;
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.graph.edges[edge as usize];
-            let may_win = self.may_win(source);
-            if may_win && !matches!(self.won.win[source as usize], Win::Everything) {
-                return Some(source);
-            }
-            edge = next_in;
-        }
-        None
+        let mut sources = self.graph.edges_into(node).map(|edge| edge.source);
+        sources.find(|&source| {
+            self.may_win(source) && !matches!(self.won.win[source as usize], Win::Everything)
+        })
     }
 
     fn has_one_predecessor(&self, node: u32) -> bool {
-        let edge = self.graph.nodes[node as usize].first_in;
-        edge != NONE && self.graph.edges[edge as usize].next_in == NONE
+        self.graph.edges_into(node).take(2).count() == 1
     }
 
     /// What the parts do when a node was updated and is not won as a whole.

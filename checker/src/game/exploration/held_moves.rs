@@ -15,7 +15,7 @@ pub(in crate::game) enum Hold {
 #[derive(Debug, Default)]
 pub(in crate::game) struct HeldMoves {
     /// For each edge; edges after the last entry are not held.
-    pub(super) holds: Vec<Hold>,
+    pub(in crate::game) holds: Vec<Hold>,
     /// For each node: the processes that take part in the moves by which the seeker wins a part of
     /// it, as in [`Edge::movers`].
     pub(in crate::game) attackers: Vec<u32>,
@@ -24,7 +24,7 @@ pub(in crate::game) struct HeldMoves {
     /// The number of edges at which hubs are counted again.
     pub(super) next_count: usize,
     /// Nodes that were undefended at their last computation, and others.
-    pub(super) undefended: Vec<u32>,
+    pub(in crate::game) undefended: Vec<u32>,
     /// Whether weak moves are used too.
     pub(in crate::game) uses_weak: bool,
 }
@@ -63,20 +63,5 @@ impl HeldMoves {
     /// Makes room for one more node that nobody attacks.
     pub(in crate::game) fn add_node(&mut self) {
         self.attackers.push(0);
-    }
-
-    /// Takes out the held moves, so that for a while nothing is held back.
-    pub(in crate::game) fn take_held_moves(&mut self) -> Vec<Hold> {
-        std::mem::take(&mut self.holds)
-    }
-
-    /// Puts back what was taken out.
-    pub(in crate::game) fn restore_held_moves(&mut self, holds: Vec<Hold>) {
-        self.holds = holds;
-    }
-
-    /// Whether some node may be undefended.
-    pub(in crate::game) fn is_undefended(&self) -> bool {
-        !self.undefended.is_empty()
     }
 }

@@ -130,7 +130,7 @@ impl Solver<'_, '_, '_> {
 
     /// The processes that take part in winning moves of the seeker, or in its win after them.
     fn attack(&self, node: u32, win: &[Win], attackers: &[u32]) -> u32 {
-        let edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let edges = self.graph.edges_from(node).iter();
         let winning = edges.filter(|edge| {
             self.seeker.owns(edge.controllable)
                 && !matches!(win[edge.target as usize], Win::Nothing)

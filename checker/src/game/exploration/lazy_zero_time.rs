@@ -60,7 +60,7 @@ impl Solver<'_, '_, '_> {
     /// Where the evader must move from a node in which time does not pass: to the first node that
     /// is not won anywhere.
     fn chosen(&self, node: u32) -> Option<u32> {
-        let mut edges = self.graph.edges[self.graph.edges_of(node)].iter();
+        let mut edges = self.graph.edges_from(node).iter();
         let open = edges.find(|edge| {
             self.is_evasion(edge)
                 && edge.is_total

@@ -14,15 +14,11 @@ pub(super) mod held_moves;
 pub(super) mod lazy_safety;
 pub(super) mod lazy_zero_time;
 pub(super) mod next;
-pub(super) mod reserve;
-pub(super) mod schedule;
 pub(super) mod waiting;
 
 use crate::search::limits::StopReason;
 
 use held_moves::HeldMoves;
-use reserve::Reserve;
-use schedule::Schedule;
 use waiting::WaitingList;
 
 /// What is explored, and what is not.
@@ -46,22 +42,60 @@ pub(super) struct Exploration {
 impl Exploration {
     /// The bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
-        self.waiting.bytes() + self.reserve.bytes() + self.held.bytes() + self.may_win.len()
+        let marks = self.reserve.sources.len() + self.may_win.len();
+        self.waiting.bytes() + self.held.bytes() + marks
     }
 
     /// Makes room for one more node, which does not wait.
     pub(super) fn add_node(&mut self) {
         self.waiting.add_node();
-        self.reserve.add_node();
+        self.reserve.sources.push(false);
         self.held.add_node();
     }
 
     /// Forgets all nodes; they must be added again.
     pub(super) fn forget_nodes(&mut self) {
         self.waiting.forget_nodes();
-        self.reserve.forget_nodes();
+        self.reserve.sources.clear();
         self.held.forget_nodes();
     }
+}
+
+/// The nodes from which some moves of the evader are kept in reserve: see [`lazy_zero_time`].
+#[derive(Debug, Default)]
+pub(in crate::game) struct Reserve {
+    /// Whether anything more is to be kept.
+    pub(in crate::game) is_kept: bool,
+    /// Whether anything was ever kept.
+    pub(in crate::game) is_used: bool,
+    /// For each node: whether it leads to something in reserve.
+    sources: Vec<bool>,
+    /// The number of nodes that were visited to find those in play.
+    looks: u64,
+}
+
+/// When prospects are computed: see [`crate::game::backward::losing_timed`].
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::game) struct Schedule {
+    /// The number of explored states at which they are computed again.
+    pub(in crate::game) next: u64,
+    /// The factor by which that number grows the next time.
+    pub(in crate::game) growth: u64,
+    /// Whether they are computed now, instead of what is won.
+    pub(in crate::game) is_running: bool,
+}
+
+/// How the game continues.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::game) enum LookAhead {
+    /// The seeker cannot win any more.
+    EvaderWins,
+    /// It may win, and the evader uses more of its moves.
+    Open,
+    /// What it may win does not depend on any held move.
+    Settled,
+    /// A limit came first.
+    Stopped(StopReason),
 }
 
 /// What was done in this turn of the solver before it explores.

@@ -3,8 +3,7 @@
 use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
 
-use super::schedule::LookAhead;
-use super::{Next, Turn};
+use super::{LookAhead, Next, Turn};
 use crate::game::Extent;
 use crate::game::solver::Solver;
 

@@ -157,12 +157,9 @@ impl ChainCache {
     }
 }
 
-/// Whether locations alone decide where a predicate holds.
+/// Whether the locations alone decide a predicate.
 fn depends_on_locations(predicate: &Predicate) -> bool {
-    match predicate {
-        Predicate::Constant(_) | Predicate::Location(..) => true,
-        Predicate::Data(_) | Predicate::Clock(_) | Predicate::Deadlock => false,
-        Predicate::Not(inner) => depends_on_locations(inner),
-        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().all(depends_on_locations),
-    }
+    let is_of_locations =
+        |leaf: &Predicate| matches!(leaf, Predicate::Constant(_) | Predicate::Location(..));
+    predicate.leaves().into_iter().all(is_of_locations)
 }

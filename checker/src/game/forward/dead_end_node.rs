@@ -6,7 +6,7 @@ use crate::zones::Zone;
 use super::clock_programs::ProgramId;
 use super::dead_ends::DeadEnds;
 use super::graph::Graph;
-use super::node::{Edge, NONE, Origin, Standing};
+use super::node::{Origin, Standing};
 
 impl Graph<'_, '_> {
     /// Adds an edge of `length` moves to the node of all dead ends.
@@ -31,18 +31,10 @@ impl Graph<'_, '_> {
     /// expanded again.
     pub(in crate::game) fn take_dead_ends(&mut self) -> Result<Vec<u32>, Failure> {
         let DeadEnds { node, .. } = std::mem::take(&mut self.dead_ends);
-        let mut edge = node.map_or(NONE, |node| self.nodes[node as usize].first_in);
-        let mut sources = Vec::new();
-        while edge != NONE {
-            let Edge {
-                source, next_in, ..
-            } = self.edges[edge as usize];
-            // The edges of a node into the same target are successive.
-            if sources.last() != Some(&source) {
-                sources.push(source);
-            }
-            edge = next_in;
-        }
+        let edges = node.into_iter().flat_map(|node| self.edges_into(node));
+        let mut sources: Vec<u32> = edges.map(|edge| edge.source).collect();
+        // The edges of a node into the same target are successive.
+        sources.dedup();
         if self.nodes[0].standing == Standing::Dead {
             self.reevaluate(0)?;
             sources.push(0);

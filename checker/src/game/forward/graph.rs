@@ -250,10 +250,28 @@ impl<'s, 'a> Graph<'s, 'a> {
         self.store.load(self.nodes[node as usize].discrete, words);
     }
 
+    /// The words of a node.
+    pub fn words_of(&self, node: u32) -> Vec<i32> {
+        self.store.words(self.nodes[node as usize].discrete)
+    }
+
     /// The edges of an expanded node.
     pub fn edges_of(&self, node: u32) -> std::ops::Range<usize> {
         let (first, last) = self.nodes[node as usize].edges;
         first as usize..last as usize
+    }
+
+    /// The edges of a node.
+    pub fn edges_from(&self, node: u32) -> &[Edge] {
+        &self.edges[self.edges_of(node)]
+    }
+
+    /// The edges into a node, the last one first.
+    pub fn edges_into(&self, node: u32) -> impl Iterator<Item = &Edge> {
+        // There is none beyond the list.
+        let edge = |index: u32| self.edges.get(index as usize);
+        let last = edge(self.nodes[node as usize].first_in);
+        std::iter::successors(last, move |one| edge(one.next_in))
     }
 
     /// How time is stopped in a node; `None` if nothing stops it for only some clock values.

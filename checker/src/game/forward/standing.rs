@@ -11,8 +11,7 @@ use super::urgent_nodes::Urgent;
 impl Graph<'_, '_> {
     /// Evaluates the objective in a node again.
     pub(super) fn reevaluate(&mut self, node: u32) -> Result<(), Failure> {
-        let mut words = self.words.clone();
-        self.load(node, &mut words);
+        let mut words = self.words_of(node);
         let zone = Zone::from_bounds(self.dimension(), self.zone(node));
         let urgent = self.urgent.remove(&node);
         let standing = self.standing(node, &mut words, &zone, urgent.as_ref())?;
@@ -40,8 +39,8 @@ impl Graph<'_, '_> {
             (goal, keep) => {
                 let dimension = self.dimension();
                 let goal = goal.to_federation(zone.bounds(), dimension);
-                let mut broken = Federation::of_zone(dimension, zone.bounds());
-                broken.subtract(&keep.to_federation(zone.bounds(), dimension));
+                let mut broken = Federation::of_zone(dimension, zone.bounds())
+                    .minus(&keep.to_federation(zone.bounds(), dimension));
                 broken.subtract(&goal);
                 let mut goal = goal;
                 if let Some(urgent) = urgent {

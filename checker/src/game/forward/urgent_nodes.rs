@@ -68,10 +68,7 @@ impl Urgent {
             ..Barriers::none(dimension)
         };
         let reached = future::successors(&from, &nothing, &barriers).intersection(&self.reached);
-        let zones = reached.zones();
-        zones
-            .map(|zone| Zone::from_bounds(dimension, zone))
-            .collect()
+        reached.to_zones().collect()
     }
 
     /// The safe timed predecessors of `good` with respect to `bad`, where something stops time in
@@ -80,24 +77,19 @@ impl Urgent {
     /// moment, moments as early as one likes are.
     pub(in crate::game) fn predecessors(&self, good: &Federation, bad: &Federation) -> Federation {
         let stops = self.stops();
-        let mut now = good.clone();
-        now.subtract(bad);
-        let mut running = self.reached.clone();
-        running.subtract(&stops);
+        let now = good.clone().minus(bad);
+        let running = self.reached.clone().minus(&stops);
         let first = instants::after(&running, &ClockSet::EMPTY);
         let entered = now.intersection(&stops);
         let entered = entered.intersection(&first);
-        let mut soon = now.intersection(&self.obliged);
-        soon.subtract(&self.channel);
+        let soon = now.intersection(&self.obliged).minus(&self.channel);
         let mut sooner = instants::before(&soon, &ClockSet::EMPTY);
         sooner = sooner.intersection(&running);
         sooner.subtract(bad);
-        let mut ends = now.clone();
-        ends.subtract(&stops);
+        let mut ends = now.clone().minus(&stops);
         ends.unite(&entered);
         ends.unite(&sooner);
-        let mut barred = stops;
-        barred.subtract(&entered);
+        let mut barred = stops.minus(&entered);
         barred.unite(bad);
         let mut all = past::predecessors(&ends, &barred, &ClockSet::EMPTY);
         all.unite(&now);

@@ -134,19 +134,7 @@ fn unbroken(solver: &Solver<'_, '_, '_>, node: u32) -> Win {
     match solver.graph.nodes[node as usize].standing {
         Standing::Broken | Standing::Dead => Win::Nothing,
         Standing::Open | Standing::Goal => Win::Everything,
-        Standing::Mixed => {
-            let mut rest = solver.whole(node);
-            rest.subtract(&solver.broken(node));
-            as_win(rest)
-        }
-    }
-}
-
-fn as_win(part: Federation) -> Win {
-    if part.is_empty() {
-        Win::Nothing
-    } else {
-        Win::Part(part)
+        Standing::Mixed => Win::of(solver.whole(node).minus(&solver.broken(node))),
     }
 }
 
@@ -167,19 +155,16 @@ fn target(solver: &mut Solver<'_, '_, '_>, node: u32, kept: &[Win]) -> Result<Wi
     let mut goal = match solver.graph.nodes[node as usize].standing {
         Standing::Open | Standing::Broken | Standing::Dead => return Ok(Win::Nothing),
         Standing::Goal => solver.whole(node),
-        Standing::Mixed => {
-            let parts = solver.graph.parts(node);
-            parts.map_or_else(
-                || Federation::empty(solver.graph.dimension()),
-                |parts| parts.goal.clone(),
-            )
-        }
+        Standing::Mixed => match solver.graph.parts(node) {
+            Some(parts) => parts.goal.clone(),
+            None => return Ok(Win::Nothing),
+        },
     };
     goal.subtract(&leave(solver, node, kept)?);
     if goal.includes_zone(solver.graph.zone(node)) {
         return Ok(Win::Everything);
     }
-    Ok(as_win(goal))
+    Ok(Win::of(goal))
 }
 
 /// The part of a node from which the controller cannot prevent play from leaving what is kept.
@@ -188,20 +173,19 @@ pub(in crate::game) fn leave(
     node: u32,
     kept: &[Win],
 ) -> Result<Federation, Failure> {
-    let mut out = solver.whole(node);
-    out.subtract(&solver.federation_of(node, &kept[node as usize]));
+    let mut out = solver
+        .whole(node)
+        .minus(&solver.federation_of(node, &kept[node as usize]));
     let mut back = Federation::empty(solver.graph.dimension());
-    for index in solver.graph.edges_of(node) {
-        let edge = solver.graph.edges[index];
+    for edge in solver.graph.edges_from(node) {
         let kept = &kept[edge.target as usize];
         if edge.is_leg {
             continue;
         }
         if edge.controllable {
-            back.unite(&solver.before(&edge, kept));
+            back.unite(&solver.before(edge, kept));
         } else {
-            let missing = solver.missing(&edge, kept, None);
-            out.unite(&missing);
+            out.unite(&solver.missing(edge, kept, None));
         }
     }
     for legs in solver.graph.branch_points.of(node) {
@@ -210,8 +194,7 @@ pub(in crate::game) fn leave(
     }
     back.subtract(&out);
     let situation = solver.situation(node)?;
-    let mut held = solver.forced_controller(node, &situation);
-    held.subtract(&back);
+    let held = solver.forced_controller(node, &situation).minus(&back);
     out.unite(&held);
     Ok(solver.safe_past(node, out, &back, &situation))
 }

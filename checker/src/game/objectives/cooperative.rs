@@ -62,8 +62,7 @@ impl Winning {
         parts.find_map(|(_, won)| {
             let mut part = won.clone();
             part.intersect_zone(zone.bounds());
-            let first = part.zones().next()?;
-            Some(Zone::from_bounds(zone.dimension(), first))
+            part.to_zones().next()
         })
     }
 

@@ -131,8 +131,8 @@ impl Explorer<'_, '_, '_> {
         };
         for (words, zones) in &knowledge.states {
             let place = self.places.at(self.symbolic, &self.question, words)?;
-            for zone in zones.zones() {
-                class.enter(&place, Zone::from_bounds(zones.dimension(), zone));
+            for zone in zones.to_zones() {
+                class.enter(&place, zone);
             }
         }
         let mut next = 0;
@@ -157,8 +157,7 @@ impl Explorer<'_, '_, '_> {
         let Some(cell) = place.cell(class.observation) else {
             return Ok(());
         };
-        let mut elsewhere = Federation::of_zone(from.dimension(), place.zone.bounds());
-        elsewhere.subtract(cell);
+        let elsewhere = Federation::of_zone(from.dimension(), place.zone.bounds()).minus(cell);
         let free = passing(&place, &from, &elsewhere);
         let own = self.enabled(&place, &free, |one| one == Some(class.action))?;
         let mut stops = elsewhere;
@@ -222,8 +221,7 @@ impl Explorer<'_, '_, '_> {
         inside: &Federation,
         own: &Federation,
     ) -> Result<bool, Failure> {
-        let mut idle = inside.clone();
-        idle.subtract(own);
+        let idle = inside.clone().minus(own);
         if idle.is_empty() {
             return Ok(false);
         }
@@ -342,11 +340,7 @@ impl Explorer<'_, '_, '_> {
     }
 
     fn extrapolated(&mut self, place: &Place, part: &Federation) -> Vec<Zone> {
-        let dimension = part.dimension();
-        let zones = part.zones();
-        let mut zones: Vec<Zone> = zones
-            .map(|zone| Zone::from_bounds(dimension, zone))
-            .collect();
+        let mut zones = part.to_zones().collect();
         self.symbolic.extrapolate_all(&place.words, &mut zones);
         zones
     }
@@ -401,12 +395,9 @@ fn may_wait_for_ever(idle: &Federation) -> bool {
     if dimension > 1 && idle.zones().all(is_bounded) {
         return false;
     }
-    let mut ends = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
-    ends.subtract(idle);
+    let mut ends = idle.complement();
     ends.down(&ClockSet::EMPTY);
-    let mut staying = idle.clone();
-    staying.subtract(&ends);
-    !staying.is_empty()
+    !idle.is_subset(&ends)
 }
 
 /// Whether a graph has a cycle.

@@ -3,7 +3,7 @@
 //! Invariant: the discrete states are in ascending order, and no federation is empty.
 
 use std::collections::BTreeMap;
-use std::hash::{Hash, Hasher};
+use std::hash::{BuildHasher, Hash, Hasher};
 use std::sync::Arc;
 
 use crate::zones::{Bound, Federation, dbm};
@@ -80,9 +80,7 @@ impl Knowledge {
     /// subsets.
     pub(super) fn signature(&self) -> u64 {
         self.states.keys().fold(0, |bits, words| {
-            let mut hasher = rustc_hash::FxHasher::default();
-            words.hash(&mut hasher);
-            bits | 1 << (hasher.finish() >> 58)
+            bits | 1 << (rustc_hash::FxBuildHasher.hash_one(words) >> 58)
         })
     }
 

@@ -31,9 +31,8 @@ impl Action {
         if !one.controllable {
             return None;
         }
-        let first = &one.parts[0];
-        let edge = &network.processes[first.process as usize].edges[first.edge as usize];
-        let has_channels = edge.leg.as_ref().is_some_and(|leg| !leg.follows_sync);
+        let leg = network.edge(one.parts[0]).leg.as_ref();
+        let has_channels = leg.is_some_and(|leg| !leg.follows_sync);
         Some(match one.channel {
             Some(channel) if !has_channels => Action::Channel(channel),
             _ => {

@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 use rustc_hash::FxHashMap;
 
-use crate::network::{ClockEffect, Extent, Failure, Moves, Symbolic};
+use crate::network::{ClockEffect, Failure, Moves, Symbolic};
 use crate::zones::{Federation, Zone};
 
 use super::knowledge::Observation;
@@ -91,21 +91,18 @@ impl Place {
         let invariant = symbolic.invariant(&mut scratch)?.unwrap_or_default();
         let zone = Zone::of_constraints(dimension, &invariant);
         let goal = match question.goal {
-            Some(goal) => symbolic.extent(goal, &mut scratch, zone.bounds())?,
-            None => Extent::Nowhere,
+            Some(goal) => symbolic.part(goal, &mut scratch, &zone)?,
+            None => Federation::empty(dimension),
         };
-        let goal = goal.to_federation(zone.bounds(), dimension);
         let mut broken = Federation::empty(dimension);
         if let Some(keep) = question.keep {
             broken.push(zone.bounds());
-            let kept = symbolic.extent(keep, &mut scratch, zone.bounds())?;
-            broken.subtract(&kept.to_federation(zone.bounds(), dimension));
+            broken.subtract(&symbolic.part(keep, &mut scratch, &zone)?);
             broken.subtract(&goal);
         }
         let mut cells = vec![(Vec::new(), Federation::of_zone(dimension, zone.bounds()))];
         for predicate in question.observations {
-            let holds = symbolic.extent(predicate, &mut scratch, zone.bounds())?;
-            let holds = holds.to_federation(zone.bounds(), dimension);
+            let holds = symbolic.part(predicate, &mut scratch, &zone)?;
             cells = cells
                 .into_iter()
                 .flat_map(|(values, part)| halves(&values, part, &holds))
@@ -184,8 +181,6 @@ impl Place {
 /// The part of a cell in which another predicate does not hold, and the part in which it holds.
 fn halves(values: &[bool], part: Federation, holds: &Federation) -> [(Vec<bool>, Federation); 2] {
     let inside = part.intersection(holds);
-    let mut outside = part;
-    outside.subtract(holds);
     let with = |value: bool| values.iter().copied().chain([value]).collect();
-    [(with(false), outside), (with(true), inside)]
+    [(with(false), part.minus(holds)), (with(true), inside)]
 }

@@ -5,10 +5,10 @@ use crate::network::Failure;
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::{ClockSet, Federation};
 
-use super::chains::{Inner, walk};
+use super::chains::Inner;
 use super::extraction::{Choices, Chooser, Extracted, extract as extracted, moves_of, named};
 use super::safety::Evading;
-use super::{Decision, Selection, Strategy, StrategyState, decide};
+use super::{Decision, Selection, Strategy, decide};
 use crate::game::Player;
 use crate::game::backward::winning_sets::{Gain, Win};
 use crate::game::forward::node::Edge;
@@ -22,12 +22,7 @@ pub fn extract(
     solver: &mut Solver<'_, '_, '_>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    let owner = if solver.is_won() {
-        solver.seeker
-    } else {
-        solver.seeker.opponent()
-    };
-    extract_from(solver, owner, vec![0], watch)
+    extract_from(solver, solver.winner(), vec![0], watch)
 }
 
 /// Reads the strategy of a player who wins from these nodes of a solved game.
@@ -41,10 +36,16 @@ pub fn extract_from(
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
     if owner != solver.seeker {
-        let result = extracted(solver, &Evading { owner }, waiting, watch)?;
+        let selection = match owner {
+            Player::Controller => Selection::Any,
+            Player::Environment => Selection::First,
+        };
+        let strategy = Strategy::empty(owner, selection);
+        let result = extracted(solver, &Evading, strategy, waiting, watch)?;
         return Ok(result.map(|all| all.strategy));
     }
-    let result = extracted(solver, &Seeking { owner }, waiting, watch)?;
+    let strategy = Strategy::empty(owner, Selection::First);
+    let result = extracted(solver, &Seeking, strategy, waiting, watch)?;
     Ok(result.map(|mut all| {
         rank_chains(&mut all);
         all.strategy
@@ -52,22 +53,12 @@ pub fn extract_from(
 }
 
 /// How the seeker chooses.
-struct Seeking {
-    owner: Player,
-}
+struct Seeking;
 
 impl Chooser for Seeking {
-    fn owner(&self) -> Player {
-        self.owner
-    }
-
-    fn selection(&self) -> Selection {
-        Selection::First
-    }
-
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
-        if self.is_over(solver, node) {
+        if solver.is_over(solver.seeker, node) {
             return Ok(chosen);
         }
         for gain in &solver.won.gains[node as usize].clone() {
@@ -117,11 +108,10 @@ impl Chooser for Seeking {
     /// Elsewhere the strategy waits.
     fn inside(
         &self,
-        solver: &mut Solver<'_, '_, '_>,
+        solver: &Solver<'_, '_, '_>,
         edge: &Edge,
-        source: &[i32],
-    ) -> Result<Vec<StrategyState>, Failure> {
-        let inside = walk(solver, edge, source)?;
+        inside: &[Inner],
+    ) -> Vec<Vec<Decision>> {
         let is_own = |inner: &Inner| solver.seeker.owns(inner.controllable);
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
         for gain in &solver.won.gains[edge.target as usize] {
@@ -138,10 +128,7 @@ impl Chooser for Seeking {
                 }
             }
         }
-        let states = inside.into_iter().zip(decisions);
-        Ok(states
-            .map(|(inner, decisions)| inner.with(decisions))
-            .collect())
+        decisions
     }
 }
 

@@ -47,8 +47,7 @@ impl Inner {
             won.down(&ClockSet::EMPTY);
             won.constrain_all(&self.invariant);
         }
-        let mut lost = Federation::of_zone(won.dimension(), zone.bounds());
-        lost.subtract(won);
+        let lost = Federation::of_zone(won.dimension(), zone.bounds()).minus(won);
         (acting, lost)
     }
 }
@@ -59,11 +58,14 @@ pub(super) fn walk(
     edge: &Edge,
     source: &[i32],
 ) -> Result<Vec<Inner>, Failure> {
+    let mut inside = Vec::new();
+    if edge.length == 1 {
+        return Ok(inside);
+    }
     let symbolic = &mut *solver.graph.symbolic;
     let mut words = source.to_vec();
     let mut moves = Moves::default();
     symbolic.remembered_moves(&mut words, &mut moves)?;
-    let mut inside = Vec::new();
     let Some(first) = symbolic.fire(moves.get(edge.ordinal as usize), &mut words)? else {
         return Ok(inside);
     };

@@ -7,7 +7,7 @@
 //! the closed loop contains every run of every player that follows the strategy.
 
 use crate::cancellation;
-use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
+use crate::ir::{ClockAtom, ClockId, FixedConstraint, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
 use crate::search::StateStore;
 use crate::zones::future::Barriers;
@@ -182,8 +182,7 @@ fn allowed(network: &Network, joined: &Joined<'_>, owner: Player, selection: Sel
             Some(one) => _ = one.1.unite(&part),
             None => moves.push((parts.clone(), part.clone())),
         }
-        let mut stop = part;
-        stop.subtract(&waiting);
+        let stop = part.minus(&waiting);
         barriers.stops.unite(&stop);
         if stop.zones().any(|zone| has_open_side(zone, dimension)) {
             barriers.open.push(stop);
@@ -191,8 +190,7 @@ fn allowed(network: &Network, joined: &Joined<'_>, owner: Player, selection: Sel
     }
     decided.reduce();
     let forbidden = moves.into_iter().map(|(parts, here)| {
-        let mut forbidden = decided.clone();
-        forbidden.subtract(&here);
+        let mut forbidden = decided.clone().minus(&here);
         forbidden.reduce();
         (parts, forbidden)
     });
@@ -232,15 +230,10 @@ fn collect_atoms(zones: &Federation, atoms: &mut Vec<ClockAtom>) {
 }
 
 fn atom(left: usize, right: usize, bound: Bound) -> ClockAtom {
-    let clock = |index: usize| ClockRange {
-        first: ClockId(index as u32),
-        count: 1,
-    };
-    ClockAtom {
-        left: clock(left),
-        right: clock(right),
-        low: bound.value(),
-        high: bound.value(),
+    ClockAtom::from(FixedConstraint {
+        left: ClockId(left as u32),
+        right: ClockId(right as u32),
+        bound: bound.value(),
         strict: bound.is_strict(),
-    }
+    })
 }

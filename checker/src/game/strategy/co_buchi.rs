@@ -20,9 +20,9 @@ use crate::network::{Failure, Part};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
-use super::chains::walk;
+use super::chains::Inner;
 use super::extraction::{self, Choices, Chooser, moves_of};
-use super::{Decision, Selection, Strategy, StrategyState, decide};
+use super::{Decision, Selection, Strategy, decide};
 use crate::game::Player;
 use crate::game::backward::winning_sets::Win;
 use crate::game::forward::node::{Edge, Standing};
@@ -40,7 +40,8 @@ pub fn extract(
     waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    let result = extraction::extract(solver, &Denying { rounds }, waiting, watch)?;
+    let strategy = Strategy::empty(Player::Environment, Selection::First);
+    let result = extraction::extract(solver, &Denying { rounds }, strategy, waiting, watch)?;
     Ok(result.map(|all| all.strategy))
 }
 
@@ -50,14 +51,6 @@ struct Denying<'r> {
 }
 
 impl Chooser for Denying<'_> {
-    fn owner(&self) -> Player {
-        Player::Environment
-    }
-
-    fn selection(&self) -> Selection {
-        Selection::First
-    }
-
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
         let moves = moves_of(solver, node)?;
@@ -70,8 +63,7 @@ impl Chooser for Denying<'_> {
             }
             let leaving = leave(solver, node, before)?;
             let leaving = leaving.intersection(&lost);
-            let mut evading = lost.clone();
-            evading.subtract(&leaving);
+            let evading = lost.clone().minus(&leaving);
             for (part, kept) in [(leaving, before), (evading, &self.rounds[after])] {
                 let mut waiting = part.clone();
                 for index in solver.graph.edges_of(node) {
@@ -113,11 +105,10 @@ impl Chooser for Denying<'_> {
     /// chain does not lead into what is kept.
     fn inside(
         &self,
-        solver: &mut Solver<'_, '_, '_>,
+        solver: &Solver<'_, '_, '_>,
         edge: &Edge,
-        source: &[i32],
-    ) -> Result<Vec<StrategyState>, Failure> {
-        let inside = walk(solver, edge, source)?;
+        inside: &[Inner],
+    ) -> Vec<Vec<Decision>> {
         let dimension = solver.graph.dimension();
         let mut decisions: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
         // The parts that the rounds have taken away until now.
@@ -135,13 +126,10 @@ impl Chooser for Denying<'_> {
                 push(&mut decisions[index], rank, lost, None);
             }
         }
-        let states = inside.into_iter().zip(decisions);
-        Ok(states
-            .map(|(inner, decisions)| inner.with(decisions))
-            .collect())
+        decisions
     }
 
-    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, _: Player, node: u32) -> bool {
         solver.graph.nodes[node as usize].standing == Standing::Broken
     }
 }

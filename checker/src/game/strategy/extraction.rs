@@ -5,33 +5,28 @@ use crate::network::{Failure, Moves, Part, entry_of};
 use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
-use super::{Decision, Selection, Strategy, StrategyState};
+use super::chains::{Inner, walk};
+use super::{Decision, Strategy, StrategyState};
 use crate::game::Player;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
 
 /// The choices of the player whose strategy is read.
 pub(super) trait Chooser {
-    /// The player.
-    fn owner(&self) -> Player;
-
-    /// How a move is selected where the strategy allows several.
-    fn selection(&self) -> Selection;
-
     /// What is chosen in a node.
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure>;
 
-    /// What is done in the states inside the chain of an edge, in order.
+    /// What is done in the states inside the chain of an edge.
     fn inside(
         &self,
-        solver: &mut Solver<'_, '_, '_>,
+        solver: &Solver<'_, '_, '_>,
         edge: &Edge,
-        source: &[i32],
-    ) -> Result<Vec<StrategyState>, Failure>;
+        inside: &[Inner],
+    ) -> Vec<Vec<Decision>>;
 
-    /// Whether play has ended in a node and is won, for all clock values.
-    fn is_over(&self, solver: &Solver<'_, '_, '_>, node: u32) -> bool {
-        solver.is_over(self.owner(), node)
+    /// Whether play has ended in a node and the owner has won, for all clock values.
+    fn is_over(&self, solver: &Solver<'_, '_, '_>, owner: Player, node: u32) -> bool {
+        solver.is_over(owner, node)
     }
 }
 
@@ -73,20 +68,20 @@ pub(super) struct Extracted {
     pub(super) steps_to_end: Vec<u32>,
 }
 
-/// Reads the strategy of a player who wins from these nodes.
+/// Reads the strategy of a player who wins from these nodes into one that is empty.
 ///
 /// # Errors
 /// The model fails in a state of it. An error of the inner result says why it was not finished.
 pub(super) fn extract(
     solver: &mut Solver<'_, '_, '_>,
     chooser: &dyn Chooser,
+    mut strategy: Strategy,
     mut waiting: Vec<u32>,
     watch: &mut dyn Watch,
 ) -> Result<Result<Extracted, StopReason>, Failure> {
     if let Some(reason) = solver.tell(watch) {
         return Ok(Err(reason));
     }
-    let mut strategy = Strategy::empty(chooser.owner(), chooser.selection());
     let mut steps_to_end = Vec::new();
     let mut bytes = 0;
     let mut seen = vec![false; solver.graph.nodes.len()];
@@ -95,8 +90,7 @@ pub(super) fn extract(
     }
     while let Some(node) = waiting.pop() {
         let known = strategy.states.len();
-        let mut words = solver.graph.symbolic.stepper.network().initial.clone();
-        solver.graph.load(node, &mut words);
+        let words = solver.graph.words_of(node);
         let Choices {
             decisions,
             legs,
@@ -106,13 +100,17 @@ pub(super) fn extract(
             words: words.clone(),
             decisions,
             legs,
-            is_goal: chooser.is_over(solver, node),
+            is_goal: chooser.is_over(solver, strategy.owner, node),
         });
         steps_to_end.push(0);
         for edge in taken {
             let edge = solver.graph.edges[edge as usize];
-            let mut inside = chooser.inside(solver, &edge, &words)?;
-            if chooser.owner() == Player::Controller {
+            let inside = walk(solver, &edge, &words)?;
+            let decisions = chooser.inside(solver, &edge, &inside);
+            let inside = inside.into_iter().zip(decisions);
+            let inside = inside.map(|(inner, decisions)| inner.with(decisions));
+            let mut inside: Vec<StrategyState> = inside.collect();
+            if strategy.owner == Player::Controller {
                 name_entries(solver, &mut inside);
             }
             steps_to_end.extend((1..=inside.len() as u32).rev());
@@ -156,8 +154,7 @@ fn name_entries(solver: &Solver<'_, '_, '_>, inside: &mut [StrategyState]) {
 
 /// The moves of a node.
 pub(super) fn moves_of(solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Moves, Failure> {
-    let mut words = solver.graph.symbolic.stepper.network().initial.clone();
-    solver.graph.load(node, &mut words);
+    let mut words = solver.graph.words_of(node);
     let mut moves = Moves::default();
     solver
         .graph

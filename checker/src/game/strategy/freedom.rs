@@ -20,9 +20,10 @@ use crate::search::limits::{StopReason, Watch};
 use crate::zones::Federation;
 
 use super::attractor::{choose_moves, won_before};
+use super::chains::Inner;
 use super::extraction::{Choices, Chooser, extract as extracted};
 use super::safety::allowed_waiting;
-use super::{Selection, Strategy, StrategyState, decide};
+use super::{Decision, Selection, Strategy, decide};
 use crate::game::Player;
 use crate::game::forward::node::Edge;
 use crate::game::solver::Solver;
@@ -46,7 +47,8 @@ pub fn extract(
     freedom: Freedom,
     watch: &mut dyn Watch,
 ) -> Result<Result<Strategy, StopReason>, Failure> {
-    let result = extracted(solver, &Free(freedom), vec![0], watch)?;
+    let strategy = Strategy::empty(Player::Controller, Selection::Any);
+    let result = extracted(solver, &Free(freedom), strategy, vec![0], watch)?;
     Ok(result.map(|all| all.strategy))
 }
 
@@ -54,20 +56,13 @@ pub fn extract(
 struct Free(Freedom);
 
 impl Chooser for Free {
-    fn owner(&self) -> Player {
-        Player::Controller
-    }
-
-    fn selection(&self) -> Selection {
-        Selection::Any
-    }
-
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
         let goal = solver.goal(node);
-        let mut free = solver.federation_of(node, &solver.won.win[node as usize]);
-        free.subtract(&goal);
-        if self.is_over(solver, node) || free.is_empty() {
+        let free = solver
+            .federation_of(node, &solver.won.win[node as usize])
+            .minus(&goal);
+        if solver.is_over(Player::Controller, node) || free.is_empty() {
             return Ok(chosen);
         }
         match self.0 {
@@ -82,14 +77,9 @@ impl Chooser for Free {
         Ok(chosen)
     }
 
-    fn inside(
-        &self,
-        _: &mut Solver<'_, '_, '_>,
-        edge: &Edge,
-        _: &[i32],
-    ) -> Result<Vec<StrategyState>, Failure> {
-        debug_assert_eq!(edge.length, 1, "the graph has no chains");
-        Ok(Vec::new())
+    fn inside(&self, _: &Solver<'_, '_, '_>, _: &Edge, inside: &[Inner]) -> Vec<Vec<Decision>> {
+        debug_assert!(inside.is_empty(), "the graph has no chains");
+        Vec::new()
     }
 }
 
@@ -106,8 +96,7 @@ fn choose_winning(
     };
     let mut rest = free.clone();
     choose_moves(solver, node, &mut rest, 0, Selection::Any, &won, chosen)?;
-    let mut acting = free.clone();
-    acting.subtract(&rest);
+    let acting = free.clone().minus(&rest);
     let safe = solver.federation_of(node, &solver.won.win[node as usize]);
     let mut waiting = allowed_waiting(solver, node, &safe, free, &acting)?;
     waiting.reduce();

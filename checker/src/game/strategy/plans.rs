@@ -42,7 +42,6 @@ pub struct Plans<'r, 'g, 's, 'a> {
 impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
     /// The plans of a solved game in which the environment has no choice.
     pub fn new(solver: &'r mut Solver<'g, 's, 'a>) -> Plans<'r, 'g, 's, 'a> {
-        let dimension = solver.graph.dimension();
         let mut plans = Plans {
             on_path: vec![false; solver.graph.nodes.len()],
             path: Vec::new(),
@@ -50,9 +49,8 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
             solver,
         };
         if !matches!(plans.solver.won.win[0], Win::Nothing) {
-            let zones = plans.solver.graph.whole(0);
-            let zones = zones.zones().map(|zone| Zone::from_bounds(dimension, zone));
-            plans.enter(0, zones.collect());
+            let zones = plans.solver.graph.whole(0).to_zones().collect();
+            plans.enter(0, zones);
         }
         plans
     }
@@ -121,8 +119,7 @@ impl<'r, 'g, 's, 'a> Plans<'r, 'g, 's, 'a> {
             .any(|zone| graph.symbolic.has_grown(zone.bounds()))
         {
             let graph = &mut *self.solver.graph;
-            let mut words = graph.symbolic.stepper.network().initial.clone();
-            graph.load(edge.target, &mut words);
+            let words = graph.words_of(edge.target);
             graph.symbolic.extrapolate_all(&words, &mut zones);
         }
         (!zones.is_empty()).then_some(zones)

@@ -8,34 +8,22 @@ use crate::network::Failure;
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, ClockSet, Federation, instants, past};
 
-use super::chains::walk;
+use super::chains::Inner;
 use super::extraction::{Choices, Chooser, moves_of, named};
-use super::{Selection, StrategyState, decide};
+use super::{Decision, decide};
 use crate::game::Player;
 use crate::game::forward::node::{Edge, Standing};
 use crate::game::solver::Solver;
 
 /// How the evader chooses.
-pub(super) struct Evading {
-    pub(super) owner: Player,
-}
+pub(super) struct Evading;
 
 impl Chooser for Evading {
-    fn owner(&self) -> Player {
-        self.owner
-    }
-
-    fn selection(&self) -> Selection {
-        match self.owner {
-            Player::Controller => Selection::Any,
-            Player::Environment => Selection::First,
-        }
-    }
-
     fn choices(&self, solver: &mut Solver<'_, '_, '_>, node: u32) -> Result<Choices, Failure> {
         let mut chosen = Choices::default();
-        let mut free = solver.federation_of(node, &solver.won.lost(node));
-        free.subtract(&ended(solver, node));
+        let mut free = solver
+            .federation_of(node, &solver.won.lost(node))
+            .minus(&ended(solver, node));
         if free.is_empty() {
             return Ok(chosen);
         }
@@ -95,24 +83,20 @@ impl Chooser for Evading {
     /// What the evader does in those states inside a chain in which the seeker does not win.
     fn inside(
         &self,
-        solver: &mut Solver<'_, '_, '_>,
+        solver: &Solver<'_, '_, '_>,
         edge: &Edge,
-        source: &[i32],
-    ) -> Result<Vec<StrategyState>, Failure> {
-        let inside = walk(solver, edge, source)?;
+        inside: &[Inner],
+    ) -> Vec<Vec<Decision>> {
         let mut won = solver.federation_of(edge.target, &solver.won.win[edge.target as usize]);
-        let mut states = Vec::new();
-        for inner in inside.into_iter().rev() {
+        let mut all: Vec<Vec<Decision>> = vec![Vec::new(); inside.len()];
+        for (inner, decisions) in inside.iter().zip(&mut all).rev() {
             let (acting, mut waiting) =
                 inner.evaded(&mut won, !solver.seeker.owns(inner.controllable));
             waiting.subtract(&acting);
-            let mut decisions = Vec::new();
-            decide(&mut decisions, acting, Some(inner.parts.clone()), 0);
-            decide(&mut decisions, waiting, None, 0);
-            states.push(inner.with(decisions));
+            decide(decisions, acting, Some(inner.parts.clone()), 0);
+            decide(decisions, waiting, None, 0);
         }
-        states.reverse();
-        Ok(states)
+        all
     }
 }
 
@@ -160,8 +144,7 @@ pub(super) fn allowed_waiting(
     }
     // The safe valuations may end in a limit that is not itself safe. Before such an end, the last
     // valuations with a move must use it.
-    let mut unsafe_ones = solver.whole(node);
-    unsafe_ones.subtract(safe);
+    let unsafe_ones = solver.whole(node).minus(safe);
     let after = instants::after(&passing, &stopped);
     let ends = unsafe_ones.intersection(&after);
     if !ends.is_empty() {
@@ -170,8 +153,7 @@ pub(super) fn allowed_waiting(
         others.subtract(&ends);
         let ending = shortly_before(&ends, &others, &stopped).intersection(safe);
         let mut last = ending.intersection(acting);
-        let mut later = ending;
-        later.subtract(acting);
+        let later = ending.minus(acting);
         let earlier = past::predecessors(&later, &unsafe_ones, &stopped);
         last.subtract(&earlier);
         // It may wait at the first moment of the stretch: there is time left.

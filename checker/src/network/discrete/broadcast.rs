@@ -9,8 +9,7 @@
 //! choice that is tried leads to a possible combination, or is the last one that is tried.
 
 use crate::cancellation;
-use crate::exec::EmittedConstraint;
-use crate::ir::Network;
+use crate::ir::{FixedConstraint, Network};
 
 use super::broadcast_filter::{Demand, Scope, Sending};
 use super::candidate::{Candidate, Choice, Group};
@@ -280,7 +279,7 @@ impl Stepper<'_> {
         }
     }
 
-    fn constraints_of(&self, candidate: u32) -> &[EmittedConstraint] {
+    fn constraints_of(&self, candidate: u32) -> &[FixedConstraint] {
         let (first, last) = self.candidates[candidate as usize].constraints;
         &self.constraints[first as usize..last as usize]
     }
@@ -290,7 +289,7 @@ impl Stepper<'_> {
 /// one.
 fn next_branches(network: &Network, parts: &mut [Part]) -> bool {
     for part in parts.iter_mut().rev() {
-        let edge = &network.processes[part.process as usize].edges[part.edge as usize];
+        let edge = network.edge(*part);
         if part.branch as usize + 1 < edge.branches.len() {
             part.branch += 1;
             return true;

@@ -7,7 +7,7 @@
 //! Invariant: what a scope leaves out is impossible or not wanted; what it accepts may still be
 //! impossible.
 
-use crate::exec::EmittedConstraint;
+use crate::ir::FixedConstraint;
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::{Bound, Federation};
 
@@ -40,10 +40,10 @@ pub(super) struct Sending<'z> {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Demand<'c> {
     /// It takes part by this edge instance, whose guard emitted the constraints.
-    Takes(Part, &'c [EmittedConstraint]),
+    Takes(Part, &'c [FixedConstraint]),
     /// This process abstains: the conjunction does not hold. Each of its candidates makes one such
     /// demand.
-    Abstains(u32, &'c [EmittedConstraint]),
+    Abstains(u32, &'c [FixedConstraint]),
 }
 
 /// Follows the choices of a combination under a scope. Holds the buffers.

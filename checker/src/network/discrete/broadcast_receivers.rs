@@ -51,7 +51,7 @@ impl Stepper<'_> {
         let (mut combinations, mut after) = (1_u64, 1_u64);
         for group in others.by_ref() {
             combinations = combinations.saturating_mul(group.picks());
-            after = after.saturating_mul(group.ways());
+            after = after.saturating_mul(group.ways);
         }
         let (rank_after, scope) = self.ranks_and_scope(combinations, after, sender.scope)?;
         self.chosen.clear();
@@ -81,7 +81,7 @@ impl Stepper<'_> {
             let audience = &mut self.audience;
             let place = audience.groups.iter();
             let place = place
-                .take_while(|group| audience.candidates[group.first()].process < receiver)
+                .take_while(|group| audience.candidates[group.first].process < receiver)
                 .count();
             let first = audience.candidates.len();
             let shift = audience.constraints.len() as u32;

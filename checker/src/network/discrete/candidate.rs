@@ -1,6 +1,6 @@
 //! The parts of moves: enabled edge instances, the receivers of a broadcast, and the participants.
 
-use crate::exec::EmittedConstraint;
+use crate::ir::FixedConstraint;
 
 use super::transition::Part;
 
@@ -53,19 +53,9 @@ pub(super) enum Choice {
 }
 
 impl Group {
-    /// The place of its first candidate.
-    pub(super) fn first(&self) -> usize {
-        self.first
-    }
-
     /// How many choices there are.
     pub(super) fn picks(&self) -> u64 {
         (self.end - self.first) as u64
-    }
-
-    /// The number of moves that its choices stand for.
-    pub(super) fn ways(&self) -> u64 {
-        self.ways
     }
 
     /// The same group for candidates that begin at another place.
@@ -104,7 +94,7 @@ pub(super) struct Audience {
     pub(super) channel: u32,
     /// The candidates with their constraints; the first candidate is a sender's.
     pub(super) candidates: Vec<Candidate>,
-    pub(super) constraints: Vec<EmittedConstraint>,
+    pub(super) constraints: Vec<FixedConstraint>,
     /// The groups of the receivers, in their order.
     pub(super) groups: Vec<Group>,
     /// The sender that was not asked what it receives.
@@ -114,6 +104,6 @@ pub(super) struct Audience {
 impl Audience {
     /// The process of a group.
     pub(super) fn process_of(&self, group: &Group) -> u32 {
-        self.candidates[group.first()].process
+        self.candidates[group.first].process
     }
 }

@@ -13,14 +13,13 @@
 //!   later is not remembered, nor are edges whose words seldom come again. That is judged by how
 //!   often each set was used and not in trials of states, as an edge has few sets or many.
 
-use std::hash::{Hash, Hasher};
+use std::hash::BuildHasher;
 use std::ops::Range;
 
 use hashbrown::HashTable;
-use rustc_hash::FxHasher;
+use rustc_hash::FxBuildHasher;
 
-use crate::exec::EmittedConstraint;
-use crate::ir::{Edge, Network};
+use crate::ir::{Edge, FixedConstraint, Network};
 
 use super::selects::select_count;
 use crate::analysis::function_reads::read_words;
@@ -57,12 +56,12 @@ pub(super) struct Set {
     /// The instances of a receiving edge by channel, then by select values; those of another edge
     /// by select values.
     pub(super) instances: Vec<Instance>,
-    constraints: Vec<EmittedConstraint>,
+    constraints: Vec<FixedConstraint>,
 }
 
 impl Set {
     /// Adds an instance.
-    pub(super) fn push(&mut self, channel: u32, select: u32, constraints: &[EmittedConstraint]) {
+    pub(super) fn push(&mut self, channel: u32, select: u32, constraints: &[FixedConstraint]) {
         let first = self.constraints.len() as u32;
         self.constraints.extend_from_slice(constraints);
         self.instances.push(Instance {
@@ -73,7 +72,7 @@ impl Set {
     }
 
     /// The clock constraints of an instance.
-    pub(super) fn constraints(&self, instance: Instance) -> &[EmittedConstraint] {
+    pub(super) fn constraints(&self, instance: Instance) -> &[FixedConstraint] {
         &self.constraints[instance.constraints.0 as usize..instance.constraints.1 as usize]
     }
 
@@ -288,9 +287,5 @@ fn deciding_words(network: &Network, edge: &Edge) -> Option<Vec<u32>> {
 }
 
 fn hash(key: &[i32]) -> u64 {
-    let mut hasher = FxHasher::default();
-    for &value in key {
-        value.hash(&mut hasher);
-    }
-    hasher.finish()
+    FxBuildHasher.hash_one(key)
 }

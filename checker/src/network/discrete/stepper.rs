@@ -13,8 +13,10 @@
 use std::ops::Range;
 
 use crate::cancellation;
-use crate::exec::{Context, EmittedAssignment, EmittedConstraint, Executor, RunTimeError};
-use crate::ir::{ChannelId, Edge, FunctionId, Network, RunTimeErrorKind, Update, Urgency};
+use crate::exec::{Context, EmittedAssignment, Executor, RunTimeError};
+use crate::ir::{
+    ChannelId, Edge, FixedConstraint, FunctionId, Network, RunTimeErrorKind, Update, Urgency,
+};
 
 use super::broadcast_filter::{BroadcastFilter, Scope};
 use super::candidate::{Audience, Candidate, Choice, Group};
@@ -24,7 +26,7 @@ use super::receivers::Receivers;
 use super::select_cache::Instances;
 use super::selects::select_values;
 use super::transition::{MoveListId, MoveRef, Moves, Part};
-use super::transition_cache::{Next, Record, TransitionCache, VectorId};
+use super::transition_cache::{Point, Record, TransitionCache, VectorId};
 use crate::network::failure::Failure;
 use crate::tuning::Tuning;
 
@@ -39,7 +41,7 @@ pub struct Stepper<'a> {
     pub(super) receivers: Receivers,
     /// Whether any channel is urgent.
     pub(super) has_urgent_channels: bool,
-    pub(super) constraints: Vec<EmittedConstraint>,
+    pub(super) constraints: Vec<FixedConstraint>,
     pub(super) assignments: Vec<EmittedAssignment>,
     pub(super) arguments: Vec<i32>,
     pub(super) candidates: Vec<Candidate>,
@@ -54,7 +56,7 @@ pub struct Stepper<'a> {
     pub(super) filter: BroadcastFilter,
     /// The receivers of the channel of the last broadcast, and the buffer for their constraints.
     pub(super) audience: Audience,
-    pub(super) heard: Vec<EmittedConstraint>,
+    pub(super) heard: Vec<FixedConstraint>,
     /// The cached enabled instances of edges.
     pub(super) instances: Instances,
     pub(super) partners: Partners,
@@ -183,7 +185,7 @@ impl<'a> Stepper<'a> {
 
     /// The edge of a part.
     pub fn edge(&self, part: Part) -> &'a Edge {
-        &self.network.processes[part.process as usize].edges[part.edge as usize]
+        self.network.edge(part)
     }
 
     /// Writes all moves of the state that the words allow into `out`.
@@ -250,31 +252,28 @@ impl<'a> Stepper<'a> {
 
     /// The moves of a state with this location vector, if they are in the cache.
     fn known_list(&mut self, vector: VectorId, words: &mut [i32]) -> Result<Found, Failure> {
-        let Some(mut way) = self.transitions.start(vector) else {
-            return Ok(Found::Nothing);
-        };
-        loop {
-            match self.transitions.next(way) {
-                Next::Moves(list) => return Ok(Found::Moves(list)),
-                Next::Ask(function, arguments) => {
-                    let mut context = Context {
-                        state: words,
-                        constraints: &mut self.constraints,
-                        assignments: &mut self.assignments,
-                    };
-                    match self.executor.call(function, arguments, &mut context) {
-                        Ok(answer) => self.transitions.answer(&mut way, answer),
-                        Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
-                            return Err(error.into());
-                        }
-                        // The moves are then made without the cache, which shows whether the
-                        // failure counts.
-                        Err(_) => return Ok(Found::Failure),
-                    }
+        let mut point = self.transitions.root(vector);
+        while let Some(Point::Ask(question)) = point {
+            let (function, arguments) = self.transitions.asked(question);
+            let mut context = Context {
+                state: words,
+                constraints: &mut self.constraints,
+                assignments: &mut self.assignments,
+            };
+            match self.executor.call(function, arguments, &mut context) {
+                Ok(answer) => point = self.transitions.after(question, answer),
+                Err(error) if error.kind == RunTimeErrorKind::Interrupted => {
+                    return Err(error.into());
                 }
-                Next::Unknown => return Ok(Found::Nothing),
+                // The moves are then made without the cache, which shows whether the failure
+                // counts.
+                Err(_) => return Ok(Found::Failure),
             }
         }
+        Ok(match point {
+            Some(Point::Moves(list)) => Found::Moves(list),
+            _ => Found::Nothing,
+        })
     }
 
     /// Makes the moves of a state with this location vector, and caches them if they do not depend
@@ -376,7 +375,7 @@ impl<'a> Stepper<'a> {
     pub fn invariants(
         &mut self,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.invariants_of(0..self.network.processes.len(), words)
     }
 
@@ -385,7 +384,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         process: usize,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.invariants_of(process..process + 1, words)
     }
 
@@ -393,7 +392,7 @@ impl<'a> Stepper<'a> {
         &mut self,
         processes: Range<usize>,
         words: &mut [i32],
-    ) -> Result<Option<&[EmittedConstraint]>, RunTimeError> {
+    ) -> Result<Option<&[FixedConstraint]>, RunTimeError> {
         self.constraints.clear();
         self.arguments.clear();
         for index in processes {

@@ -1,7 +1,8 @@
 //! Moves, each a composed transition, in flat buffers that are reused for the next state.
 
-use crate::exec::EmittedConstraint;
-use crate::ir::ChannelId;
+use crate::ir::{ChannelId, FixedConstraint};
+
+pub use crate::ir::Part;
 use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
 
@@ -11,20 +12,6 @@ const MOST_MOVES: usize = 1 << 20;
 /// The index of cached moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MoveListId(pub(super) u32);
-
-/// The part of one process in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
-    /// binding fastest.
-    pub select: u32,
-}
 
 /// Ranges into the buffers of [`Moves`].
 #[derive(Clone, Copy, Debug)]
@@ -49,22 +36,12 @@ pub(in crate::network) struct Label {
     pub(in crate::network) is_possible: bool,
 }
 
-impl Label {
-    /// The same for a move whose constraints were changed.
-    pub(in crate::network) fn unsettled(self) -> Label {
-        Label {
-            is_possible: false,
-            ..self
-        }
-    }
-}
-
 /// The moves of a state, by ascending rank.
 #[derive(Clone, Debug, Default)]
 pub struct Moves {
     headers: Vec<Header>,
     parts: Vec<Part>,
-    constraints: Vec<EmittedConstraint>,
+    constraints: Vec<FixedConstraint>,
     /// Ranges of `constraints`: conjunctions that must *not* hold, from clock-guarded broadcast
     /// receivers that abstain.
     excluded: Vec<(u32, u32)>,
@@ -78,7 +55,7 @@ pub struct MoveRef<'a> {
     /// The parts: the sender (or the only process) first, then receivers in process order.
     pub parts: &'a [Part],
     /// The clock constraints of the participants' guards.
-    pub constraints: &'a [EmittedConstraint],
+    pub constraints: &'a [FixedConstraint],
     /// The channel of the synchronisation; `None` for an internal edge.
     pub channel: Option<ChannelId>,
     /// Whether the controller owns the move: all participating edges are controllable.
@@ -95,7 +72,7 @@ pub struct MoveRef<'a> {
 
 impl<'a> MoveRef<'a> {
     /// The conjunctions of clock constraints that must not hold.
-    pub fn excluded(&self) -> impl Iterator<Item = &'a [EmittedConstraint]> {
+    pub fn excluded(&self) -> impl Iterator<Item = &'a [FixedConstraint]> {
         let moves = self.moves;
         moves.excluded[self.excluded.0 as usize..self.excluded.1 as usize]
             .iter()
@@ -187,8 +164,8 @@ impl Moves {
     pub(in crate::network) fn push<'c>(
         &mut self,
         parts: &[Part],
-        constraints: impl IntoIterator<Item = &'c [EmittedConstraint]>,
-        excluded: impl IntoIterator<Item = &'c [EmittedConstraint]>,
+        constraints: impl IntoIterator<Item = &'c [FixedConstraint]>,
+        excluded: impl IntoIterator<Item = &'c [FixedConstraint]>,
         label: Label,
     ) {
         let first_part = self.parts.len() as u32;
@@ -210,5 +187,19 @@ impl Moves {
             excluded: (first_excluded, self.excluded.len() as u32),
             label,
         });
+    }
+
+    /// Adds a move of another list, which none of these conjunctions may allow any more.
+    pub(in crate::network) fn push_without<'c>(
+        &mut self,
+        one: MoveRef<'c>,
+        forbidden: impl Iterator<Item = &'c [FixedConstraint]>,
+    ) {
+        let label = Label {
+            is_possible: false,
+            ..one.label
+        };
+        let excluded = one.excluded().chain(forbidden);
+        self.push(one.parts, [one.constraints], excluded, label);
     }
 }

@@ -14,10 +14,10 @@
 //! * Ids stay what they are; nothing is forgotten. Memory is bounded by [`MOST_BYTES`]: what comes
 //!   later is not remembered.
 
-use std::hash::{Hash, Hasher};
+use std::hash::BuildHasher;
 
 use hashbrown::HashTable;
-use rustc_hash::FxHasher;
+use rustc_hash::FxBuildHasher;
 
 use crate::ir::FunctionId;
 use crate::zones::federation::block_bytes;
@@ -57,8 +57,10 @@ struct Question {
 
 /// A point of a tree.
 #[derive(Clone, Copy, Debug)]
-enum Point {
+pub(super) enum Point {
+    /// Ask this question.
     Ask(u32),
+    /// These are the moves.
     Moves(MoveListId),
 }
 
@@ -71,21 +73,6 @@ enum Knowledge {
     Tree(Point, u32),
     Unsuited,
 }
-
-/// What the tree of a location vector says next.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Next<'o> {
-    /// Evaluate this, and answer.
-    Ask(FunctionId, &'o [i32]),
-    /// These are the moves.
-    Moves(MoveListId),
-    /// Nothing is known: the moves must be put together.
-    Unknown,
-}
-
-/// A way through a tree.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Way(Option<Point>);
 
 /// The functions that were evaluated while moves were put together.
 #[derive(Debug, Default)]
@@ -179,51 +166,50 @@ impl TransitionCache {
         let key = &words[..self.processes];
         let (locations, processes) = (&self.locations, self.processes);
         let of = |id: u32| &locations[id as usize * processes..][..processes];
-        if let Some(&id) = self.table.find(hash(key), |&id| of(id) == key) {
+        if let Some(&id) = self
+            .table
+            .find(FxBuildHasher.hash_one(key), |&id| of(id) == key)
+        {
             return Some(VectorId(id));
         }
         if self.bytes > MOST_BYTES {
             return None;
         }
         let id = self.known.len() as u32;
-        self.table.insert_unique(hash(key), id, |&id| hash(of(id)));
+        self.table
+            .insert_unique(FxBuildHasher.hash_one(key), id, |&id| {
+                FxBuildHasher.hash_one(of(id))
+            });
         self.known.push(Knowledge::Met);
         self.locations.extend_from_slice(key);
         self.bytes += size_of_val(key) + size_of::<Knowledge>() + 5;
         None
     }
 
-    /// Starts through the tree of a location vector; `None` if it is unsuited.
-    pub(super) fn start(&self, vector: VectorId) -> Option<Way> {
+    /// Where the tree of a location vector begins, if it has one.
+    pub(super) fn root(&self, vector: VectorId) -> Option<Point> {
         match self.known[vector.0 as usize] {
-            Knowledge::Met => Some(Way(None)),
-            Knowledge::Tree(root, _) => Some(Way(Some(root))),
-            Knowledge::Unsuited => None,
+            Knowledge::Tree(root, _) => Some(root),
+            Knowledge::Met | Knowledge::Unsuited => None,
         }
+    }
+
+    /// The function and the arguments that a question asks for.
+    pub(super) fn asked(&self, question: u32) -> (FunctionId, &[i32]) {
+        let question = &self.questions[question as usize];
+        (question.function, &question.arguments)
+    }
+
+    /// Where to go on with an answer, if that is known.
+    pub(super) fn after(&self, question: u32, answer: i32) -> Option<Point> {
+        let known = self.questions[question as usize].answers.iter();
+        let mut known = known.filter(|known| known.0 == answer);
+        known.next().map(|known| known.1)
     }
 
     /// Whether the moves of a location vector may be remembered.
     pub(super) fn is_suited(&self, vector: VectorId) -> bool {
         !matches!(self.known[vector.0 as usize], Knowledge::Unsuited)
-    }
-
-    /// What comes next on the way.
-    pub(super) fn next(&self, way: Way) -> Next<'_> {
-        match way.0 {
-            None => Next::Unknown,
-            Some(Point::Moves(list)) => Next::Moves(list),
-            Some(Point::Ask(question)) => {
-                let question = &self.questions[question as usize];
-                Next::Ask(question.function, &question.arguments)
-            }
-        }
-    }
-
-    /// Goes on with the answer to the question that came next.
-    pub(super) fn answer(&self, way: &mut Way, answer: i32) {
-        if let Some(Point::Ask(question)) = way.0 {
-            way.0 = follow(&self.questions[question as usize], answer);
-        }
     }
 
     /// The moves of a list.
@@ -279,7 +265,7 @@ impl TransitionCache {
                 self.attach(parent, &mut first, Point::Ask(question));
                 question
             };
-            way = follow(&self.questions[question as usize], answer);
+            way = self.after(question, answer);
             parent = Some((question, answer));
         }
         self.attach(parent, &mut first, leaf);
@@ -294,16 +280,4 @@ impl TransitionCache {
             None => *first = Some(point),
         }
     }
-}
-
-/// Where an answer leads, if it was met before.
-fn follow(question: &Question, answer: i32) -> Option<Point> {
-    let known = question.answers.iter().find(|known| known.0 == answer);
-    known.map(|known| known.1)
-}
-
-fn hash(locations: &[i32]) -> u64 {
-    let mut hasher = FxHasher::default();
-    locations.hash(&mut hasher);
-    hasher.finish()
 }

@@ -6,7 +6,7 @@
 use crate::ir::{LocationId, Network};
 use crate::zones::{Zone, dbm};
 
-use crate::analysis::dependence::{Footprint, Footprints, Ground, Sleeper, Start, Still};
+use crate::analysis::dependence::{Footprint, Footprints, Ground, Sleeper, Start};
 
 /// A situation: twice the number of the location among all, plus one if edges sleep.
 pub(super) type Situation = u32;
@@ -19,23 +19,8 @@ pub(super) struct Interference {
     first: Vec<u32>,
     /// For each location: its process.
     owners: Vec<u32>,
-    tables: Tables,
-}
-
-/// What is known for each of the reasons why time stands still.
-#[derive(Debug)]
-struct Tables {
-    urgent: Table,
-    committed: Table,
-}
-
-impl Tables {
-    fn of(&mut self, still: Still) -> &mut Table {
-        match still {
-            Still::Urgent => &mut self.urgent,
-            Still::Committed => &mut self.committed,
-        }
-    }
+    /// What is known for each of the reasons why time stands still.
+    tables: [Table; 2],
 }
 
 /// What is known for one of the reasons why time stands still.
@@ -72,10 +57,7 @@ impl Interference {
         Interference {
             footprints: Footprints::default(),
             first,
-            tables: Tables {
-                urgent: Table::new(owners.len()),
-                committed: Table::new(owners.len()),
-            },
+            tables: std::array::from_fn(|_| Table::new(owners.len())),
             owners,
         }
     }
@@ -100,11 +82,11 @@ impl Interference {
 
     fn sleepers(&mut self, ground: Ground<'_>, location: u32) -> &[Sleeper] {
         let still = ground.still;
-        if self.tables.of(still).sleepers[location as usize].is_none() {
+        if self.tables[still as usize].sleepers[location as usize].is_none() {
             let found = self.future(ground, 2 * location).sleepers.clone();
-            self.tables.of(still).sleepers[location as usize] = Some(found);
+            self.tables[still as usize].sleepers[location as usize] = Some(found);
         }
-        self.tables.of(still).sleepers[location as usize]
+        self.tables[still as usize].sleepers[location as usize]
             .as_deref()
             .unwrap_or_default()
     }
@@ -118,7 +100,7 @@ impl Interference {
         member: Situation,
         other: Situation,
     ) -> bool {
-        let row = &self.tables.of(ground.still).meets[member as usize];
+        let row = &self.tables[ground.still as usize].meets[member as usize];
         match row.get(other as usize) {
             Some(&Some(known)) => known,
             _ => self.learn(ground, member, other),
@@ -131,7 +113,7 @@ impl Interference {
         self.now(ground, member);
         self.future(ground, other);
         let situations = 2 * self.owners.len();
-        let table = self.tables.of(still);
+        let table = &mut self.tables[still as usize];
         let now = &table.now[member as usize];
         let future = &table.future[other as usize];
         let meets = now
@@ -148,7 +130,7 @@ impl Interference {
     pub(super) fn now(&mut self, ground: Ground<'_>, situation: Situation) -> &Footprint {
         let start = self.start(situation);
         let footprints = &mut self.footprints;
-        self.tables.of(ground.still).now[situation as usize]
+        self.tables[ground.still as usize].now[situation as usize]
             .get_or_insert_with(|| Box::new(footprints.now(ground, start)))
     }
 
@@ -156,7 +138,7 @@ impl Interference {
     pub(super) fn future(&mut self, ground: Ground<'_>, situation: Situation) -> &Footprint {
         let start = self.start(situation);
         let footprints = &mut self.footprints;
-        self.tables.of(ground.still).future[situation as usize]
+        self.tables[ground.still as usize].future[situation as usize]
             .get_or_insert_with(|| Box::new(footprints.future(ground, start)))
     }
 

@@ -23,11 +23,7 @@ impl Symmetry {
     /// none.
     pub fn of_network(network: &Network) -> Option<Arc<Symmetry>> {
         let places = Places::new(network);
-        let mut symmetry = Symmetry {
-            sets: Vec::new(),
-            swaps: Vec::new(),
-            dimension: network.clocks.len().max(1),
-        };
+        let mut symmetry = Symmetry::none(network);
         for number in 0..network.scalar_sets.len() as u32 {
             if let Ok((members, swaps)) = symmetry.exchanges_of(&places, number) {
                 symmetry.sets.push(members);
@@ -40,11 +36,7 @@ impl Symmetry {
     /// For each scalar set: why it is not reduced, if it is not.
     pub fn obstacles(network: &Network) -> Vec<Option<Obstacle>> {
         let places = Places::new(network);
-        let none = Symmetry {
-            sets: Vec::new(),
-            swaps: Vec::new(),
-            dimension: network.clocks.len().max(1),
-        };
+        let none = Symmetry::none(network);
         let sets = 0..network.scalar_sets.len() as u32;
         sets.map(|number| none.exchanges_of(&places, number).err())
             .collect()

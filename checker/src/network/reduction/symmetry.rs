@@ -195,9 +195,18 @@ impl Swap {
 }
 
 impl Symmetry {
+    /// The symmetry that exchanges nothing.
+    pub(super) fn none(network: &Network) -> Symmetry {
+        Symmetry {
+            sets: Vec::new(),
+            swaps: Vec::new(),
+            dimension: network.clocks.len().max(1),
+        }
+    }
+
     /// The permutation that changes no member.
     pub fn identity(&self) -> Permutation {
-        self.sets.iter().flat_map(|set| 0..set.count).collect()
+        Permutation(self.sets.iter().flat_map(|set| 0..set.count).collect())
     }
 
     /// Replaces a state by one that differs only by exchanges of members; for most such states the
@@ -306,11 +315,5 @@ impl Members {
     fn swap(self, first: u32, second: u32) -> usize {
         let before = first * (2 * self.count - first - 1) / 2;
         self.first_swap + (before + second - first - 1) as usize
-    }
-}
-
-impl FromIterator<u32> for Permutation {
-    fn from_iter<I: IntoIterator<Item = u32>>(images: I) -> Permutation {
-        Permutation(images.into_iter().collect())
     }
 }

@@ -41,15 +41,11 @@ pub(super) struct Holders {
 impl Holders {
     pub(super) fn new(network: &Network, tuning: Tuning) -> Holders {
         let processes = || network.processes.iter();
-        let has_rates = processes().any(|process| {
-            let mut locations = process.locations.iter();
-            locations.any(|location| !location.rates.is_empty())
-        });
         let of_process = |locations: &[Location]| -> Vec<Vec<Limit>> {
             locations
                 .iter()
                 .map(|location| {
-                    if has_rates || !tuning.time_stoppers {
+                    if network.features.stopwatches || !tuning.time_stoppers {
                         Vec::new()
                     } else {
                         limits(location)

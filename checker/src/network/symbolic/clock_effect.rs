@@ -1,8 +1,8 @@
 //! The effect of moves on clocks: how the constraints and assignments that code emits become those
 //! of zones.
 
-use crate::exec::{EmittedAssignment, EmittedConstraint};
-use crate::ir::ClockId;
+use crate::exec::EmittedAssignment;
+use crate::ir::{ClockId, FixedConstraint};
 use crate::network::Failure;
 use crate::zones::clocks::Assignment;
 use crate::zones::dbm::Constraint;
@@ -74,8 +74,7 @@ impl ClockEffect {
         if within.constrain_all(&self.guard) {
             let mut rest = Federation::of_zone(dimension, within.bounds());
             self.subtract_excluded(&mut rest);
-            let pieces = rest.zones();
-            out.extend(pieces.map(|bounds| Zone::from_bounds(dimension, bounds)));
+            out.extend(rest.to_zones());
             out.retain_mut(|piece| self.enter(piece));
         }
     }
@@ -101,7 +100,7 @@ impl ClockEffect {
 
     /// The part of a zone in which the move is possible.
     pub fn enabled_part(&self, zone: &[Bound], dimension: usize) -> Federation {
-        let mut enabled = Federation::of_zone(dimension, Zone::universe(dimension).bounds());
+        let mut enabled = Federation::universe(dimension);
         enabled.constrain_all(&self.invariant);
         enabled.preimage(&self.guard, &self.assignments);
         enabled.intersect_zone(zone);
@@ -129,16 +128,14 @@ pub(super) fn check_limit(value: i32) -> Result<(), Failure> {
 /// Emitted constraints as constraints on zones; `None` if one of them never holds (a clock compared
 /// with itself).
 pub(super) fn to_constraints(
-    emitted: &[EmittedConstraint],
+    emitted: &[FixedConstraint],
 ) -> Result<Option<Vec<Constraint>>, Failure> {
     let mut constraints = Vec::new();
     Ok(add_constraints(emitted, &mut constraints)?.then_some(constraints))
 }
 
 /// An emitted constraint as one on zones, which may compare a clock with itself.
-pub(in crate::network) fn to_constraint(
-    emitted: &EmittedConstraint,
-) -> Result<Constraint, Failure> {
+pub(in crate::network) fn to_constraint(emitted: &FixedConstraint) -> Result<Constraint, Failure> {
     let bound = if emitted.strict {
         Bound::strict(emitted.bound)
     } else {
@@ -153,7 +150,7 @@ pub(in crate::network) fn to_constraint(
 
 /// Replaces `constraints` by the emitted ones; returns false if one of them never holds.
 pub(in crate::network) fn add_constraints(
-    emitted: &[EmittedConstraint],
+    emitted: &[FixedConstraint],
     constraints: &mut Vec<Constraint>,
 ) -> Result<bool, Failure> {
     constraints.clear();
@@ -184,19 +181,24 @@ pub(super) fn to_assignment(one: &EmittedAssignment) -> Result<Assignment, Failu
     })
 }
 
-/// The zones of a federation as conjunctions of constraints.
-pub(super) fn conjunctions(federation: &Federation) -> Vec<Vec<EmittedConstraint>> {
-    let conjunction = |zone: &[Bound]| {
-        let mut constraints = Vec::new();
-        minimal::for_each_minimal(zone, federation.dimension(), |one| {
-            constraints.push(EmittedConstraint {
-                left: ClockId(one.left as u32),
-                right: ClockId(one.right as u32),
-                bound: one.bound.value(),
-                strict: one.bound.is_strict(),
-            });
+/// The fewest constraints that make a zone.
+pub fn conjunction(zone: &[Bound], dimension: usize) -> Vec<FixedConstraint> {
+    let mut constraints = Vec::new();
+    minimal::for_each_minimal(zone, dimension, |one| {
+        constraints.push(FixedConstraint {
+            left: ClockId(one.left as u32),
+            right: ClockId(one.right as u32),
+            bound: one.bound.value(),
+            strict: one.bound.is_strict(),
         });
-        constraints
-    };
-    federation.zones().map(conjunction).collect()
+    });
+    constraints
+}
+
+/// The zones of a federation as conjunctions.
+pub fn conjunctions(federation: &Federation) -> Vec<Vec<FixedConstraint>> {
+    let zones = federation.zones();
+    zones
+        .map(|zone| conjunction(zone, federation.dimension()))
+        .collect()
 }

@@ -38,12 +38,7 @@ impl Symbolic<'_> {
     ) -> Result<Extent, Failure> {
         Ok(match self.alive(words, zone)? {
             Alive::Everywhere => Extent::Nowhere,
-            Alive::Within(alive) => {
-                let whole = Federation::of_zone(self.dimension(), zone);
-                let mut rest = whole.clone();
-                rest.subtract(&alive);
-                Extent::of(rest, &whole)
-            }
+            Alive::Within(alive) => self.rest_of(zone, &alive),
         })
     }
 

@@ -113,12 +113,11 @@ impl Symbolic<'_> {
             }
             let mut reached = self.within(&entries[index], &whole, &barriers);
             reached.reduce();
-            let mut parts = reached.zones();
-            let first = parts
+            let mut parts = reached.to_zones();
+            zones[index] = parts
                 .next()
                 .expect("the zone on entry is reached without delay");
-            zones[index] = Zone::from_bounds(self.dimension(), first);
-            zones.extend(parts.map(|part| Zone::from_bounds(self.dimension(), part)));
+            zones.extend(parts);
         }
         Ok(())
     }
@@ -178,16 +177,17 @@ impl Symbolic<'_> {
             Scope::Of(_) => self.stepper.compute_moves(words, scope, out)?,
             _ => self.stepper.moves_in(words, scope, out)?,
         }
-        self.apply_priorities(words, out)?;
-        if let Some(restriction) = self.restriction {
-            restriction::apply(self.stepper.network(), restriction, words, out);
-        }
-        Ok(())
+        self.forbid(words, out)
     }
 
     /// Like [`Symbolic::moves`], for a caller that asks for the moves of the same state again.
     pub fn remembered_moves(&mut self, words: &mut [i32], out: &mut Moves) -> Result<(), Failure> {
         self.stepper.moves(words, out)?;
+        self.forbid(words, out)
+    }
+
+    /// Applies priorities and the restriction to the moves of a state.
+    fn forbid(&mut self, words: &[i32], out: &mut Moves) -> Result<(), Failure> {
         self.apply_priorities(words, out)?;
         if let Some(restriction) = self.restriction {
             restriction::apply(self.stepper.network(), restriction, words, out);
@@ -224,13 +224,7 @@ impl Symbolic<'_> {
                 .filter(|(other, _)| *other > level);
             let forbidden =
                 above.flat_map(|(_, conjunctions)| conjunctions.iter().map(Vec::as_slice));
-            let excluded = one.excluded().chain(forbidden);
-            allowed.push(
-                one.parts,
-                [one.constraints],
-                excluded,
-                one.label.unsettled(),
-            );
+            allowed.push_without(one, forbidden);
         }
         *moves = allowed;
         Ok(())

@@ -92,21 +92,7 @@ impl<'a> Symbolic<'a> {
         if let Some(outcome) = found {
             return Ok(self.memo.result(outcome, zone));
         }
-        let (entered, kept) = if self.compute(words, source, may_delay, zone)? {
-            // A single state may have any number of successors.
-            if self.memo.used_bytes() > self.memo.limits.bytes {
-                self.memo.forget();
-            }
-            self.intern(words, zone)
-        } else {
-            (NOTHING, NOTHING)
-        };
-        let outcome = ZoneOutcome {
-            zone: known.zone,
-            effect,
-            entered,
-            kept,
-        };
+        let outcome = self.new_outcome((known.zone, effect), words, source, may_delay, zone)?;
         if self.is_known(known) {
             self.memo.insert(outcome);
         }
@@ -166,21 +152,30 @@ impl<'a> Symbolic<'a> {
             && dbm::constrain_all(zone, dimension, &self.invariant))
     }
 
-    /// Applies the current effect to a zone, and lets time pass if it may.
-    fn compute(
+    /// What the current effect makes of a zone, with the wait after it.
+    fn new_outcome(
         &mut self,
+        (source_id, effect): (ZoneId, u32),
         words: &[i32],
         source: &[Bound],
         may_delay: bool,
         zone: &mut [Bound],
-    ) -> Result<bool, Failure> {
-        if !self.apply_effect(source, zone)? {
-            return Ok(false);
+    ) -> Result<ZoneOutcome, Failure> {
+        let mut outcome = ZoneOutcome {
+            zone: source_id,
+            effect,
+            entered: NOTHING,
+            kept: NOTHING,
+        };
+        if self.apply_effect(source, zone)? {
+            self.delay_by_invariant(words, may_delay, zone)?;
+            // A single state may have any number of successors.
+            if self.memo.used_bytes() > self.memo.limits.bytes {
+                self.memo.forget();
+            }
+            (outcome.entered, outcome.kept) = self.intern(words, zone);
         }
-        let invariant = std::mem::take(&mut self.invariant);
-        let result = self.delay(words, may_delay, &invariant, zone);
-        self.invariant = invariant;
-        result.map(|()| true)
+        Ok(outcome)
     }
 
     /// The numbers of a zone that was entered and of its stored form.
@@ -236,15 +231,6 @@ impl<'a> Symbolic<'a> {
             return false;
         }
         let network = self.stepper.network();
-        let is_urgent = network.channels.iter().any(|channel| channel.urgent);
-        let locations = network
-            .processes
-            .iter()
-            .flat_map(|process| &process.locations);
-        !is_urgent
-            && locations
-                .map(|location| location.rates.len())
-                .sum::<usize>()
-                == 0
+        !network.features.stopwatches && !network.channels.iter().any(|channel| channel.urgent)
     }
 }

@@ -2,8 +2,8 @@
 
 use hashbrown::HashTable;
 
-use crate::exec::{EmittedAssignment, EmittedConstraint};
-use crate::ir::ClockId;
+use crate::exec::EmittedAssignment;
+use crate::ir::{ClockId, FixedConstraint};
 
 /// Effects; each is stored once, as words that determine the result. The first words say how many
 /// words there are up to the end of the guard, of the assignments and of the invariant. Then come
@@ -47,7 +47,7 @@ impl PackedEffects {
         self.key[part] = self.key.len() as u32;
     }
 
-    pub(super) fn add_constraints(&mut self, emitted: &[EmittedConstraint]) {
+    pub(super) fn add_constraints(&mut self, emitted: &[FixedConstraint]) {
         for one in emitted {
             let clocks = packed(one.left, one.right) | u32::from(one.strict) << 31;
             self.key.extend([clocks, one.bound.cast_unsigned()]);
@@ -64,7 +64,7 @@ impl PackedEffects {
         self.key[first..self.key[end] as usize].as_chunks().0
     }
 
-    pub(super) fn guard(&self) -> Vec<EmittedConstraint> {
+    pub(super) fn guard(&self) -> Vec<FixedConstraint> {
         constraints(self.pairs(FRONT, GUARD))
     }
 
@@ -80,7 +80,7 @@ impl PackedEffects {
             .collect()
     }
 
-    pub(super) fn invariant(&self) -> Vec<EmittedConstraint> {
+    pub(super) fn invariant(&self) -> Vec<FixedConstraint> {
         constraints(self.pairs(self.key[ASSIGNMENTS] as usize, INVARIANT))
     }
 
@@ -92,24 +92,16 @@ impl PackedEffects {
             table,
             key,
         } = self;
-        let of = |index: u32| {
-            let index = index as usize;
-            let first = index.checked_sub(1).map_or(0, |before| ends[before]);
-            &words[first as usize..ends[index] as usize]
-        };
         let hash_of_key = hash_words(key);
-        if let Some(&index) = table.find(hash_of_key, |&index| of(index) == key.as_slice()) {
+        let is_key = |&index: &u32| entry(words, ends, index) == key.as_slice();
+        if let Some(&index) = table.find(hash_of_key, is_key) {
             return index;
         }
         let index = ends.len() as u32;
         words.extend_from_slice(key);
         ends.push(words.len() as u32);
-        let of = |index: u32| {
-            let index = index as usize;
-            let first = index.checked_sub(1).map_or(0, |before| ends[before]);
-            &words[first as usize..ends[index] as usize]
-        };
-        table.insert_unique(hash_of_key, index, |&index| hash_words(of(index)));
+        let hash_of = |&index: &u32| hash_words(entry(words, ends, index));
+        table.insert_unique(hash_of_key, index, hash_of);
         index
     }
 }
@@ -119,6 +111,13 @@ const CLOCK_BITS: u32 = 15;
 /// The greatest clock that fits.
 pub(super) const MOST_CLOCKS: u32 = (1 << CLOCK_BITS) - 1;
 
+/// The words of an effect.
+fn entry<'w>(words: &'w [u32], ends: &[u32], index: u32) -> &'w [u32] {
+    let index = index as usize;
+    let first = index.checked_sub(1).map_or(0, |before| ends[before]);
+    &words[first as usize..ends[index] as usize]
+}
+
 /// Two clocks in the lower 30 bits of a word.
 fn packed(first: ClockId, second: ClockId) -> u32 {
     debug_assert!(first.0.max(second.0) <= MOST_CLOCKS);
@@ -126,8 +125,8 @@ fn packed(first: ClockId, second: ClockId) -> u32 {
 }
 
 /// The constraints in pairs of words.
-fn constraints(pairs: &[[u32; 2]]) -> Vec<EmittedConstraint> {
-    let constraint = |&[clocks, bound]: &[u32; 2]| EmittedConstraint {
+fn constraints(pairs: &[[u32; 2]]) -> Vec<FixedConstraint> {
+    let constraint = |&[clocks, bound]: &[u32; 2]| FixedConstraint {
         left: ClockId(clocks & MOST_CLOCKS),
         right: ClockId(clocks >> CLOCK_BITS & MOST_CLOCKS),
         bound: bound.cast_signed(),

@@ -3,9 +3,7 @@
 //! The extent of a predicate in a state is the part of the zone in which it holds. Predicates
 //! without clocks hold in all of it or in none, and cost no zone operation.
 
-use crate::ir::{
-    ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, Network, Predicate,
-};
+use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, FunctionId, Network, Predicate};
 use crate::zones::{Bound, Federation, Zone};
 
 use crate::network::{Failure, Symbolic};
@@ -29,14 +27,6 @@ impl Extent {
             Extent::Everywhere
         } else {
             Extent::Part(part)
-        }
-    }
-
-    fn negated(self, zone: &Federation) -> Extent {
-        match self {
-            Extent::Nowhere => Extent::Everywhere,
-            Extent::Everywhere => Extent::Nowhere,
-            Extent::Part(part) => Extent::of(difference(zone, &part), zone),
         }
     }
 
@@ -71,19 +61,27 @@ impl Symbolic<'_> {
             Predicate::Location(process, location) => Ok(everywhere_if(
                 words[process.0 as usize] == location.0 as i32,
             )),
-            Predicate::Not(inner) => {
-                let extent = self.extent(inner, words, zone)?;
-                Ok(match extent {
-                    Extent::Part(_) => extent.negated(&self.whole(zone)),
-                    Extent::Nowhere => Extent::Everywhere,
-                    Extent::Everywhere => Extent::Nowhere,
-                })
-            }
-            Predicate::And(parts) => self.conjunction(parts, words, zone),
-            Predicate::Or(parts) => self.disjunction(parts, words, zone),
+            Predicate::Not(inner) => Ok(match self.extent(inner, words, zone)? {
+                Extent::Part(part) => self.rest_of(zone, &part),
+                Extent::Nowhere => Extent::Everywhere,
+                Extent::Everywhere => Extent::Nowhere,
+            }),
+            Predicate::And(parts) => self.combination(parts, true, words, zone),
+            Predicate::Or(parts) => self.combination(parts, false, words, zone),
             Predicate::Clock(clock) => self.clock_extent(clock, words, zone),
             Predicate::Deadlock => self.deadlock_extent(words, zone),
         }
+    }
+
+    /// The part of a zone in which a predicate holds, for a state with these words.
+    pub fn part(
+        &mut self,
+        predicate: &Predicate,
+        words: &mut [i32],
+        zone: &Zone,
+    ) -> Result<Federation, Failure> {
+        let extent = self.extent(predicate, words, zone.bounds())?;
+        Ok(extent.to_federation(zone.bounds(), self.dimension()))
     }
 
     /// Whether the predicate holds somewhere in the zone: what [`Symbolic::extent`] says, without
@@ -117,7 +115,8 @@ impl Symbolic<'_> {
                     return Ok(false);
                 }
                 if parts.iter().filter(|part| !part.is_of_words()).count() > 1 {
-                    return Ok(self.conjunction(parts, words, zone)?.is_somewhere());
+                    let both = self.combination(parts, true, words, zone)?;
+                    return Ok(both.is_somewhere());
                 }
                 for part in parts {
                     if !self.holds_somewhere(part, words, zone)? {
@@ -130,54 +129,41 @@ impl Symbolic<'_> {
         }
     }
 
+    /// What is left of a zone outside of a part of it.
+    pub(super) fn rest_of(&self, zone: &[Bound], part: &Federation) -> Extent {
+        let whole = self.whole(zone);
+        Extent::of(whole.clone().minus(part), &whole)
+    }
+
     fn whole(&self, zone: &[Bound]) -> Federation {
         Federation::of_zone(self.dimension(), zone)
     }
 
-    fn conjunction(
+    /// Where all parts hold, or where one does.
+    fn combination(
         &mut self,
         parts: &[Predicate],
+        is_conjunction: bool,
         words: &mut [i32],
         zone: &[Bound],
     ) -> Result<Extent, Failure> {
         let mut result: Option<Federation> = None;
         for part in parts {
             match self.extent(part, words, zone)? {
-                Extent::Nowhere => return Ok(Extent::Nowhere),
-                Extent::Everywhere => {}
-                Extent::Part(part) => {
-                    result = Some(match result {
-                        None => part,
-                        Some(so_far) => so_far.intersection(&part),
-                    });
-                }
-            }
-        }
-        Ok(result.map_or(Extent::Everywhere, |part| {
-            Extent::of(part, &self.whole(zone))
-        }))
-    }
-
-    fn disjunction(
-        &mut self,
-        parts: &[Predicate],
-        words: &mut [i32],
-        zone: &[Bound],
-    ) -> Result<Extent, Failure> {
-        let mut result: Option<Federation> = None;
-        for part in parts {
-            match self.extent(part, words, zone)? {
-                Extent::Everywhere => return Ok(Extent::Everywhere),
-                Extent::Nowhere => {}
+                Extent::Nowhere if is_conjunction => return Ok(Extent::Nowhere),
+                Extent::Everywhere if !is_conjunction => return Ok(Extent::Everywhere),
+                Extent::Nowhere | Extent::Everywhere => {}
                 Extent::Part(part) => match &mut result {
                     None => result = Some(part),
-                    Some(so_far) => {
-                        so_far.unite(&part);
-                    }
+                    Some(so_far) if is_conjunction => *so_far = so_far.intersection(&part),
+                    Some(so_far) => _ = so_far.unite(&part),
                 },
             }
         }
-        Ok(result.map_or(Extent::Nowhere, |part| Extent::of(part, &self.whole(zone))))
+        Ok(match result {
+            None => everywhere_if(is_conjunction),
+            Some(part) => Extent::of(part, &self.whole(zone)),
+        })
     }
 
     fn clock_extent(
@@ -238,12 +224,6 @@ fn decided_by_locations(predicate: &Predicate, words: &[i32]) -> Option<bool> {
     }
 }
 
-fn difference(from: &Federation, other: &Federation) -> Federation {
-    let mut rest = from.clone();
-    rest.subtract(other);
-    rest
-}
-
 fn everywhere_if(holds: bool) -> Extent {
     if holds {
         Extent::Everywhere
@@ -254,36 +234,12 @@ fn everywhere_if(holds: bool) -> Extent {
 
 /// The clock comparisons of a predicate, for extrapolation.
 pub fn atoms(predicate: &Predicate) -> Vec<ClockAtom> {
-    let mut atoms = Vec::new();
-    collect_atoms(predicate, &mut atoms);
-    atoms
-}
-
-fn collect_atoms(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
-    match predicate {
-        Predicate::Clock(clock) => {
-            let atom = ClockAtom {
-                left: clock_range(clock.left),
-                right: clock_range(clock.right),
-                low: clock.range.0,
-                high: clock.range.1,
-                strict: clock.strict,
-            };
-            // Under a negation the comparison turns round, so both directions count.
-            atoms.push(negated(&atom));
-            atoms.push(atom);
-        }
-        Predicate::Not(inner) => collect_atoms(inner, atoms),
-        Predicate::And(parts) | Predicate::Or(parts) => {
-            for part in parts {
-                collect_atoms(part, atoms);
-            }
-        }
-        Predicate::Data(_)
-        | Predicate::Constant(_)
-        | Predicate::Location(..)
-        | Predicate::Deadlock => {}
-    }
+    // Under a negation the comparison turns round, so both directions count.
+    let both = |comparison: &ClockPredicate| {
+        let atom = comparison.atom();
+        [negated(&atom), atom]
+    };
+    predicate.comparisons().flat_map(both).collect()
 }
 
 /// The comparison that holds where this one fails.
@@ -314,29 +270,18 @@ pub fn negated_atoms(network: &Network) -> Vec<ClockAtom> {
     guards.flat_map(|guard| &guard.atoms).map(negated).collect()
 }
 
-fn clock_range(choice: ClockChoice) -> ClockRange {
-    match choice {
-        ClockChoice::Fixed(clock) => ClockRange {
-            first: clock,
-            count: 1,
-        },
-        ClockChoice::Indexed(range, _) => range,
-    }
-}
-
 /// The code that decides a predicate, which reads words only.
 pub fn functions(predicate: &Predicate) -> Vec<FunctionId> {
-    match predicate {
-        Predicate::Constant(_) | Predicate::Location(..) | Predicate::Deadlock => Vec::new(),
+    let functions = predicate.leaves().into_iter().flat_map(|leaf| match leaf {
         Predicate::Data(function) => vec![*function],
         Predicate::Clock(clock) => {
             let sides = [clock.left, clock.right].into_iter();
             let chosen = sides.filter_map(chooser);
             std::iter::once(clock.bound).chain(chosen).collect()
         }
-        Predicate::Not(inner) => functions(inner),
-        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().flat_map(functions).collect(),
-    }
+        _ => Vec::new(),
+    });
+    functions.collect()
 }
 
 /// The code that chooses a clock.
@@ -349,10 +294,6 @@ pub fn chooser(clock: ClockChoice) -> Option<FunctionId> {
 
 /// Whether a predicate mentions `deadlock`.
 pub fn has_deadlock(predicate: &Predicate) -> bool {
-    match predicate {
-        Predicate::Deadlock => true,
-        Predicate::Not(inner) => has_deadlock(inner),
-        Predicate::And(parts) | Predicate::Or(parts) => parts.iter().any(has_deadlock),
-        _ => false,
-    }
+    let mut leaves = predicate.leaves().into_iter();
+    leaves.any(|leaf| matches!(leaf, Predicate::Deadlock))
 }

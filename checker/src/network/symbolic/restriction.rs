@@ -13,8 +13,7 @@
 //! priority over moves of lower levels. [`crate::network::Symbolic::without_priorities`] says
 //! whether priorities count.
 
-use crate::exec::EmittedConstraint;
-use crate::ir::{ClockAtom, Network};
+use crate::ir::{ClockAtom, FixedConstraint, Network};
 use crate::zones::Federation;
 use crate::zones::future::Barriers;
 
@@ -86,7 +85,7 @@ pub(super) fn apply(
     }
     let mut rest = Moves::default();
     for one in moves.iter() {
-        let forbidden: Vec<Vec<EmittedConstraint>> = if is_own(&one) {
+        let forbidden: Vec<Vec<FixedConstraint>> = if is_own(&one) {
             conjunctions(allowed.forbidden(network, &one))
         } else {
             let others = allowed.picked_otherwise(network, &one);
@@ -94,13 +93,7 @@ pub(super) fn apply(
         };
         // An empty conjunction always holds.
         if !forbidden.iter().any(Vec::is_empty) {
-            let excluded = one.excluded().chain(forbidden.iter().map(Vec::as_slice));
-            rest.push(
-                one.parts,
-                [one.constraints],
-                excluded,
-                one.label.unsettled(),
-            );
+            rest.push_without(one, forbidden.iter().map(Vec::as_slice));
         }
     }
     *moves = rest;

@@ -12,7 +12,7 @@
 use std::sync::Arc;
 
 use crate::cancellation;
-use crate::exec::EmittedConstraint;
+use crate::ir::FixedConstraint;
 use crate::zones::clocks::{self, Assignment};
 use crate::zones::dbm::{self, Constraint};
 use crate::zones::extrapolate::Ceilings;
@@ -80,15 +80,11 @@ impl<'a> Symbolic<'a> {
     pub fn new(stepper: Stepper<'a>, bounds: ClockBounds) -> Symbolic<'a> {
         let network = stepper.network();
         let dimension = network.clocks.len().max(1);
-        let has_rates = network
-            .processes
-            .iter()
-            .any(|process| process.locations.iter().any(|l| !l.rates.is_empty()));
         let greatest = bounds.greatest().max(greatest_reset(network));
         let is_looked_at = !bounds.simulates() || greatest > CALM_CONSTANT;
         Symbolic {
             dimension,
-            has_rates,
+            has_rates: network.features.stopwatches,
             range: is_looked_at.then(|| Bound::most_in_zone(dimension, bounds.has_differences())),
             has_urgent_channels: network.channels.iter().any(|channel| channel.urgent),
             has_guarded_urgency: network.features.clock_guarded_urgent,
@@ -252,6 +248,22 @@ impl<'a> Symbolic<'a> {
         Ok(self.fire_into(one, words, &mut effect)?.then_some(effect))
     }
 
+    /// The same for a move from a state with these words, which it copies to `target`; `None` also
+    /// if nothing of the zone satisfies the guard.
+    pub fn fire_within(
+        &mut self,
+        one: MoveRef<'_>,
+        words: &[i32],
+        zone: &[Bound],
+        target: &mut [i32],
+    ) -> Result<Option<ClockEffect>, Failure> {
+        if !self.is_enabled(one, zone)? {
+            return Ok(None);
+        }
+        target.copy_from_slice(words);
+        self.fire(one, target)
+    }
+
     /// Like [`Symbolic::fire`], but writes the effect to a value that is reused; returns whether
     /// the move is possible.
     pub fn fire_into(
@@ -302,7 +314,7 @@ impl<'a> Symbolic<'a> {
     }
 
     /// Whether some constraint of a conjunction holds nowhere in the zone.
-    fn is_false(&self, conjunction: &[EmittedConstraint], zone: &[Bound]) -> bool {
+    fn is_false(&self, conjunction: &[FixedConstraint], zone: &[Bound]) -> bool {
         conjunction.iter().any(|one| {
             let constraint = to_constraint(one);
             constraint.is_ok_and(|one| !dbm::satisfies(zone, self.dimension, &one))
@@ -344,6 +356,16 @@ impl<'a> Symbolic<'a> {
             return Ok(());
         }
         let may_delay = self.may_delay(words)?;
+        self.delay_by_invariant(words, may_delay, zone)
+    }
+
+    /// Lets time pass within the invariant that was made last.
+    pub(super) fn delay_by_invariant(
+        &mut self,
+        words: &[i32],
+        may_delay: bool,
+        zone: &mut [Bound],
+    ) -> Result<(), Failure> {
         let invariant = std::mem::take(&mut self.invariant);
         let result = self.delay(words, may_delay, &invariant, zone);
         self.invariant = invariant;
@@ -546,11 +568,7 @@ impl<'a> Symbolic<'a> {
                     .split(words, zone.bounds(), &mut self.ceilings, &mut parts);
             }
             zones.clear();
-            zones.extend(
-                parts
-                    .zones()
-                    .map(|part| Zone::from_bounds(self.dimension, part)),
-            );
+            zones.extend(parts.to_zones());
             return;
         }
         for zone in zones {

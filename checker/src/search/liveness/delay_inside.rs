@@ -64,11 +64,7 @@ impl Inside {
                 });
             }
             Extent::Everywhere => Federation::empty(dimension),
-            Extent::Part(part) => {
-                let mut outside = Federation::of_zone(dimension, whole.bounds());
-                outside.subtract(&part);
-                outside
-            }
+            Extent::Part(part) => Federation::of_zone(dimension, whole.bounds()).minus(&part),
         };
         let passage = Passage::new(symbolic, keep, words, whole, outside)?;
         let mut inside = passage.reached(entry.zone, entry.is_running);
@@ -78,9 +74,8 @@ impl Inside {
             Some((ending, part)) => (Some(ending), part),
             None => (None, inside),
         };
-        let zones = part.zones().map(|zone| Zone::from_bounds(dimension, zone));
         Ok(Inside {
-            zones: zones.collect(),
+            zones: part.to_zones().collect(),
             ending,
             is_coarse: passage.is_coarse(),
         })
@@ -97,10 +92,8 @@ pub(in crate::search) fn endings(
     whole: Zone,
 ) -> Result<(Federation, Federation), Failure> {
     let dimension = whole.dimension();
-    let extent = symbolic.extent(keep, words, whole.bounds())?;
-    let inside = extent.to_federation(whole.bounds(), dimension);
-    let mut outside = Federation::of_zone(dimension, whole.bounds());
-    outside.subtract(&inside);
+    let inside = symbolic.part(keep, words, &whole)?;
+    let outside = Federation::of_zone(dimension, whole.bounds()).minus(&inside);
     let mut passage = Passage::new(symbolic, keep, words, whole, outside)?;
     passage.counts_doubts = false;
     let stuck = passage.stuck(symbolic, words, &inside)?;
@@ -141,9 +134,8 @@ impl Passage {
         if has_inexact_pasts(&stopped, dimension) {
             frame = Zone::universe(dimension);
             frame.constrain_all(&symbolic.invariant(words)?.unwrap_or_default());
-            let inside = symbolic.extent(keep, words, frame.bounds())?;
-            left = Federation::of_zone(dimension, frame.bounds());
-            left.subtract(&inside.to_federation(frame.bounds(), dimension));
+            let inside = symbolic.part(keep, words, &frame)?;
+            left = Federation::of_zone(dimension, frame.bounds()).minus(&inside);
         }
         Ok(Passage {
             barriers: if may_delay {
@@ -250,11 +242,8 @@ impl Passage {
         let mut exits = self.left.clone();
         let mut target = words.to_vec();
         for one in moves.iter() {
-            if !symbolic.is_enabled(one, self.whole.bounds())? {
-                continue;
-            }
-            target.copy_from_slice(words);
-            if let Some(effect) = symbolic.fire(one, &mut target)? {
+            let whole = self.whole.bounds();
+            if let Some(effect) = symbolic.fire_within(one, words, whole, &mut target)? {
                 exits.unite(&effect.enabled_part(self.frame.bounds(), dimension));
                 if inside.is_subset(&exits) {
                     return Ok(Federation::empty(dimension));
@@ -266,8 +255,7 @@ impl Passage {
         } else if self.may_delay {
             exits = future::predecessors_within(&exits, &self.barriers);
         }
-        let mut stuck = inside.clone();
-        stuck.subtract(&exits);
+        let stuck = inside.clone().minus(&exits);
         Ok(stuck)
     }
 }

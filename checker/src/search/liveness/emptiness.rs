@@ -176,7 +176,8 @@ impl<'p> Liveness<'p> {
         }
         symbolic.extrapolate_all(words, &mut inside.zones);
         for zone in inside.zones {
-            if self.is_left(words, &zone) {
+            let discrete = self.discrete(words);
+            if self.is_left(discrete, &zone) {
                 continue;
             }
             self.push(symbolic, words, zone)?;
@@ -229,13 +230,10 @@ impl<'p> Liveness<'p> {
     ) -> Result<Option<RunEnding>, Failure> {
         let one = frame.moves.get(frame.next_move);
         frame.next_move += 1;
-        if !symbolic.is_enabled(one, frame.zone.bounds())? {
-            return Ok(None);
-        }
-        frame.target.copy_from_slice(&frame.words);
         frame.parts.clear();
         frame.parts.extend_from_slice(one.parts);
-        let Some(effect) = symbolic.fire(one, &mut frame.target)? else {
+        let (words, zone) = (&frame.words, frame.zone.bounds());
+        let Some(effect) = symbolic.fire_within(one, words, zone, &mut frame.target)? else {
             return Ok(None);
         };
         let mut entries = Vec::new();
@@ -271,51 +269,33 @@ impl<'p> Liveness<'p> {
         zone: Zone,
     ) -> Result<Option<RunEnding>, Failure> {
         let discrete = self.discrete(words);
-        let mut node = self.heads[discrete.0 as usize];
-        let mut is_left = false;
-        while node != NONE {
-            let Node {
-                zone: other,
-                next,
-                depth,
-                ..
-            } = self.nodes[node as usize];
-            let other = self.zones.get(other);
-            if depth == NONE {
-                is_left |= dbm::is_subset(zone.bounds(), other);
-            } else if dbm::is_subset(other, zone.bounds()) {
-                let top = self
-                    .frames
-                    .last_mut()
-                    .expect("the move was taken from a node");
-                top.pending = vec![zone];
-                return Ok(Some(RunEnding::Loop(depth as usize)));
-            }
-            node = next;
+        let closes = |one: &&Node| {
+            one.depth != NONE && dbm::is_subset(self.zones.get(one.zone), zone.bounds())
+        };
+        let closing = self.list(discrete).find(closes).map(|one| one.depth);
+        if let Some(depth) = closing {
+            let top = self.frames.last_mut();
+            top.expect("the move was taken from a node").pending = vec![zone];
+            return Ok(Some(RunEnding::Loop(depth as usize)));
         }
-        if !is_left {
+        if !self.is_left(discrete, &zone) {
             self.push(symbolic, words, zone)?;
         }
         Ok(None)
     }
 
+    /// The nodes with these words.
+    fn list(&self, discrete: DiscreteId) -> impl Iterator<Item = &Node> {
+        // There is none beyond the end.
+        let node = |index: u32| self.nodes.get(index as usize);
+        let first = node(self.heads[discrete.0 as usize]);
+        std::iter::successors(first, move |one| node(one.next))
+    }
+
     /// Whether it is known that no run starts in the zone.
-    fn is_left(&mut self, words: &[i32], zone: &Zone) -> bool {
-        let discrete = self.discrete(words);
-        let mut node = self.heads[discrete.0 as usize];
-        while node != NONE {
-            let Node {
-                zone: other,
-                next,
-                depth,
-                ..
-            } = self.nodes[node as usize];
-            if depth == NONE && dbm::is_subset(zone.bounds(), self.zones.get(other)) {
-                return true;
-            }
-            node = next;
-        }
-        false
+    fn is_left(&self, discrete: DiscreteId, zone: &Zone) -> bool {
+        self.list(discrete)
+            .any(|one| one.depth == NONE && dbm::is_subset(zone.bounds(), self.zones.get(one.zone)))
     }
 
     fn push(

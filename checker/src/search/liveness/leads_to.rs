@@ -59,12 +59,12 @@ impl Goal for Unanswered<'_> {
             counters,
             watch,
         } = visited;
-        let dimension = symbolic.dimension();
-        let extent = symbolic.extent(self.open, words, zone.bounds())?;
-        for part in extent.to_federation(zone.bounds(), dimension).zones() {
-            let zone_on_entry = Zone::from_bounds(dimension, part);
+        for zone_on_entry in symbolic.part(self.open, words, zone)?.to_zones() {
             // For a valuation in an open part, the zone does not say whether time runs in it.
-            let is_open = !symbolic.barriers(words, part)?.open.is_empty();
+            let is_open = !symbolic
+                .barriers(words, zone_on_entry.bounds())?
+                .open
+                .is_empty();
             for is_running in [false, true].into_iter().take(1 + usize::from(is_open)) {
                 let entry = Entry {
                     zone: &zone_on_entry,

@@ -169,24 +169,27 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         self.zones.get(self.nodes[node].zone)
     }
 
+    /// The words and the zone of a node.
+    fn state_of(&self, node: usize) -> (Vec<i32>, Zone) {
+        let words = self.store.words(self.nodes[node].discrete);
+        let zone = Zone::from_bounds(self.symbolic.dimension(), self.zone_of(node));
+        (words, zone)
+    }
+
     fn explore(&mut self, index: usize) -> Result<(), Failure> {
         if std::mem::replace(&mut self.nodes[index].is_explored, true) {
             return Ok(());
         }
         let dimension = self.symbolic.dimension();
-        let mut words = self.symbolic.stepper.network().initial.clone();
-        self.store.load(self.nodes[index].discrete, &mut words);
-        let zone = Zone::from_bounds(dimension, self.zone_of(index));
+        let (mut words, zone) = self.state_of(index);
         let mut moves = Moves::default();
         self.symbolic
             .moves_within(&mut words, zone.bounds(), &mut moves)?;
         let mut target = words.clone();
         for one in moves.iter() {
-            if !self.symbolic.is_enabled(one, zone.bounds())? {
-                continue;
-            }
-            target.copy_from_slice(&words);
-            let Some(effect) = self.symbolic.fire(one, &mut target)? else {
+            let symbolic = &mut *self.symbolic;
+            let Some(effect) = symbolic.fire_within(one, &words, zone.bounds(), &mut target)?
+            else {
                 continue;
             };
             let mut entries = Vec::new();
@@ -237,7 +240,6 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
             return Ok(());
         };
         let (discrete, _) = self.store.intern(words);
-        let dimension = zone.dimension();
         let mut extrapolated = vec![zone.clone()];
         self.symbolic.extrapolate_all(words, &mut extrapolated);
         let known = self.ways.get(&discrete).map_or(&[][..], Vec::as_slice);
@@ -253,9 +255,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
             self.ways.entry(discrete).or_default().push(node);
         }
         let opening = Origin::Opening(self.nodes.len() - 1);
-        let extent = self.symbolic.extent(open, words, zone.bounds())?;
-        for part in extent.to_federation(zone.bounds(), dimension).zones() {
-            let entry = Zone::from_bounds(dimension, part);
+        for entry in self.symbolic.part(open, words, zone)?.to_zones() {
             self.stay(&opening, words, &entry, invariant)?;
         }
         Ok(())
@@ -439,23 +439,16 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
             Stay::Loops(head, way) => {
                 let mut opening = 0;
                 self.follow(&self.nodes[head].from, &mut trace, &mut opening);
-                self.push_node(head, &mut trace);
+                trace.states.push(self.state_of(head));
                 let start = trace.states.len() - 1;
                 for (node, parts) in way {
                     trace.moves.push(parts);
-                    self.push_node(node, &mut trace);
+                    trace.states.push(self.state_of(node));
                 }
                 let ending = RunEnding::Loop(start);
                 (EndlessRun { trace, ending }, opening)
             }
         }
-    }
-
-    fn push_node(&self, node: usize, trace: &mut Trace) {
-        let mut words = self.symbolic.stepper.network().initial.clone();
-        self.store.load(self.nodes[node].discrete, &mut words);
-        let zone = Zone::from_bounds(self.symbolic.dimension(), self.zone_of(node));
-        trace.states.push((words, zone));
     }
 
     /// Adds the states and moves that lead to this origin.
@@ -475,7 +468,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
                 // The rest is the same state, if the run begins in it.
                 Origin::Opening(_) => *opening = trace.states.len(),
                 Origin::Move(node, parts) => {
-                    self.push_node(*node, trace);
+                    trace.states.push(self.state_of(*node));
                     trace.moves.push(parts.clone());
                 }
             }

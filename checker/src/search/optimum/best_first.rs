@@ -195,22 +195,17 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         let nodes_between = moves_between_checks(LOOK_EVERY, dimension) as usize;
         let mut nodes_at_look = self.nodes.len() + nodes_between;
         self.explored += 1;
-        let network = self.symbolic.stepper.network();
-        let mut words = network.initial.clone();
         let Node { discrete, zone, .. } = &self.nodes[node as usize];
-        self.store.load(*discrete, &mut words);
-        let zone = zone.clone();
+        let (mut words, zone) = (self.store.words(*discrete), zone.clone());
         let mut moves = Moves::default();
         self.symbolic
             .moves_within(&mut words, zone.bounds(), &mut moves)?;
         let mut target = words.clone();
         let mut zones = Vec::new();
         for one in moves.iter() {
-            if !self.symbolic.is_enabled(one, zone.bounds())? {
-                continue;
-            }
-            target.copy_from_slice(&words);
-            let Some(effect) = self.symbolic.fire(one, &mut target)? else {
+            let symbolic = &mut *self.symbolic;
+            let Some(effect) = symbolic.fire_within(one, &words, zone.bounds(), &mut target)?
+            else {
                 continue;
             };
             effect.entry_zones(zone.bounds(), self.symbolic.dimension(), &mut zones);
@@ -242,19 +237,22 @@ impl<'s, 'a> BestFirst<'s, 'a> {
                 forget_upper_bounds(zone, clock);
             }
         }
+        if zones.is_empty() {
+            return Ok(());
+        }
+        let (discrete, is_new) = self.store.intern(words);
+        if is_new {
+            self.lists.push(Vec::new());
+        }
         // The goal is evaluated before extrapolation; where it holds, nothing more is explored.
         for zone in &*zones {
             if let Some(cost) = self.goal_cost(words, zone, parent)? {
-                let goal = self.push(words, zone.clone(), parent, step, cost);
+                let goal = self.push(discrete, zone.clone(), parent, step, cost);
                 self.waiting.push(Reverse((cost, true, goal)));
             }
         }
         self.symbolic.extrapolate_all(words, zones);
         for zone in zones.drain(..) {
-            let (discrete, is_new) = self.store.intern(words);
-            if is_new {
-                self.lists.push(Vec::new());
-            }
             let (nodes, list) = (&self.nodes, &mut self.lists[discrete.0 as usize]);
             let bounds_of = |node: u32| nodes[node as usize].zone.bounds();
             let mut known = list.iter().copied();
@@ -273,18 +271,21 @@ impl<'s, 'a> BestFirst<'s, 'a> {
                 Measure::Moves => self.moves_after(parent),
                 Measure::Time(clock) => least_value(&zone, clock),
             };
-            let node = self.push(words, zone, parent, step, cost);
+            let node = self.push(discrete, zone, parent, step, cost);
             self.lists[discrete.0 as usize].push(node);
             self.waiting.push(Reverse((cost, false, node)));
         }
         Ok(())
     }
 
-    fn push(&mut self, words: &[i32], zone: Zone, parent: u32, step: Step, cost: Cost) -> u32 {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.lists.push(Vec::new());
-        }
+    fn push(
+        &mut self,
+        discrete: DiscreteId,
+        zone: Zone,
+        parent: u32,
+        step: Step,
+        cost: Cost,
+    ) -> u32 {
         let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,
@@ -310,11 +311,10 @@ impl<'s, 'a> BestFirst<'s, 'a> {
         zone: &Zone,
         parent: u32,
     ) -> Result<Option<Cost>, Failure> {
-        let dimension = zone.dimension();
         let part = self.goal.part(self.symbolic, words, zone)?;
-        let costs = part.zones().map(|bounds| match self.measure {
+        let costs = part.to_zones().map(|zone| match self.measure {
             Measure::Moves => self.moves_after(parent),
-            Measure::Time(clock) => least_value(&Zone::from_bounds(dimension, bounds), clock),
+            Measure::Time(clock) => least_value(&zone, clock),
         });
         Ok(costs.min())
     }
@@ -333,12 +333,10 @@ impl<'s, 'a> BestFirst<'s, 'a> {
 
     /// The stored states, none of which contains another.
     pub fn into_reached(self) -> Reached {
-        let initial = &self.symbolic.stepper.network().initial;
         let mut reached = Reached::new();
         let mut room = Room::default();
         for (index, list) in self.lists.iter().enumerate() {
-            let mut words = initial.clone();
-            self.store.load(DiscreteId(index as u32), &mut words);
+            let words = self.store.words(DiscreteId(index as u32));
             let zones = list.iter();
             let zones = zones.map(|&node| self.nodes[node as usize].zone.clone());
             let zone_bytes = (self.symbolic.dimension().pow(2)) * size_of::<Bound>();
@@ -351,7 +349,6 @@ impl<'s, 'a> BestFirst<'s, 'a> {
     /// Like [`BestFirst::into_met`], with the moves between these states in the order in which they
     /// were taken. A move stands in it once for each zone that it leads to.
     pub fn into_graph(mut self, most: usize) -> Result<(Vec<Met>, Vec<Link>), Failure> {
-        let initial = self.symbolic.stepper.network().initial.clone();
         let mut moves = Moves::default();
         let mut moves_of = NONE;
         let mut links = Vec::new();
@@ -360,9 +357,7 @@ impl<'s, 'a> BestFirst<'s, 'a> {
                 continue;
             }
             if moves_of != source {
-                let mut words = initial.clone();
-                let discrete = self.nodes[source as usize].discrete;
-                self.store.load(discrete, &mut words);
+                let mut words = self.store.words(self.nodes[source as usize].discrete);
                 self.symbolic.moves(&mut words, &mut moves)?;
                 moves_of = source;
             }
@@ -378,13 +373,11 @@ impl<'s, 'a> BestFirst<'s, 'a> {
     /// The first `most` states in the order in which they were reached, including those that a
     /// later one contains.
     pub fn into_met(self, most: usize) -> Result<Vec<Met>, Failure> {
-        let initial = &self.symbolic.stepper.network().initial;
         let mut moves = Moves::default();
         let mut moves_of = NONE;
         let mut met: Vec<Met> = Vec::new();
         for node in self.nodes.into_iter().take(most) {
-            let mut words = initial.clone();
-            self.store.load(node.discrete, &mut words);
+            let words = self.store.words(node.discrete);
             let mut from = None;
             if node.parent != NONE {
                 let parent = node.parent as usize;

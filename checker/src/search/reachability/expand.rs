@@ -18,6 +18,7 @@ use super::recent::RecentStates;
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::outcome::Step;
 use crate::search::store::packed_zones::Kept;
+use crate::search::store::passed_list::PassedList;
 
 /// The greatest number of committed states in a chain that are explored without waiting.
 const LONGEST_CHAIN: usize = 64;
@@ -37,11 +38,8 @@ pub(super) trait Sink {
     /// need not if a stored state contains it.
     fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool;
 
-    /// The bytes of a state's words that decide identity.
-    fn pack(&mut self, words: &[i32]) -> &[u8];
-
-    /// The approximate number of stored states.
-    fn stored(&self) -> usize;
+    /// The states that are stored here.
+    fn passed(&mut self) -> &mut PassedList;
 }
 
 /// What exploration needs in addition to its own buffers.
@@ -315,15 +313,13 @@ impl Explorer {
             self.way.push(one.rank);
             return self.enter_whole(scene, target, kept, depth);
         }
-        if !symbolic.is_enabled(one, source.zone.bounds())? {
-            return Ok(Taken::Nothing);
-        }
-        target.words.copy_from_slice(&source.words);
-        let Some(effect) = symbolic.fire(one, &mut target.words)? else {
+        let zone = source.zone.bounds();
+        let Some(effect) = symbolic.fire_within(one, &source.words, zone, &mut target.words)?
+        else {
             return Ok(Taken::Nothing);
         };
         let mut entries = std::mem::take(&mut self.entries);
-        effect.entry_zones(source.zone.bounds(), symbolic.dimension(), &mut entries);
+        effect.entry_zones(zone, symbolic.dimension(), &mut entries);
         if may_lead_on && effect.keeps_all_of(&source.zone) {
             let stubborn = self.stubborn.as_ref();
             if stubborn.is_some_and(|stubborn| stubborn.is_passing(one.parts)) {
@@ -461,8 +457,9 @@ impl Explorer {
 
     /// Moves down to a committed state, unless it was explored lately.
     fn descend<S: Sink>(&mut self, sink: &mut S, words: &[i32], zone: &[Bound]) -> Taken {
-        let stored = sink.stored();
-        if self.keeps_recent && self.recent.enter(sink.pack(words), zone, stored) {
+        let passed = sink.passed();
+        let stored = passed.len();
+        if self.keeps_recent && self.recent.enter(passed.pack(words), zone, stored) {
             self.leads_on = false;
             self.way.pop();
             return Taken::Nothing;

@@ -110,8 +110,7 @@ impl Target for &Predicate {
         words: &mut [i32],
         zone: &Zone,
     ) -> Result<Federation, Failure> {
-        let extent = symbolic.extent(self, words, zone.bounds())?;
-        Ok(extent.to_federation(zone.bounds(), zone.dimension()))
+        symbolic.part(self, words, zone)
     }
 }
 

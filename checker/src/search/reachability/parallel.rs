@@ -385,11 +385,7 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
         };
         let steps = tree::way(&trees, current, last);
         let worker = self.worker(index);
-        let goal: Option<&mut dyn Goal> = if is_found {
-            Some(&mut *worker.goal)
-        } else {
-            None
-        };
+        let goal = is_found.then_some(&mut *worker.goal as &mut dyn Goal);
         retrace::retrace(worker.symbolic, &steps, goal)
     }
 }

@@ -24,7 +24,7 @@ use super::tree::{self, Origin, Tree};
 use crate::search::limits::{Counters, Watch, moves_between_checks, states_between_checks};
 use crate::search::outcome::{Outcome, Step, Trace};
 use crate::search::store::packed_zones::Kept;
-use crate::search::store::passed_list::Stored;
+use crate::search::store::passed_list::{PassedList, Stored};
 
 /// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
@@ -92,12 +92,8 @@ impl Sink for Store {
         self.tree.add(words, zone, self.current, way).is_some()
     }
 
-    fn pack(&mut self, words: &[i32]) -> &[u8] {
-        self.tree.passed.pack(words)
-    }
-
-    fn stored(&self) -> usize {
-        self.tree.passed.len()
+    fn passed(&mut self) -> &mut PassedList {
+        &mut self.tree.passed
     }
 }
 
@@ -250,11 +246,7 @@ impl<'s, 'a> Search<'s, 'a> {
     fn trace(&mut self, is_found: bool) -> Trace {
         let Store { tree, current, .. } = &self.store;
         let steps = tree::way(&[tree], *current, self.explorer.way());
-        let goal: Option<&mut dyn Goal> = if is_found {
-            Some(&mut *self.goal)
-        } else {
-            None
-        };
+        let goal = is_found.then_some(&mut *self.goal as &mut dyn Goal);
         retrace::retrace(self.symbolic, &steps, goal)
     }
 }

@@ -14,7 +14,7 @@ use super::expand::Sink;
 use super::tree::{Origin, Tree};
 use crate::search::outcome::Step;
 use crate::search::store::packed_zones::Kept;
-use crate::search::store::passed_list::Stored;
+use crate::search::store::passed_list::{PassedList, Stored};
 
 /// A state that is sent.
 #[derive(Clone, Copy, Debug)]
@@ -214,12 +214,8 @@ impl Sink for Shard {
         self.store_or_send(words, zone, way, true).is_some()
     }
 
-    fn pack(&mut self, words: &[i32]) -> &[u8] {
-        self.tree.passed.pack(words)
-    }
-
-    fn stored(&self) -> usize {
-        self.tree.passed.len()
+    fn passed(&mut self) -> &mut PassedList {
+        &mut self.tree.passed
     }
 }
 

@@ -13,9 +13,9 @@
 //! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up
 //! hashes the bytes once and compares them once, on a match of 32 bits of the hash.
 
-use crate::cancellation;
 use crate::ir::{Network, Shape};
 
+use super::records::Records;
 use super::segmented_table::PiecedTable;
 
 /// The index of a stored discrete state.
@@ -29,9 +29,6 @@ struct Entry {
     id: u32,
     hash: u32,
 }
-
-/// Bytes of records in one block, at least; a block holds a power of two of records.
-const BLOCK_BYTES: usize = 1 << 16;
 
 /// What a word is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,14 +148,11 @@ pub struct StateStore {
     runs: Vec<Run>,
     /// The bytes of a record that decide identity.
     identity: usize,
-    /// The bytes of a record.
-    stride: usize,
-    /// Records in a block, as a power of two.
-    block_bits: u32,
-    blocks: Vec<Vec<u8>>,
+    /// What the words are that are not stored.
+    initial: Vec<i32>,
+    records: Records,
     table: PiecedTable<Entry>,
     scratch: Vec<u8>,
-    count: u32,
 }
 
 impl StateStore {
@@ -171,23 +165,19 @@ impl StateStore {
         let identity = runs.iter().map(Run::bytes).sum();
         runs.extend(runs_of(&written, &widths, identity_words, written.len()));
         let stride = runs.iter().map(Run::bytes).sum::<usize>().max(1);
-        let block_bits = (BLOCK_BYTES / stride).max(1).ilog2();
         StateStore {
             runs,
             identity,
-            stride,
-            block_bits,
-            blocks: Vec::new(),
+            initial: network.initial.clone(),
+            records: Records::new(stride),
             table: PiecedTable::new(),
             scratch: vec![0; stride],
-            count: 0,
         }
     }
 
     /// The bytes that the store takes.
     pub fn bytes(&self) -> usize {
-        let block = self.stride << self.block_bits;
-        self.blocks.len() * block + self.table.bytes()
+        self.records.bytes() + self.table.bytes()
     }
 
     /// The bytes of the state that decide identity, valid until the next call.
@@ -225,51 +215,44 @@ impl StateStore {
     /// The id of the state that was packed or taken over last, which has this hash, and whether it
     /// is new.
     pub(super) fn intern_proposed(&mut self, hash: u32) -> (DiscreteId, bool) {
-        let (blocks, stride, bits, identity) =
-            (&self.blocks, self.stride, self.block_bits, self.identity);
-        let key = &self.scratch[..identity];
-        let is_same = |entry: &Entry| {
-            entry.hash == hash && &record(blocks, stride, bits, entry.id)[..identity] == key
-        };
-        if let Some(entry) = self.table.find(spread(hash), is_same) {
-            return (DiscreteId(entry.id), false);
+        if let Some(known) = self.known(&self.scratch[..self.identity], hash) {
+            return (known, false);
         }
-        let id = cancellation::number(self.count as usize);
-        self.count += 1;
-        if id as usize >> self.block_bits == self.blocks.len() {
-            self.blocks
-                .push(Vec::with_capacity(self.stride << self.block_bits));
-        }
-        let block = self
-            .blocks
-            .last_mut()
-            .expect("a block was just made if there was none");
-        block.extend_from_slice(&self.scratch);
+        let id = self.records.push(&self.scratch);
         self.table
             .insert_unique(spread(hash), Entry { id, hash }, |entry| spread(entry.hash));
         (DiscreteId(id), true)
     }
 
-    /// The id of a stored state.
-    pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
-        let mut packed = vec![0; self.stride];
-        if !pack(&self.runs, words, &mut packed) {
-            return None;
-        }
-        let key = &packed[..self.identity];
-        let hash = hash_bytes(key);
+    #[inline]
+    fn known(&self, key: &[u8], hash: u32) -> Option<DiscreteId> {
         let is_same = |entry: &Entry| {
-            entry.hash == hash
-                && &record(&self.blocks, self.stride, self.block_bits, entry.id)[..self.identity]
-                    == key
+            entry.hash == hash && &self.records.get(entry.id)[..self.identity] == key
         };
         let entry = self.table.find(spread(hash), is_same);
         entry.map(|entry| DiscreteId(entry.id))
     }
 
+    /// The id of a stored state.
+    pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
+        let mut packed = vec![0; self.scratch.len()];
+        if !pack(&self.runs, words, &mut packed) {
+            return None;
+        }
+        let key = &packed[..self.identity];
+        self.known(key, hash_bytes(key))
+    }
+
+    /// The words of a state.
+    pub fn words(&self, id: DiscreteId) -> Vec<i32> {
+        let mut words = self.initial.clone();
+        self.load(id, &mut words);
+        words
+    }
+
     /// Writes the stored words of a state over those of another state of the same network.
     pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
-        let mut record = record(&self.blocks, self.stride, self.block_bits, id.0);
+        let mut record = self.records.get(id.0);
         for run in &self.runs {
             let (bytes, rest) = record.split_at(run.bytes());
             run.unpack(bytes, words);
@@ -288,11 +271,6 @@ fn pack(runs: &[Run], words: &[i32], bytes: &mut [u8]) -> bool {
         rest = others;
     }
     fits
-}
-
-fn record(blocks: &[Vec<u8>], stride: usize, bits: u32, id: u32) -> &[u8] {
-    let within = (id as usize & ((1 << bits) - 1)) * stride;
-    &blocks[id as usize >> bits][within..within + stride]
 }
 
 /// By word: what it is stored as.
@@ -437,7 +415,7 @@ mod tests {
                 first: 0,
                 set: None,
             }));
-            assert_eq!(store.stride, 3 * bytes);
+            assert_eq!(store.scratch.len(), 3 * bytes);
             for state in [[low, high, 0], [high, high, low]] {
                 let (id, is_new) = store.intern(&state);
                 assert!(is_new && store.intern(&state) == (id, false));

@@ -1,10 +1,10 @@
 //! Where states are kept: discrete states, packed zones, the passed list.
 
 pub mod discrete_states;
-mod matrices;
 pub(super) mod packed_paths;
 pub(super) mod packed_zones;
 pub(super) mod passed_list;
+mod records;
 pub(super) mod segmented_table;
 mod signature;
 pub(super) mod zone_lists;

@@ -17,7 +17,7 @@ use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
 
 use super::discrete_states::{hash_bytes, spread};
-use super::matrices::Matrices;
+use super::records::Records;
 use super::segmented_table::PiecedTable;
 use super::signature::{Signature, Signatures, widen_narrow};
 
@@ -210,7 +210,7 @@ pub(super) struct PackedZones {
     tuning: Tuning,
     signatures: Signatures,
     width: Width,
-    matrices: Matrices,
+    matrices: Records,
     /// The matrix that was proposed last.
     candidate: Vec<u8>,
     known: Known,
@@ -235,7 +235,7 @@ impl PackedZones {
             tuning: Tuning::default(),
             signatures: Signatures::new(dimension, greatest),
             width: Width::One,
-            matrices: Matrices::new(dimension * dimension),
+            matrices: Records::new(dimension * dimension),
             candidate: vec![0; dimension * dimension],
             known: Known::default(),
             demands: Vec::new(),

@@ -320,10 +320,7 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     fn extent(&mut self, predicate: &Predicate) -> Result<Federation, Unscheduled> {
         let whole = self.whole()?;
-        let extent = self
-            .symbolic
-            .extent(predicate, &mut self.words, whole.bounds())?;
-        Ok(extent.to_federation(whole.bounds(), whole.dimension()))
+        Ok(self.symbolic.part(predicate, &mut self.words, &whole)?)
     }
 
     /// A new event, reached by waiting in the current state.
@@ -375,15 +372,12 @@ impl<'s, 'a> Plan<'s, 'a> {
 
     /// Where what must stay does not hold.
     fn outside(&mut self, whole: &Zone) -> Result<Federation, Unscheduled> {
-        let dimension = whole.dimension();
         let Some(keep) = &self.keep else {
-            return Ok(Federation::empty(dimension));
+            return Ok(Federation::empty(whole.dimension()));
         };
-        let negation = keep.negated();
-        let extent = self
+        Ok(self
             .symbolic
-            .extent(&negation, &mut self.words, whole.bounds())?;
-        Ok(extent.to_federation(whole.bounds(), dimension))
+            .part(&keep.negated(), &mut self.words, whole)?)
     }
 
     /// What must stay holds at an event.

@@ -1,23 +1,23 @@
-//! Packed matrices side by side, in blocks that are never moved.
+//! Byte strings of one length side by side, in blocks that are never moved.
 
 use crate::cancellation;
 
-/// Bytes of matrices in one block, at least; a block holds a power of two of matrices.
+/// Bytes in one block, at least; a block holds a power of two of records.
 const BLOCK_BYTES: usize = 1 << 16;
 
-/// Packed matrices of one size, by number from 0, in blocks that are never moved.
+/// Byte strings of one length, by number from 0, in blocks that are never moved.
 #[derive(Debug)]
-pub(super) struct Matrices {
+pub(super) struct Records {
     size: usize,
-    /// Matrices in a block, as a power of two.
+    /// Records in a block, as a power of two.
     block_bits: u32,
     pub(super) blocks: Vec<Vec<u8>>,
     count: u32,
 }
 
-impl Matrices {
-    pub(super) fn new(size: usize) -> Matrices {
-        Matrices {
+impl Records {
+    pub(super) fn new(size: usize) -> Records {
+        Records {
             size,
             block_bits: (BLOCK_BYTES / size).max(1).ilog2(),
             blocks: Vec::new(),
@@ -36,14 +36,14 @@ impl Matrices {
         &mut self.blocks[block][first..first + self.size]
     }
 
-    /// The block of a matrix, and where it begins there.
+    /// The block of a record, and where it begins there.
     #[inline]
     fn place(&self, id: u32) -> (usize, usize) {
         let within = id as usize & ((1 << self.block_bits) - 1);
         (id as usize >> self.block_bits, within * self.size)
     }
 
-    pub(super) fn push(&mut self, matrix: &[u8]) -> u32 {
+    pub(super) fn push(&mut self, record: &[u8]) -> u32 {
         let id = cancellation::number(self.count as usize);
         self.count += 1;
         if id as usize >> self.block_bits == self.blocks.len() {
@@ -53,7 +53,7 @@ impl Matrices {
         let block = self.blocks.last_mut();
         block
             .expect("a block was just made if there was none")
-            .extend_from_slice(matrix);
+            .extend_from_slice(record);
         id
     }
 
