@@ -16,7 +16,7 @@ use super::run::Runner;
 use super::run_id::RunId;
 use super::run_watch::{RunWatch, Shown, Shows};
 use crate::cancellation;
-use crate::ir::{Path, RunBound, Statistical};
+use crate::ir::{Asked, Path, RunBound, Statistical};
 
 /// Gives blocks of results: of runs from a number on, as [`block`] writes them. It is told how many
 /// runs are needed at most, if that is known. An empty block says that none is there yet.
@@ -227,26 +227,15 @@ pub(super) fn shown(
     query: &Statistical,
     run: RunId,
 ) -> Result<Shown, Failure> {
-    match query {
-        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
-            let outcome = runner.path(run, bound, path)?;
-            Ok(Shown::Decided {
-                satisfied: outcome.satisfied,
-                at: outcome.at,
-            })
-        }
-        Statistical::Expectation {
-            bound,
-            maximum,
-            value,
-            ..
-        } => {
-            let (value, _) = runner.extreme(run, bound, *value, *maximum)?;
-            Ok(Shown::Value(value))
-        }
-        Statistical::Comparison { .. } => unreachable!("a comparison is about pairs of runs"),
-        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
-    }
+    let asked = query.asked().expect("the query is about single runs");
+    let outcome = runner.observe(run, query.bound(), asked)?;
+    Ok(match asked {
+        Asked::Path(_) => Shown::Decided {
+            satisfied: outcome.value != 0.0,
+            at: outcome.at,
+        },
+        Asked::Extreme(..) => Shown::Value(outcome.value),
+    })
 }
 
 /// Whether a run and the next one have what is asked of the two runs of a pair.
@@ -260,9 +249,9 @@ pub(super) fn pair_of_runs(
         run: first.run + 1,
         ..first
     };
-    let first = runner.path(first, &left.0, &left.1)?;
-    let second = runner.path(next, &right.0, &right.1)?;
-    Ok((first.satisfied, second.satisfied))
+    let first = runner.observe(first, &left.0, Asked::Path(&left.1))?;
+    let second = runner.observe(next, &right.0, Asked::Path(&right.1))?;
+    Ok((first.value != 0.0, second.value != 0.0))
 }
 
 /// Consumes the results of runs 0, 1, … as [`in_order`] does; they are made by threads, or come

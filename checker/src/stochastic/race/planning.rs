@@ -210,7 +210,7 @@ impl Race<'_> {
             let rate = if is_uniform {
                 None
             } else {
-                rules::exponential_rate(race, process, spot, never)?
+                Some(rules::exponential_rate(race, process, spot, never)?)
             };
             drawn.set(race.delay_in_windows(rate)?);
             Ok(())

@@ -286,9 +286,7 @@ impl<R: Copy> Planning<'_, '_, R> {
         length: Option<R>,
         never: B::Exit,
     ) -> Flow<B> {
-        let Some(rate) = exponential_rate(b, self.process, self.spot, never)? else {
-            return Ok(());
-        };
+        let rate = exponential_rate(b, self.process, self.spot, never)?;
         let Some(length) = length.filter(|_| !self.spot.is_plain) else {
             let passed = b.draw_exponential(rate);
             let moment = window.after(b, passed);
@@ -391,12 +389,10 @@ impl<R: Copy> Planning<'_, '_, R> {
             Ok(())
         };
         let by_rate = |b: &mut B| {
-            b.attempt(
-                |b, never| match exponential_rate(b, self.process, self.spot, never)? {
-                    None => Ok(()),
-                    rate => draw(b, rate),
-                },
-            )
+            b.attempt(|b, never| {
+                let rate = exponential_rate(b, self.process, self.spot, never)?;
+                draw(b, Some(rate))
+            })
         };
         match self.bound {
             None => by_rate(b),
@@ -409,31 +405,28 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 }
 
-/// The rate of the exponential delay, which is greater than 0; leaves if it is 0. None if there is
-/// none, which has ended the run or left.
+/// The rate of the exponential delay, which is greater than 0; leaves if it is 0, and ends the run
+/// if there is none.
 #[inline]
 pub(in crate::stochastic) fn exponential_rate<B: Backend>(
     b: &mut B,
     process: usize,
     spot: &Spot,
     never: B::Exit,
-) -> Flow<B, Option<B::Real>> {
+) -> Flow<B, B::Real> {
     let stand = b.stand(process);
     let Some(known) = spot.exponential_rate else {
         b.fail(|_| Failure::NoRate(stand))?;
-        return Ok(None);
+        // What is written behind it as code is not reached.
+        return Ok(b.real(0.0));
     };
-    if known == Number::Known(0.0) {
-        b.leave(never)?;
-        return Ok(None);
-    }
     let rate = number(b, known, &[])?;
     if !matches!(known, Number::Known(rate) if rate > 0.0 && rate.is_finite()) {
         b.insist_on_range(rate, |b| Failure::Rate(stand, b.shown(rate)))?;
         let is_positive = b.compare_real_to(rate, Relation::Greater, 0.0);
         b.unless(is_positive, never)?;
     }
-    Ok(Some(rate))
+    Ok(rate)
 }
 
 /// A number, as much greater as counts as equal.
