@@ -26,7 +26,6 @@ impl<R: Copy> Bound<R> {
 }
 
 /// Lets a process plan in a location.
-#[inline]
 pub(in crate::stochastic) fn plan<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -86,7 +85,6 @@ pub(in crate::stochastic) fn stay<B: Backend>(
     Ok(bound(b, program, process, spot)?.map(|bound| bound.end))
 }
 
-#[inline]
 fn bound<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -143,7 +141,6 @@ pub(in crate::stochastic) fn require_invariant<B: Backend>(
 }
 
 /// Goes on if an output of a process is enabled, else leaves.
-#[inline]
 fn require_some_output<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -194,7 +191,6 @@ struct Planning<'p, 'a, R> {
 
 impl<R: Copy> Planning<'_, '_, R> {
     /// Ends a plan: the process tries to move at a moment that it may stay until.
-    #[inline]
     fn end_in_time<B: Backend<Real = R>>(&self, b: &mut B, moment: R) {
         let stay = self.bound.map(|bound| bound.end);
         b.set_plan(self.process, Some(moment), stay, false);
@@ -216,7 +212,6 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// The end of a window, cut where the process may stay no longer.
-    #[inline]
     fn cut<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>) -> Option<R> {
         let mut high = window.high;
         if let Some(Bound { end, .. }) = self.bound {
@@ -229,7 +224,6 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// Draws the delay in one window, and ends the plan.
-    #[inline]
     fn in_window<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -258,7 +252,6 @@ impl<R: Copy> Planning<'_, '_, R> {
         self.by_rate(b, window, length, never)
     }
 
-    #[inline]
     fn uniformly<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, length: R) -> Flow<B> {
         if self.spot.is_plain {
             // A moment of no length is drawn as any other.
@@ -278,7 +271,6 @@ impl<R: Copy> Planning<'_, '_, R> {
         Ok(())
     }
 
-    #[inline]
     fn by_rate<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -407,7 +399,6 @@ impl<R: Copy> Planning<'_, '_, R> {
 
 /// The rate of the exponential delay, which is greater than 0; leaves if it is 0, and ends the run
 /// if there is none.
-#[inline]
 pub(in crate::stochastic) fn exponential_rate<B: Backend>(
     b: &mut B,
     process: usize,
@@ -430,7 +421,6 @@ pub(in crate::stochastic) fn exponential_rate<B: Backend>(
 }
 
 /// A number, as much greater as counts as equal.
-#[inline]
 pub(in crate::stochastic) fn tolerant<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let (part, tolerance) = (b.real(1.0 + TOLERANCE), b.real(TOLERANCE));
     let value = b.multiply(value, part);
