@@ -1,7 +1,7 @@
 """The table of all that steers: its words, its unit, its help.
 
 A new setting is one row of `PARAMETERS`, and a field in `ntagen.drive.settings` (or, for the
-virtual needle, in `ntagen.drive.simulate`). From the row follow the language (`ntagen.nsl`: words,
+virtual needle, in `ntagen.needle.errors`). From the row follow the language (`ntagen.nsl`: words,
 dimension, diagnostics, layout), what ``--set`` takes, and the lists of settings.
 
 Values are in mm, rad, s, N and bytes, wherever they come from.

@@ -16,7 +16,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use checker::exec::Jit;
-use checker::ir::Statistical;
+use checker::ir::{Asked, Statistical};
 use checker::stochastic::{RunId, Runner};
 
 use statistical::{DEVIATIONS, Measured, load};
@@ -191,9 +191,9 @@ fn run(case: &Case, runs: u64) -> Result<(Measured, f64), Box<dyn Error>> {
     let begin = Instant::now();
     for run in 0..runs {
         let outcome = runner
-            .path(RunId { seed: 1, run }, bound, path)
+            .observe(RunId { seed: 1, run }, bound, Asked::Path(path))
             .map_err(|failure| format!("{}: run {run} fails: {failure:?}", case.name))?;
-        satisfied += u64::from(outcome.satisfied);
+        satisfied += u64::from(outcome.value != 0.0);
         moves += outcome.moves;
         squares += (outcome.moves as f64).powi(2);
     }

@@ -15,7 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use checker::exec::{Executor, Jit};
-use checker::ir::{Network, Statistical};
+use checker::ir::{Asked, Network, Statistical};
 use checker::stochastic::{Precision, RunId, Runner, estimate};
 
 use statistical::{DEVIATIONS, Measured, load};
@@ -234,7 +234,7 @@ fn counted_moves(network: &Network, executor: &dyn Executor, query: &Statistical
     let mut runner = Runner::new(network, executor);
     let (mut sum, mut squares) = (0.0, 0.0);
     for run in 0..COUNTED_RUNS {
-        let outcome = runner.path(RunId { seed: 0, run }, bound, path);
+        let outcome = runner.observe(RunId { seed: 0, run }, bound, Asked::Path(path));
         let moves = outcome
             .expect("the runs of the benchmark do not fail")
             .moves as f64;

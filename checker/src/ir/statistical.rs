@@ -100,3 +100,39 @@ pub enum Path {
     /// Any other formula over time.
     Formula(Formula),
 }
+
+/// What is asked of one run.
+#[derive(Clone, Copy, Debug)]
+pub enum Asked<'q> {
+    /// Whether it has what a path says.
+    Path(&'q Path),
+    /// The least value that a function leaves, or the greatest if this is true.
+    Extreme(FunctionId, bool),
+}
+
+impl Statistical {
+    /// How long the runs of a query are; the runs of the second probability of a comparison have a
+    /// bound of their own.
+    pub fn bound(&self) -> &RunBound {
+        match self {
+            Statistical::Probability(bound, _)
+            | Statistical::Hypothesis { bound, .. }
+            | Statistical::Expectation { bound, .. } => bound,
+            Statistical::Comparison { left, .. } => &left.0,
+            Statistical::Simulation(asked) => &asked.bound,
+        }
+    }
+
+    /// What is asked of each run; `None` where runs are compared or shown.
+    pub fn asked(&self) -> Option<Asked<'_>> {
+        match self {
+            Statistical::Probability(_, path) | Statistical::Hypothesis { path, .. } => {
+                Some(Asked::Path(path))
+            }
+            Statistical::Expectation { value, maximum, .. } => {
+                Some(Asked::Extreme(*value, *maximum))
+            }
+            Statistical::Comparison { .. } | Statistical::Simulation(_) => None,
+        }
+    }
+}

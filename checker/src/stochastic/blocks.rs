@@ -16,7 +16,7 @@ use super::run::Runner;
 use super::run_id::RunId;
 use super::run_watch::{RunWatch, Shown, Shows};
 use crate::cancellation;
-use crate::ir::{Path, RunBound, Statistical};
+use crate::ir::{Asked, Path, RunBound, Statistical};
 
 /// Gives blocks of results: of runs from a number on, as [`block`] writes them. It is told how many
 /// runs are needed at most, if that is known. An empty block says that none is there yet.
@@ -118,27 +118,6 @@ fn read_byte(from: &mut &[u8]) -> Option<u8> {
     Some(*byte)
 }
 
-/// A number in bytes of 7 bits, the lowest first (LEB128).
-fn write_number(mut number: u64, to: &mut Vec<u8>) {
-    while number >= 0x80 {
-        to.push(number as u8 | 0x80);
-        number >>= 7;
-    }
-    to.push(number as u8);
-}
-
-fn read_number(from: &mut &[u8]) -> Option<u64> {
-    let mut number = 0_u64;
-    for shift in (0..u64::BITS).step_by(7) {
-        let byte = read_byte(from)?;
-        number |= u64::from(byte & 0x7f).checked_shl(shift)?;
-        if byte & 0x80 == 0 {
-            return Some(number);
-        }
-    }
-    None
-}
-
 /// Writes results, each with how often it comes.
 struct Writer<T> {
     bytes: Vec<u8>,
@@ -158,7 +137,7 @@ impl<T: Transferred> Writer<T> {
 
     fn finish_last(&mut self) {
         if let Some((result, count)) = self.last.take() {
-            write_number(count, &mut self.bytes);
+            self.bytes.extend(count.to_le_bytes());
             result.write(&mut self.bytes);
         }
     }
@@ -166,7 +145,7 @@ impl<T: Transferred> Writer<T> {
     /// Marks that the next run failed.
     fn fail(&mut self) {
         self.finish_last();
-        write_number(0, &mut self.bytes);
+        self.bytes.extend(0_u64.to_le_bytes());
     }
 }
 
@@ -227,26 +206,15 @@ pub(super) fn shown(
     query: &Statistical,
     run: RunId,
 ) -> Result<Shown, Failure> {
-    match query {
-        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
-            let outcome = runner.path(run, bound, path)?;
-            Ok(Shown::Decided {
-                satisfied: outcome.satisfied,
-                at: outcome.at,
-            })
-        }
-        Statistical::Expectation {
-            bound,
-            maximum,
-            value,
-            ..
-        } => {
-            let (value, _) = runner.extreme(run, bound, *value, *maximum)?;
-            Ok(Shown::Value(value))
-        }
-        Statistical::Comparison { .. } => unreachable!("a comparison is about pairs of runs"),
-        Statistical::Simulation(_) => unreachable!("runs are shown by `simulate`"),
-    }
+    let asked = query.asked().expect("the query is about single runs");
+    let outcome = runner.observe(run, query.bound(), asked)?;
+    Ok(match asked {
+        Asked::Path(_) => Shown::Decided {
+            satisfied: outcome.value != 0.0,
+            at: outcome.at,
+        },
+        Asked::Extreme(..) => Shown::Value(outcome.value),
+    })
 }
 
 /// Whether a run and the next one have what is asked of the two runs of a pair.
@@ -260,9 +228,9 @@ pub(super) fn pair_of_runs(
         run: first.run + 1,
         ..first
     };
-    let first = runner.path(first, &left.0, &left.1)?;
-    let second = runner.path(next, &right.0, &right.1)?;
-    Ok((first.satisfied, second.satisfied))
+    let first = runner.observe(first, &left.0, Asked::Path(&left.1))?;
+    let second = runner.observe(next, &right.0, Asked::Path(&right.1))?;
+    Ok((first.value != 0.0, second.value != 0.0))
 }
 
 /// Consumes the results of runs 0, 1, … as [`in_order`] does; they are made by threads, or come
@@ -310,17 +278,26 @@ pub(super) fn from_anywhere<T: Transferred + Shows + Send>(
 
 /// Takes a result from the front, and how often it comes. If there is none, nothing is left.
 fn read<T: Transferred>(from: &mut &[u8]) -> Option<(T, u64)> {
-    let count = read_number(from).filter(|count| *count > 0);
-    let result = count.and_then(|count| Some((T::read(from)?, count)));
+    let result = read_counted(from);
     if result.is_none() {
         *from = &[];
     }
     result
 }
 
+fn read_counted<T: Transferred>(from: &mut &[u8]) -> Option<(T, u64)> {
+    let (count, rest) = from.split_first_chunk()?;
+    *from = rest;
+    let count = u64::from_le_bytes(*count);
+    (count > 0)
+        .then(|| T::read(from))
+        .flatten()
+        .map(|result| (result, count))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Shown, Transferred, Writer, read, read_number, write_number};
+    use super::{Shown, Transferred, Writer, read};
 
     fn written<T: Transferred>(results: &[T]) -> Vec<u8> {
         let mut writer = Writer {
@@ -361,14 +338,10 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_any_size_come_back_and_others_are_refused() {
-        for number in [0, 1, 127, 128, 300, u64::from(u32::MAX), u64::MAX] {
-            let mut bytes = Vec::new();
-            write_number(number, &mut bytes);
-            assert_eq!(read_number(&mut &bytes[..]), Some(number));
-            bytes.pop();
-            assert_eq!(read_number(&mut &bytes[..]), None, "{number} is cut");
+    fn what_is_cut_is_refused() {
+        let whole = written(&[Shown::Value(7.0)]);
+        for length in 0..whole.len() {
+            assert!(all::<Shown>(&whole[..length]).is_empty(), "cut at {length}");
         }
-        assert_eq!(read_number(&mut &[0xff_u8; 11][..]), None);
     }
 }

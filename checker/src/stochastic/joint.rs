@@ -13,15 +13,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::behaviour::Behaviour;
 use super::collector::Collector;
-use super::extreme::Extreme;
 use super::failure::Failure;
 use super::in_order::in_order;
-use super::mitl::Watch;
+use super::observer::Observer;
 use super::precision::{Estimate, Precision};
-use super::run::{Runner, watched};
+use super::run::Runner;
 use super::run_id::RunId;
 use super::run_watch::{Ends, Shows};
-use crate::ir::{Path, RunBound, Statistical};
+use crate::ir::{RunBound, Statistical};
 
 /// Answers queries for estimates or tests from the same runs, each with what is asked of it alone;
 /// all have the same bound and the same seed. `ends` is asked now and then, with the number of runs
@@ -37,7 +36,7 @@ pub fn estimate_jointly(
     let Some((first, Precision { seed, threads, .. })) = asked.first() else {
         return Ok(Vec::new());
     };
-    let bound = bound_of(first);
+    let bound = first.bound();
     let queries: Vec<&Statistical> = asked.iter().map(|(query, _)| *query).collect();
     let mut collectors: Vec<Collector> = asked
         .iter()
@@ -84,30 +83,13 @@ pub fn estimate_jointly(
     Ok(estimates.collect())
 }
 
-/// How long the runs of a query are.
-pub fn bound_of(query: &Statistical) -> &RunBound {
-    match query {
-        Statistical::Probability(bound, _)
-        | Statistical::Hypothesis { bound, .. }
-        | Statistical::Expectation { bound, .. } => bound,
-        // The runs of the second probability have a bound of their own.
-        Statistical::Comparison { left, .. } => &left.0,
-        Statistical::Simulation(asked) => &asked.bound,
-    }
-}
-
 /// What is known of a run for one query.
 enum Seen<'q> {
     /// Nothing is looked for.
     Closed,
-    /// Not decided yet.
-    Open,
-    /// A formula that is not decided yet.
-    Formula(Watch<'q>),
+    Open(Observer<'q>),
     /// Whether it is satisfied.
     Decided(bool),
-    /// The least or greatest value so far, and whether it may change as time passes.
-    Extreme(Extreme, bool),
 }
 
 /// What a run says of several queries.
@@ -131,79 +113,36 @@ impl Runner<'_> {
         let mut seen: Vec<Seen<'_>> = queries
             .iter()
             .zip(open)
-            .map(|(query, open)| match query {
-                _ if !open.load(Ordering::Relaxed) => Seen::Closed,
-                &&Statistical::Expectation { value, maximum, .. } => {
-                    Seen::Extreme(Extreme::new(value, maximum), self.program.is_timed(value))
+            .map(|(query, open)| {
+                if !open.load(Ordering::Relaxed) {
+                    return Seen::Closed;
                 }
-                Statistical::Probability(_, Path::Formula(formula))
-                | Statistical::Hypothesis {
-                    path: Path::Formula(formula),
-                    ..
-                } => Seen::Formula(Watch::new(formula)),
-                _ => Seen::Open,
+                let asked = query.asked().expect("the query is about single runs");
+                Seen::Open(Observer::new(&self.program, asked))
             })
             .collect();
         let ended = self.until_bound(id, bound, &mut |race, delay| {
             let mut is_over = true;
-            for (query, seen) in queries.iter().zip(&mut seen) {
-                match (&mut *seen, query) {
-                    (
-                        Seen::Open,
-                        Statistical::Probability(_, path) | Statistical::Hypothesis { path, .. },
-                    ) => {
-                        if let Some((satisfied, _)) = watched(race, path, delay)? {
-                            *seen = Seen::Decided(satisfied);
-                        } else {
-                            is_over = false;
-                        }
-                    }
-                    (Seen::Formula(watch), _) => {
-                        if let Some((satisfied, _)) = watch.state(race, delay)? {
-                            *seen = Seen::Decided(satisfied);
-                        } else {
-                            is_over = false;
-                        }
-                    }
-                    (Seen::Extreme(extreme, is_timed), _) => {
-                        extreme.look(&mut race.machine)?;
-                        if *is_timed && delay > 0.0 && delay.is_finite() {
-                            extreme.look_through(race, delay)?;
-                        }
-                        is_over = false;
-                    }
-                    _ => {}
+            for one in &mut seen {
+                let Seen::Open(observer) = one else { continue };
+                match observer.look(race, delay)? {
+                    Some((satisfied, _)) => *one = Seen::Decided(satisfied),
+                    None => is_over = false,
                 }
             }
             Ok(is_over)
         });
         let mut failure = ended.err();
-        let mut results = Vec::with_capacity(seen.len());
-        for (query, seen) in queries.iter().zip(&mut seen) {
-            if let (Seen::Extreme(extreme, _), None) = (&mut *seen, &failure) {
-                failure = extreme.look(&mut self.race.machine).err();
+        let results = seen.into_iter().map(|one| match one {
+            Seen::Closed => None,
+            Seen::Decided(satisfied) => Some(f64::from(satisfied)),
+            Seen::Open(_) if failure.is_some() => None,
+            Seen::Open(mut observer) => {
+                let result = observer.finish(&mut self.race.machine);
+                result.map_err(|found| failure = Some(found)).ok()
             }
-            results.push(match seen {
-                Seen::Decided(satisfied) => Some(f64::from(*satisfied)),
-                Seen::Closed => None,
-                _ if failure.is_some() => None,
-                Seen::Open => Some(f64::from(holds_at_the_end(query))),
-                Seen::Formula(watch) => Some(f64::from(watch.finish())),
-                Seen::Extreme(extreme, _) => Some(extreme.value()),
-            });
-        }
+        });
+        let results = results.collect();
         JointRun { results, failure }
     }
-}
-
-/// Whether a run that was not decided until its bound satisfies a query.
-fn holds_at_the_end(query: &Statistical) -> bool {
-    matches!(
-        query,
-        Statistical::Probability(_, Path::Always(_))
-            | Statistical::Hypothesis {
-                path: Path::Always(_),
-                ..
-            }
-    )
 }

@@ -99,7 +99,6 @@ impl<'a> Machine<'a> {
     }
 
     /// The random numbers of the run.
-    #[inline]
     pub(super) fn stream(&mut self) -> Stream<'_> {
         let start = self.network.chances.stream as usize;
         Stream::of(&mut self.words[start..start + STREAM_WORDS])
@@ -126,41 +125,34 @@ impl<'a> Machine<'a> {
         found
     }
 
-    #[inline]
     pub(super) fn location(&self, process: usize) -> LocationId {
         LocationId(self.words[process] as u32)
     }
 
-    #[inline]
     pub(super) fn enter(&mut self, ProcessId(process): ProcessId, location: LocationId) {
         self.words[process as usize] = location.0 as i32;
     }
 
-    #[inline]
     pub(super) fn double(&self, offset: u32) -> f64 {
         let offset = offset as usize;
         double_of_words(self.words[offset], self.words[offset + 1])
     }
 
-    #[inline]
     pub(super) fn set_double(&mut self, offset: u32, value: f64) {
         let offset = offset as usize;
         self.words[offset..offset + 2].copy_from_slice(&double_words(value));
     }
 
     /// The value of the clock at these words, and its rate.
-    #[inline]
     pub(super) fn clock(&self, offset: u32) -> (f64, f64) {
         (self.double(offset), self.double(offset + 2))
     }
 
-    #[inline]
     pub(super) fn set_rate(&mut self, clock: u32, rate: f64) {
         self.set_double(clock + 2, rate);
     }
 
     /// Lets time pass.
-    #[inline]
     pub(super) fn advance(&mut self, time: f64) {
         let network = self.network;
         for &offset in &network.chances.clocks {
@@ -172,7 +164,6 @@ impl<'a> Machine<'a> {
     }
 
     /// Calls a function of the model.
-    #[inline]
     pub(super) fn call(&mut self, function: FunctionId, arguments: &[i32]) -> Result<i32, Failure> {
         let mut context = Context {
             state: &mut self.words,
@@ -183,7 +174,6 @@ impl<'a> Machine<'a> {
     }
 
     /// A condition after this time, if nothing happens until then.
-    #[inline]
     pub(super) fn mask(
         &mut self,
         condition: Condition,
@@ -230,7 +220,6 @@ impl<'a> Machine<'a> {
     }
 
     /// Whether a condition holds now.
-    #[inline]
     pub(super) fn holds(
         &mut self,
         condition: Condition,
@@ -240,13 +229,11 @@ impl<'a> Machine<'a> {
     }
 
     /// The double that a function leaves.
-    #[inline]
     pub(super) fn real(&mut self, function: FunctionId, arguments: &[i32]) -> Result<f64, Failure> {
         self.call(function, arguments)?;
         Ok(self.double(self.network.chances.result))
     }
 
-    #[inline]
     pub(super) fn update(&mut self, update: &Update, arguments: &[i32]) -> Result<(), Failure> {
         if let Some(function) = update.function {
             self.call(function, arguments)?;

@@ -4,9 +4,10 @@
 use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::in_order::in_order;
+use super::observer::watched;
 use super::precision::{Estimate, Precision};
 use super::race::Race;
-use super::run::{Runner, watched};
+use super::run::Runner;
 use super::run_id::RunId;
 use super::run_watch::Ends;
 use super::splitting::{End, Part, Parts, pilot, repetition};

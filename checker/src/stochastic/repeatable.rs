@@ -4,13 +4,13 @@ use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::run::Runner;
 use super::run_id::RunId;
-use crate::ir::Statistical;
+use crate::ir::{Asked, Statistical};
 
 /// How many runs are made twice.
 const RUNS: u64 = 3;
 
-/// What is seen of a run, bit by bit: its values and how many moves it took.
-type Seen = (Vec<u64>, u64);
+/// What is seen of a run, bit by bit: its values, and how many moves it took.
+type Seen = Vec<u64>;
 
 /// Makes the first runs of a query twice; whether they are the same both times.
 ///
@@ -33,36 +33,23 @@ pub fn is_repeatable(
 }
 
 fn seen(runner: &mut Runner<'_>, query: &Statistical, run: RunId) -> Result<Seen, Failure> {
-    match query {
-        Statistical::Probability(bound, path) | Statistical::Hypothesis { bound, path, .. } => {
-            let outcome = runner.path(run, bound, path)?;
-            let satisfied = u64::from(outcome.satisfied);
-            Ok((vec![satisfied, outcome.time.to_bits()], outcome.moves))
-        }
-        Statistical::Expectation {
-            bound,
-            maximum,
-            value,
-            ..
-        } => {
-            let (value, moves) = runner.extreme(run, bound, *value, *maximum)?;
-            Ok((vec![value.to_bits()], moves))
-        }
-        Statistical::Comparison { left, right, .. } => {
-            let mut seen = Vec::new();
-            let mut moves = 0;
-            for (bound, path) in [left, right] {
-                let outcome = runner.path(run, bound, path)?;
-                seen.extend([u64::from(outcome.satisfied), outcome.time.to_bits()]);
-                moves += outcome.moves;
-            }
-            Ok((seen, moves))
-        }
-        Statistical::Simulation(asked) => {
-            let trajectory = runner.trajectory(run, asked)?;
-            let points = trajectory.points.iter().flatten();
-            let bits = points.flat_map(|(time, value)| [time.to_bits(), value.to_bits()]);
-            Ok((bits.collect(), 0))
-        }
+    if let Statistical::Simulation(shown) = query {
+        let trajectory = runner.trajectory(run, shown)?;
+        let points = trajectory.points.iter().flatten();
+        let bits = points.flat_map(|(time, value)| [time.to_bits(), value.to_bits()]);
+        return Ok(bits.collect());
     }
+    let asked = match query {
+        Statistical::Comparison { left, right, .. } => [left, right]
+            .map(|(bound, path)| (bound, Some(Asked::Path(path))))
+            .to_vec(),
+        query => vec![(query.bound(), query.asked())],
+    };
+    let mut seen = Vec::new();
+    for (bound, asked) in asked {
+        let outcome = runner.observe(run, bound, asked.expect("runs that are not shown"))?;
+        seen.extend([outcome.value, outcome.time].map(f64::to_bits));
+        seen.push(outcome.moves);
+    }
+    Ok(seen)
 }

@@ -6,28 +6,23 @@ use std::iter;
 use std::sync::Arc;
 
 use super::behaviour::Behaviour;
-use super::condition::Condition;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
-use super::extreme::Extreme;
 use super::failure::Failure;
-use super::machine::{Machine, Mask};
-use super::mitl::Watch;
+use super::machine::Machine;
+use super::observer::{Observer, watched};
 use super::program::Program;
 use super::race::Race;
-use super::race_code::{Asked, End, RaceCode, Stages, Watched};
+use super::race_code::{RaceCode, Stages, Watched};
 use super::run_id::RunId;
 use crate::cancellation;
 use crate::exec::Executor;
-use crate::ir::{Formula, FunctionId, Network, Path, RunBound, RunLimit, Simulation};
-
-/// The changes of a condition that are followed within one delay.
-const MOST_CHANGES: usize = 1_000_000;
+use crate::ir::{Asked, Network, Path, RunBound, RunLimit, Simulation};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
-    /// Whether it has what was asked.
-    pub satisfied: bool,
+    /// The extreme value that was asked for; or 1 if the run has what a path says, and else 0.
+    pub value: f64,
     /// When that was decided, in units of the model.
     pub time: f64,
     /// How many moves it took.
@@ -145,17 +140,10 @@ impl<'a> Runner<'a> {
     }
 
     /// Makes a run as code, if there is any.
-    fn written(&mut self, id: RunId, bound: &RunBound, asked: Asked<'_>) -> Option<End> {
+    fn written(&mut self, id: RunId, bound: &RunBound, asked: Asked<'_>) -> Option<Outcome> {
         let stages = self.stages.as_mut().filter(|_| RaceCode::knows(bound))?;
         let watched = Watched::of(asked)?;
         stages.run(&self.program, self.executor, watched, id, bound.value)
-    }
-
-    /// Counts the moves of a run that was made move by move.
-    fn count_moves(&mut self) {
-        if let Some(stages) = &mut self.stages {
-            stages.count(self.race.moves);
-        }
     }
 
     /// One for each thread, at least one: what does not change from run to run is shared.
@@ -170,81 +158,35 @@ impl<'a> Runner<'a> {
         iter::once(first).chain(others).collect()
     }
 
-    /// A run, until it has what `path` asks or not.
-    pub fn path(&mut self, id: RunId, bound: &RunBound, path: &Path) -> Result<Outcome, Failure> {
-        if let Path::Formula(formula) = path {
-            return self.formula(id, bound, formula);
-        }
-        if let Some(end) = self.written(id, bound, Asked::Path(path)) {
-            return Ok(Outcome {
-                satisfied: end.decided.unwrap_or(matches!(path, Path::Always(_))),
-                time: end.time,
-                moves: end.moves,
-                at: end.time,
-            });
-        }
-        let mut decided = None;
-        self.until_bound(id, bound, &mut |race, delay| {
-            decided = watched(race, path, delay)?;
-            Ok(decided.is_some())
-        })?;
-        self.count_moves();
-        let (satisfied, ahead) = decided.unwrap_or((matches!(path, Path::Always(_)), 0.0));
-        Ok(Outcome {
-            satisfied,
-            time: self.race.time + ahead,
-            moves: self.race.moves,
-            at: position(&self.race, bound, ahead),
-        })
-    }
-
-    /// A run, until it is decided whether a formula holds for it.
-    fn formula(
+    /// A run, until what is asked of it is decided or its bound is reached.
+    pub fn observe(
         &mut self,
         id: RunId,
         bound: &RunBound,
-        formula: &Formula,
+        asked: Asked<'_>,
     ) -> Result<Outcome, Failure> {
-        let mut watch = Watch::new(formula);
+        if let Some(outcome) = self.written(id, bound, asked) {
+            return Ok(outcome);
+        }
+        let mut observer = Observer::new(&self.program, asked);
         let mut decided = None;
         self.until_bound(id, bound, &mut |race, delay| {
-            decided = watch.state(race, delay)?;
+            decided = observer.look(race, delay)?;
             Ok(decided.is_some())
         })?;
-        let (satisfied, ahead) = decided.unwrap_or_else(|| (watch.finish(), 0.0));
+        let (value, ahead) = match decided {
+            Some((satisfied, ahead)) => (f64::from(satisfied), ahead),
+            None => (observer.finish(&mut self.race.machine)?, 0.0),
+        };
+        if let Some(stages) = &mut self.stages {
+            stages.count(self.race.moves);
+        }
         Ok(Outcome {
-            satisfied,
+            value,
             time: self.race.time + ahead,
             moves: self.race.moves,
             at: position(&self.race, bound, ahead),
         })
-    }
-
-    /// The least or greatest value of an expression in a run.
-    pub fn extreme(
-        &mut self,
-        id: RunId,
-        bound: &RunBound,
-        value: FunctionId,
-        maximum: bool,
-    ) -> Result<(f64, u64), Failure> {
-        let asked = Asked::Extreme(value, maximum);
-        if let Some(end) = self.written(id, bound, asked) {
-            let sign = if maximum { 1.0 } else { -1.0 };
-            return Ok((sign * end.best, end.moves));
-        }
-        let is_timed = self.program.is_timed(value);
-        let mut extreme = Extreme::new(value, maximum);
-        self.until_bound(id, bound, &mut |race, delay| {
-            extreme.look(&mut race.machine)?;
-            if is_timed && delay > 0.0 && delay.is_finite() {
-                extreme.look_through(race, delay)?;
-            }
-            Ok(false)
-        })?;
-        extreme.look(&mut self.race.machine)?;
-        self.count_moves();
-        Ok((extreme.value(), self.race.moves))
     }
 
     /// A run, as the values of expressions over time; until what it must
@@ -430,44 +372,4 @@ fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
             }
         }
     }
-}
-
-/// Whether a path is decided by the state or within the delay behind it, and after which time.
-pub(super) fn watched(
-    race: &mut Race<'_>,
-    path: &Path,
-    delay: f64,
-) -> Result<Option<(bool, f64)>, Failure> {
-    let mut ahead = 0.0;
-    for _ in 0..MOST_CHANGES {
-        let (keep, reach) = match path {
-            Path::Eventually(goal) => (
-                Mask::constant(true),
-                race.mask(Condition::of(goal), ahead, delay)?,
-            ),
-            Path::Always(keep) => (
-                race.mask(Condition::of(keep), ahead, delay)?,
-                Mask::constant(false),
-            ),
-            Path::Until(keep, goal) => (
-                race.mask(Condition::of(keep), ahead, delay)?,
-                race.mask(Condition::of(goal), ahead, delay)?,
-            ),
-            Path::Formula(_) => unreachable!("formulas have a watch of their own"),
-        };
-        if reach.now || !keep.now {
-            return Ok(Some((reach.now, ahead)));
-        }
-        let is_inside = ahead < delay;
-        if is_inside && (reach.behind || !keep.behind) {
-            return Ok(Some((reach.behind, ahead)));
-        }
-        let horizon = reach.horizon.min(keep.horizon);
-        let next = ahead + horizon;
-        if !is_inside || next.is_infinite() || next > delay || next <= ahead {
-            return Ok(None);
-        }
-        ahead = next;
-    }
-    Ok(None)
 }

@@ -21,7 +21,6 @@ mod partial_order;
 mod process;
 #[path = "../common/random.rs"]
 mod random;
-mod random_queries;
 mod replay;
 #[path = "../common/searches.rs"]
 mod searches;

@@ -5,7 +5,7 @@ use std::io::Write as _;
 
 use checker::engine::evidence::strategy_check;
 use checker::engine::evidence::witness::Proof;
-use checker::engine::{Answer, Limits, LoadedModel, Options, Rejection, Verdict};
+use checker::engine::{Answer, Limits, LoadedModel, Options, Rejection, Rules, Verdict};
 use checker::search::limits::StopReason;
 use checker::verify::strategy::Outcome;
 use checker::verify::{Error, Regions, Semantics};
@@ -231,6 +231,43 @@ pub(crate) fn check_witnesses(
         }
     }
     Ok(())
+}
+
+/// The options for a query whose answer comes with a certificate, by one number of threads after the
+/// other.
+pub(crate) fn certifying(text: &str, query: &str) -> Options {
+    Options {
+        certificate: true,
+        threads: [1, 2, 4][(text.len() + query.len()) % 3],
+        ..options()
+    }
+}
+
+/// The certificate of an answer, if it has one, must be right. Deadlocks where time may be stopped
+/// by an urgent channel are not always certified.
+pub(crate) fn check_certificate(
+    model: &mut LoadedModel,
+    answer: &Answer,
+    query: &str,
+    describe: impl Fn() -> String,
+) -> Result<(), TestCaseError> {
+    let Some(certificate) = &answer.evidence.certificate else {
+        return Ok(());
+    };
+    let certificate =
+        certificate.head(model.network(), query) + &certificate.lines(0..certificate.state_count());
+    let checked = model.verify_evidence("certificate", &certificate, Rules::default());
+    let checked = checked.expect("the file is one of this model");
+    let may_be_open = query.contains("deadlock") && checked.holds.is_none();
+    if checked.holds == Some(true) || may_be_open {
+        return Ok(());
+    }
+    Err(TestCaseError::fail(format!(
+        "{}\n{:?}: {:?}",
+        describe(),
+        checked.holds,
+        checked.lines
+    )))
 }
 
 /// A strategy must pass the closed loop.

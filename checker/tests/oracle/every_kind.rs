@@ -7,8 +7,10 @@ use checker::engine::evidence::witness::{Proof, WitnessKind};
 use checker::engine::{Answer, LoadedModel, Options, TraceWanted, Verdict};
 use checker::search::limits::StopReason;
 use checker::search::optimum::extremum::{Extreme, Extremes};
+use checker::verify::Error;
 use checker::verify::replay::{End, Run};
 use proptest::collection::vec;
+use proptest::strategy::Strategy as _;
 use proptest::test_runner::TestCaseError;
 use proptest::{prop_assert, prop_assert_eq};
 
@@ -16,6 +18,7 @@ use crate::checks::{load, try_ask};
 use crate::compare::{self, Tally};
 use crate::endless::Endless;
 use crate::explicit::Graph;
+use crate::generate::explorer::explore;
 use crate::generate::{self, Formula, Network, Shape};
 
 const LIVENESS: Shape = Shape {
@@ -25,7 +28,7 @@ const LIVENESS: Shape = Shape {
     uncontrollable: false,
     deadlock: false,
     priorities: true,
-    guarded_urgency: false,
+    guarded_urgency: true,
     legs: false,
 };
 
@@ -35,6 +38,9 @@ const VALUES: Shape = Shape {
     constant: 3,
     ..LIVENESS
 };
+
+/// Regions that brute force explores before it gives a case up.
+const MOST_REGIONS: usize = 10_000;
 
 /// Regions tell the values of clocks apart up to this one.
 const TOP: i64 = 5;
@@ -110,11 +116,33 @@ fn compare_liveness(
     (network, formulas): &(Network, Vec<Formula>),
     tally: &Tally,
 ) -> Result<(), TestCaseError> {
+    let model = load(&network.text());
+    let graph = compare::regions_for(&model, (formulas, LIVENESS.constant), tally);
+    graph.map_or(Ok(()), |graph| {
+        check_liveness(network, formulas, graph, tally)
+    })
+}
+
+/// The same with regions that are computed from the tree of the network, not from what the engine
+/// makes of its text.
+fn compare_liveness_of_the_tree(
+    (network, formulas): &(Network, Vec<Formula>),
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
+    let graph = explore(network, LIVENESS.constant, MOST_REGIONS);
+    graph.map_or(Ok(()), |graph| {
+        check_liveness(network, formulas, Ok(graph), tally)
+    })
+}
+
+fn check_liveness(
+    network: &Network,
+    formulas: &[Formula],
+    graph: Result<Graph, Error>,
+    tally: &Tally,
+) -> Result<(), TestCaseError> {
     let text = network.text();
     let mut model = load(&text);
-    let Some(graph) = compare::regions_for(&model, (formulas, LIVENESS.constant), tally) else {
-        return Ok(());
-    };
     let (p, q) = (network.formula(&formulas[0]), network.formula(&formulas[1]));
     let verdicts = graph.as_ref().map(|graph| {
         let p = labels(network, graph, &formulas[0]);
@@ -131,8 +159,11 @@ fn compare_liveness(
         let expected = verdicts
             .map(|verdicts| verdicts[index])
             .map_err(|error| *error);
-        let answer = try_ask(&mut model, query, &compare::options());
+        let answer = try_ask(&mut model, query, &compare::certifying(&text, query));
         compare::check(&answer, expected, tally, || format!("{text}{query}"))?;
+        if let Ok(answer) = &answer {
+            compare::check_certificate(&mut model, answer, query, || format!("{text}{query}"))?;
+        }
     }
     let Ok(graph) = graph else {
         return Ok(());
@@ -339,7 +370,7 @@ fn answer(
 ) -> Result<Option<Answer>, TestCaseError> {
     let mut options = Options {
         trace,
-        ..compare::options()
+        ..compare::certifying("", query)
     };
     // A clock without greatest value that is copied to and fro is followed up to the limit of clock
     // values.
@@ -353,6 +384,7 @@ fn answer(
     }
     tally.count_compared();
     compare::check_witnesses(&answer, || query.to_owned())?;
+    compare::check_certificate(model, &answer, query, || query.to_owned())?;
     Ok(Some(answer))
 }
 
@@ -360,14 +392,27 @@ fn answer(
 fn liveness_equals_brute_force() {
     let formulas = vec(generate::formula(LIVENESS), 2..=2);
     let strategy = (generate::network(LIVENESS), formulas);
-    compare::run("liveness", 300, &strategy, compare_liveness);
+    compare::run("liveness", 600, &strategy, compare_liveness);
+}
+
+#[test]
+fn liveness_equals_brute_force_on_the_tree() {
+    let formula = generate::formula(LIVENESS).prop_map(Formula::without_differences);
+    let network = generate::network(LIVENESS).prop_map(Network::without_differences);
+    let strategy = (network, vec(formula, 2..=2));
+    compare::run(
+        "liveness of trees",
+        600,
+        &strategy,
+        compare_liveness_of_the_tree,
+    );
 }
 
 #[test]
 fn values_and_best_traces_equal_brute_force() {
     let formulas = vec(generate::formula(VALUES), 1..=1);
     let strategy = (generate::network(VALUES), formulas);
-    compare::run("values", 300, &strategy, compare_values);
+    compare::run("values", 600, &strategy, compare_values);
 }
 
 #[test]

@@ -19,7 +19,7 @@ const SHAPE: Shape = Shape {
     uncontrollable: false,
     deadlock: true,
     priorities: false,
-    guarded_urgency: false,
+    guarded_urgency: true,
     legs: false,
 };
 
@@ -49,9 +49,17 @@ fn compare(
                 order,
                 // The independent check lists the values of bounds, which are too many.
                 runs: scale == 1,
-                ..compare::options()
+                certificate: scale == 1,
+                ..compare::certifying(&text, &query)
             };
             let answer = try_ask(&mut model, &query, &options);
+            if scale == 1
+                && let Ok(answer) = &answer
+            {
+                compare::check_certificate(&mut model, answer, &query, || {
+                    format!("{text}{query}")
+                })?;
+            }
             if scale > 1 && compare::has_grown(&answer) {
                 tally.count_stopped();
                 continue;

@@ -1,10 +1,10 @@
 //! Clocks whose rates change as time passes, and conditions that are not linear in time, against
 //! solutions in closed form.
 
-use checker::ir::Statistical;
+use checker::ir::{Asked, Statistical};
 use checker::stochastic::{Behaviour, Precision, RunId, Runner, simulate};
 
-use super::{bound_of, executors, expect, load};
+use super::{executors, expect, load};
 
 /// The value of `E[...](max: ...)` or `(min: ...)` in one run, in both engines.
 fn extreme(model: &str, query: &str) -> f64 {
@@ -20,8 +20,12 @@ fn extreme(model: &str, query: &str) -> f64 {
     };
     let [left, right] = executors(&network).map(|executor| {
         let mut runner = Runner::new(&network, &*executor);
-        let found = runner.extreme(RunId { seed: 1, run: 0 }, bound, value, maximum);
-        found.expect("the run does not fail").0
+        let found = runner.observe(
+            RunId { seed: 1, run: 0 },
+            bound,
+            Asked::Extreme(value, maximum),
+        );
+        found.expect("the run does not fail").value
     });
     assert_eq!(left.to_bits(), right.to_bits(), "the engines differ");
     left
@@ -159,8 +163,9 @@ fn a_run_with_equations_is_the_same_alone_and_after_others() {
         for run in 0..10 {
             let mut alone = Runner::new(&network, &*executor);
             let [left, right] = [&mut together, &mut alone].map(|runner| {
-                let found = runner.extreme(RunId { seed: 1, run }, bound, *value, true);
-                found.expect("the run does not fail").0
+                let found =
+                    runner.observe(RunId { seed: 1, run }, bound, Asked::Extreme(*value, true));
+                found.expect("the run does not fail").value
             });
             assert_eq!(left.to_bits(), right.to_bits(), "run {run}");
         }
@@ -256,10 +261,17 @@ fn a_fixed_step_is_eulers() {
         fixed_step: Some(0.25),
         ..Behaviour::new(&network, &*jit)
     });
-    let (found, _) = runner
-        .extreme(RunId { seed: 1, run: 0 }, bound_of(&query), value, false)
+    let outcome = runner
+        .observe(
+            RunId { seed: 1, run: 0 },
+            query.kind.bound(),
+            Asked::Extreme(value, false),
+        )
         .expect("the run does not fail");
-    assert!((found - 0.75_f64.powi(4)).abs() < 1e-12, "{found}");
+    assert!(
+        (outcome.value - 0.75_f64.powi(4)).abs() < 1e-12,
+        "{outcome:?}"
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@
 use checker::diagnostics::{Diagnostic, SourceMap};
 use checker::engine::{JointQuery, LoadedModel};
 use checker::exec::{Executor, Interpreter, Jit, Libraries};
-use checker::ir::{Network, QueryKind, RunBound, Simulation, Statistical};
+use checker::ir::{Asked, Network, QueryKind, Statistical};
 use checker::semantics::{self, FIRST_POOL, Reading};
 use checker::stochastic::{Failure, Precision, RunId, Runner};
 use checker::syntax;
@@ -136,8 +136,8 @@ fn satisfied(network: &Network, query: &StatisticalQuery, runs: u64) -> Result<u
         let mut moves = Vec::new();
         let mut satisfied = 0;
         for run in 0..runs {
-            let outcome = runner.path(RunId { seed: 1, run }, bound, path)?;
-            satisfied += u64::from(outcome.satisfied);
+            let outcome = runner.observe(RunId { seed: 1, run }, bound, Asked::Path(path))?;
+            satisfied += u64::from(outcome.value != 0.0);
             moves
                 .push(outcome.time.to_bits() ^ outcome.moves ^ outcome.at.to_bits().rotate_left(7));
         }
@@ -166,17 +166,4 @@ fn expect(model: &str, query: &str, probability: f64) {
         "{}: {estimate} instead of {probability}, more than {margin} apart",
         query.text
     );
-}
-
-/// The bound of a query.
-fn bound_of(query: &StatisticalQuery) -> &RunBound {
-    match &query.kind {
-        Statistical::Probability(bound, _)
-        | Statistical::Hypothesis { bound, .. }
-        | Statistical::Expectation { bound, .. }
-        | Statistical::Comparison {
-            left: (bound, _), ..
-        }
-        | Statistical::Simulation(Simulation { bound, .. }) => bound,
-    }
 }

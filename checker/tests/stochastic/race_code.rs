@@ -4,8 +4,8 @@
 //! `NETWORKS=500 cargo test --release --test stochastic race_code::` tries more random networks.
 
 use checker::exec::{Executor, Interpreter, Jit};
-use checker::ir::Statistical;
-use checker::stochastic::{Asked, Failure, RunId, Runner};
+use checker::ir::Asked;
+use checker::stochastic::{Failure, RunId, Runner};
 
 use crate::networks::generate::{Family, network};
 use crate::random::Random;
@@ -14,45 +14,24 @@ use crate::{StatisticalQuery, load};
 /// The runs that are compared of a model.
 const RUNS: u64 = 60;
 
-/// What a run shows, its doubles as bits.
-type Shown = (Option<bool>, u64, u64);
+/// The result of a run, its time and its moves, doubles as bits.
+type Shown = [u64; 3];
+
+fn asked(query: &StatisticalQuery) -> Asked<'_> {
+    let asked = query.kind.asked();
+    asked.unwrap_or_else(|| panic!("{} has no runs to compare", query.text))
+}
 
 /// How a run ends.
 fn end(runner: &mut Runner<'_>, query: &StatisticalQuery, run: u64) -> Result<Shown, Failure> {
-    match &query.kind {
-        Statistical::Probability(bound, path) => {
-            let outcome = runner.path(RunId { seed: 3, run }, bound, path)?;
-            Ok((
-                Some(outcome.satisfied),
-                outcome.time.to_bits(),
-                outcome.moves,
-            ))
-        }
-        Statistical::Expectation {
-            bound,
-            value,
-            maximum,
-            ..
-        } => {
-            let (value, moves) = runner.extreme(RunId { seed: 3, run }, bound, *value, *maximum)?;
-            Ok((None, value.to_bits(), moves))
-        }
-        _ => panic!("{} has no runs to compare", query.text),
-    }
+    let outcome = runner.observe(RunId { seed: 3, run }, query.kind.bound(), asked(query))?;
+    let (value, time) = (outcome.value.to_bits(), outcome.time.to_bits());
+    Ok([value, time, outcome.moves])
 }
 
 /// Writes the runs of a query as code; returns whether there is code.
 fn write(runner: &mut Runner<'_>, query: &StatisticalQuery) -> bool {
-    match &query.kind {
-        Statistical::Probability(bound, path) => runner.write_runs(bound, Asked::Path(path)),
-        Statistical::Expectation {
-            bound,
-            value,
-            maximum,
-            ..
-        } => runner.write_runs(bound, Asked::Extreme(*value, *maximum)),
-        _ => panic!("{} has no runs to compare", query.text),
-    }
+    runner.write_runs(query.kind.bound(), asked(query))
 }
 
 /// Compares runs; returns how many were made by code, or `None` if there is none.

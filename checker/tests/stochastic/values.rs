@@ -1,9 +1,9 @@
 //! Probabilities and expectations that have closed forms.
 
-use checker::ir::Statistical;
+use checker::ir::{Asked, Statistical};
 use checker::stochastic::{Behaviour, Failure, Precision, RunId, Runner, simulate};
 
-use super::{bound_of, executors, expect, load};
+use super::{executors, expect, load};
 
 #[test]
 fn the_faster_of_two_exponential_delays_wins_by_its_rate() {
@@ -379,16 +379,20 @@ fn expectations_are_means() {
         let Statistical::Expectation { maximum, value, .. } = query.kind else {
             panic!("it is an expectation");
         };
-        let bound = bound_of(&query);
+        let bound = query.kind.bound();
         let [_, jit] = executors(&network);
         let mut runner = Runner::new(&network, &*jit);
         let runs = bound.runs.expect("the query says how many");
         let mut sum = 0.0;
         for run in 0..runs {
             sum += runner
-                .extreme(RunId { seed: 7, run }, bound, value, maximum)
+                .observe(
+                    RunId { seed: 7, run },
+                    bound,
+                    Asked::Extreme(value, maximum),
+                )
                 .expect("no run fails")
-                .0;
+                .value;
         }
         let found = sum / runs as f64;
         // Values between 0 and 4: Hoeffding's bound at a risk of one in a million.
@@ -509,7 +513,8 @@ fn a_value_that_is_no_number_is_an_error() {
     };
     let [_, jit] = executors(&network);
     let mut runner = Runner::new(&network, &*jit);
-    let failed = runner.extreme(RunId { seed: 1, run: 0 }, bound_of(&query), value, true);
+    let asked = Asked::Extreme(value, true);
+    let failed = runner.observe(RunId { seed: 1, run: 0 }, query.kind.bound(), asked);
     assert_eq!(failed, Err(Failure::NoNumber));
 }
 

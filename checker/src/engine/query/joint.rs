@@ -14,7 +14,7 @@ use crate::engine::rejection::Rejection;
 use crate::ir::{Query, QueryKind, Statistical};
 use crate::search::limits::{Counters, Watch as _};
 use crate::semantics::Reading;
-use crate::stochastic::{Behaviour, Estimate, Failure, Precision, bound_of, estimate_jointly};
+use crate::stochastic::{Behaviour, Estimate, Failure, Precision, estimate_jointly};
 use crate::syntax::ast::QueryText;
 
 /// A query that is answered together with others.
@@ -197,10 +197,10 @@ fn estimates_of(
 fn same_runs(members: &[Member]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (index, member) in members.iter().enumerate() {
-        let bound = bound_of(&member.asked);
+        let bound = member.asked.bound();
         let known = groups.iter_mut().find(|group| {
             let first = &members[group[0]];
-            let other = bound_of(&first.asked);
+            let other = first.asked.bound();
             let (one, another) = (&member.precision, &first.precision);
             other.limit == bound.limit
                 && other.value.to_bits() == bound.value.to_bits()

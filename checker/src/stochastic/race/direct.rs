@@ -51,57 +51,46 @@ impl Backend for Race<'_> {
     type Exit = Exit;
     type End = End;
 
-    #[inline]
     fn integer(&mut self, value: i32) -> i32 {
         value
     }
 
-    #[inline]
     fn real(&mut self, value: f64) -> f64 {
         value
     }
 
-    #[inline]
     fn set(&mut self, variable: &Cell<i32>, value: i32) {
         variable.set(value);
     }
 
-    #[inline]
     fn set_real(&mut self, variable: &Cell<f64>, value: f64) {
         variable.set(value);
     }
 
-    #[inline]
     fn plus(&mut self, left: i32, right: i32) -> i32 {
         left + right
     }
 
-    #[inline]
     fn sum(&mut self, left: i32, right: i32) -> i32 {
         left + right
     }
 
-    #[inline]
     fn doubles(&mut self, operator: DoubleOperator, left: f64, right: f64) -> f64 {
         double(operator, left, right)
     }
 
-    #[inline]
     fn compare(&mut self, left: i32, relation: Relation, right: i32) -> i32 {
         integers_relate(relation, left, right).into()
     }
 
-    #[inline]
     fn compare_reals(&mut self, left: f64, relation: Relation, right: f64) -> i32 {
         doubles_relate(relation, left, right).into()
     }
 
-    #[inline]
     fn when(&mut self, condition: i32, then: impl FnOnce(&mut Self) -> Flow<Self>) -> Flow<Self> {
         if condition == 0 { Ok(()) } else { then(self) }
     }
 
-    #[inline]
     fn choose(
         &mut self,
         condition: i32,
@@ -115,7 +104,6 @@ impl Backend for Race<'_> {
         }
     }
 
-    #[inline]
     fn cases(
         &mut self,
         number: i32,
@@ -125,7 +113,6 @@ impl Backend for Race<'_> {
         each(self, number as usize)
     }
 
-    #[inline]
     fn repeat(
         &mut self,
         mut condition: impl FnMut(&mut Self) -> i32,
@@ -137,7 +124,6 @@ impl Backend for Race<'_> {
         Ok(())
     }
 
-    #[inline]
     fn within(
         &mut self,
         body: impl FnOnce(&mut Self, Exit) -> Flow<Self>,
@@ -153,47 +139,38 @@ impl Backend for Race<'_> {
         }
     }
 
-    #[inline]
     fn leave(&mut self, exit: Exit) -> Flow<Self> {
         Err(End::Left(exit))
     }
 
-    #[inline]
     fn fail(&mut self, why: impl FnOnce(&Self) -> Failure) -> Flow<Self> {
         Err(why(self).into())
     }
 
-    #[inline]
     fn draw_uniform(&mut self, maximum: f64) -> f64 {
         maximum * self.machine.stream().uniform()
     }
 
-    #[inline]
     fn draw_exponential(&mut self, rate: f64) -> f64 {
         self.machine.stream().exponential(rate)
     }
 
-    #[inline]
     fn draw_below(&mut self, count: i32) -> i32 {
         self.machine.stream().below(count as u32) as i32
     }
 
-    #[inline]
     fn load_real(&mut self, word: u32) -> f64 {
         self.machine.double(word)
     }
 
-    #[inline]
     fn call(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, i32> {
         Ok(self.machine.call(function, values)?)
     }
 
-    #[inline]
     fn call_for_real(&mut self, function: FunctionId, values: &[i32]) -> Flow<Self, f64> {
         Ok(self.machine.real(function, values)?)
     }
 
-    #[inline]
     fn is_rated(&self, clock: u32) -> bool {
         self.rated_clocks.binary_search(&clock).is_ok()
     }
@@ -209,28 +186,23 @@ impl Backend for Race<'_> {
         value
     }
 
-    #[inline]
     fn set_plan(&mut self, process: usize, attempt: Option<f64>, stay: Option<f64>, _: bool) {
         self.attempts[process] = attempt.unwrap_or(f64::INFINITY);
         self.bounds[process] = stay.unwrap_or(f64::INFINITY);
     }
 
-    #[inline]
     fn set_window_count(&mut self, count: i32) {
         self.windows.truncate(count as usize);
     }
 
-    #[inline]
     fn window_count(&mut self) -> i32 {
         self.windows.len() as i32
     }
 
-    #[inline]
     fn window(&mut self, number: i32) -> (f64, f64) {
         self.windows[number as usize]
     }
 
-    #[inline]
     fn set_window(&mut self, number: i32, low: f64, high: f64) {
         match self.windows.get_mut(number as usize) {
             Some(window) => *window = (low, high),
@@ -238,16 +210,13 @@ impl Backend for Race<'_> {
         }
     }
 
-    #[inline]
     fn delay_in_windows(&mut self, rate: Option<f64>) -> Flow<Self, f64> {
         rules::delay_in_windows(self, rate.is_none().into(), rate.unwrap_or(f64::NAN))
     }
-    #[inline]
     fn holds(&mut self, condition: Condition, values: &[i32]) -> Flow<Self, i32> {
         Ok(self.machine.holds(condition, values)?.into())
     }
 
-    #[inline]
     fn knows_stay(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
         !matches!(spot.invariant, Condition::Timed(_) | Condition::Curved(_))
             && !self.steps(program, spot.invariant)
@@ -266,7 +235,6 @@ impl Backend for Race<'_> {
         })
     }
 
-    #[inline]
     fn knows_outputs(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
         self.is_known(program, spot)
     }

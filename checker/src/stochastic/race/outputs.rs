@@ -168,7 +168,6 @@ impl Race<'_> {
     }
 
     /// Whether a condition holds now.
-    #[inline]
     pub(super) fn holds(
         &mut self,
         program: &Program<'_>,

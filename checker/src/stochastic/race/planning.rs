@@ -76,7 +76,6 @@ impl Race<'_> {
 
     /// Whether the rules know when the outputs of a process are enabled: each has one window, which
     /// neither a receiver nor a strategy nor the motion of clocks changes.
-    #[inline]
     pub(super) fn is_known(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
         if spot.is_controllable && self.has_decisions() {
             return false;
@@ -161,7 +160,6 @@ impl Race<'_> {
     }
 
     /// Whether a condition is looked at along the motion of clocks.
-    #[inline]
     pub(super) fn steps(&mut self, program: &Program<'_>, condition: Condition) -> bool {
         match condition {
             Condition::Curved(_) => true,
@@ -210,7 +208,7 @@ impl Race<'_> {
             let rate = if is_uniform {
                 None
             } else {
-                rules::exponential_rate(race, process, spot, never)?
+                Some(rules::exponential_rate(race, process, spot, never)?)
             };
             drawn.set(race.delay_in_windows(rate)?);
             Ok(())

@@ -121,7 +121,6 @@ impl Race<'_> {
         Ok(())
     }
 
-    #[inline]
     pub(super) fn update(&mut self, update: &Update, values: &[i32]) -> Result<(), Failure> {
         if update.function.is_some() {
             self.machine.update(update, values)?;

@@ -144,12 +144,15 @@ impl Backend for Writer<'_> {
         mut condition: impl FnMut(&mut Self) -> Register,
         mut body: impl FnMut(&mut Self) -> Flow<Self>,
     ) -> Flow<Self> {
-        self.repeat(
-            |w| condition(w),
-            |w| {
-                let Ok(()) = body(w);
-            },
-        );
+        let (head, inside, next) = (self.block(), self.block(), self.block());
+        self.jump(head);
+        self.at(head);
+        let holds = condition(self);
+        self.branch(holds, inside, next);
+        self.at(inside);
+        body(self)?;
+        self.jump(head);
+        self.at(next);
         Ok(())
     }
 

@@ -10,7 +10,6 @@
 //! * The code of a process is written out for all its locations, so its size grows with the
 //!   product of senders and receivers: beyond a limit there is no code.
 
-mod asked;
 mod backend;
 mod inline;
 mod layout;
@@ -24,7 +23,6 @@ mod stages;
 mod watching;
 mod writer;
 
-pub use asked::Asked;
-pub(super) use asked::{End, Watched};
 pub(super) use runs::RaceCode;
 pub(super) use stages::Stages;
+pub(super) use watching::Watched;

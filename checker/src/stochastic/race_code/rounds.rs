@@ -1,8 +1,7 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
-use super::asked::Watched;
 use super::race_writer::{Ids, RaceWriter};
-use super::watching::{GOES_ON, IS_OVER};
+use super::watching::{GOES_ON, IS_OVER, Watched};
 use super::writer::Writer;
 use crate::ir::{
     BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Urgency,

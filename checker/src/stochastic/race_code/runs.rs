@@ -1,11 +1,10 @@
 //! The code of a race as a whole: whether there can be one, and runs that it makes.
 
-use super::asked::{End, Watched};
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, Plans, RaceWriter};
 use super::rates::rated_clocks;
-use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED};
+use super::watching::{GOES_ON, IS_OVER, MISSED, REACHED, Watched};
 use crate::analysis::function_reads::read_words;
 use crate::cancellation;
 use crate::exec::arithmetic::{double_of_words, double_words};
@@ -16,6 +15,7 @@ use crate::ir::{
 use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
 use crate::stochastic::program::{Program, Spot};
+use crate::stochastic::run::Outcome;
 use crate::stochastic::run_id::RunId;
 
 /// A race of more instructions is not written as code.
@@ -35,6 +35,7 @@ pub(super) struct WrittenRace {
     /// The functions of the network, and those of the race behind them.
     functions: Vec<Function>,
     rounds: FunctionId,
+    watched: Watched,
     /// How many instructions those of the race have.
     pub(super) instructions: usize,
 }
@@ -123,6 +124,7 @@ impl WrittenRace {
             layout,
             functions,
             rounds,
+            watched: *watched,
             instructions,
         })
     }
@@ -157,6 +159,7 @@ impl WrittenRace {
             initial,
             layout: self.layout,
             rounds: self.rounds,
+            watched: self.watched,
         })
     }
 }
@@ -200,6 +203,7 @@ pub(in crate::stochastic) struct RaceCode {
     executor: Box<dyn Executor>,
     layout: Layout,
     rounds: FunctionId,
+    watched: Watched,
     /// The words at the start of a run.
     initial: Vec<i32>,
     words: Vec<i32>,
@@ -223,7 +227,7 @@ impl RaceCode {
         executor: &dyn Executor,
         RunId { seed, run }: RunId,
         bound: f64,
-    ) -> Option<End> {
+    ) -> Option<Outcome> {
         self.words.copy_from_slice(&self.initial);
         let stream = program.network.chances.stream as usize;
         Stream::start(&mut self.words[stream..stream + STREAM_WORDS], seed, run);
@@ -254,16 +258,17 @@ impl RaceCode {
         if let Some(site) = self.executor.wraps().first() {
             executor.wraps().note(site);
         }
-        Some(End {
-            decided: match result {
-                REACHED => Some(true),
-                MISSED => Some(false),
-                IS_OVER => None,
+        let time = self.double(self.layout.time) + self.double(self.layout.decided_after);
+        Some(Outcome {
+            value: match (result, self.watched) {
+                (REACHED, _) | (IS_OVER, Watched::Always(_)) => 1.0,
+                (IS_OVER, Watched::Extreme(_, sign)) => sign * self.double(self.layout.best),
+                (MISSED | IS_OVER, _) => 0.0,
                 _ => return None,
             },
-            time: self.double(self.layout.time) + self.double(self.layout.decided_after),
+            time,
             moves,
-            best: self.double(self.layout.best),
+            at: time,
         })
     }
 

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::asked::{End, Watched};
 use super::runs::{RaceCode, WrittenRace};
+use super::watching::Watched;
 use crate::exec::Executor;
 use crate::stochastic::program::Program;
+use crate::stochastic::run::Outcome;
 use crate::stochastic::run_id::RunId;
 
 /// The moves before it is looked at whether there is code for a race.
@@ -83,7 +84,7 @@ impl Stages {
         watched: Watched,
         id: RunId,
         bound: f64,
-    ) -> Option<End> {
+    ) -> Option<Outcome> {
         self.go_on(program, executor, watched);
         if self.watched != Some(watched) {
             return None;
@@ -97,14 +98,14 @@ impl Stages {
             return None;
         };
         *runs += 1;
-        let end = code.run(program, executor, id, bound);
-        if end.is_none() {
+        let outcome = code.run(program, executor, id, bound);
+        if outcome.is_none() {
             *given_up += 1;
             if *runs >= ENOUGH_RUNS && *given_up > *runs / FEW {
                 self.stage = Stage::Without;
             }
         }
-        end
+        outcome
     }
 
     /// Writes or compiles the code if it is time to do so.

@@ -1,12 +1,49 @@
 //! Code that watches for what is asked of a run, as `stochastic/run.rs` says it: at every state,
 //! and all through the delay behind it.
 
-use super::asked::Watched;
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
-use crate::ir::{BlockId, IntegerOperator, Register, Relation};
+use crate::ir::{Asked, BlockId, FunctionId, IntegerOperator, Path, Register, Relation};
 use crate::stochastic::condition::Condition;
+use crate::stochastic::program::Program;
 use crate::stochastic::rules::{self, Backend};
+
+/// What is asked of the states of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::stochastic) enum Watched {
+    Eventually(Condition),
+    Always(Condition),
+    /// The first condition, until the second holds.
+    Until(Condition, Condition),
+    /// The greatest value of a function, times this sign.
+    Extreme(FunctionId, f64),
+}
+
+impl Watched {
+    /// What is asked, unless it is a formula with operators over time.
+    pub(in crate::stochastic) fn of(asked: Asked<'_>) -> Option<Watched> {
+        Some(match asked {
+            Asked::Extreme(value, true) => Watched::Extreme(value, 1.0),
+            Asked::Extreme(value, false) => Watched::Extreme(value, -1.0),
+            Asked::Path(Path::Eventually(goal)) => Watched::Eventually(Condition::of(goal)),
+            Asked::Path(Path::Always(keep)) => Watched::Always(Condition::of(keep)),
+            Asked::Path(Path::Until(keep, goal)) => {
+                Watched::Until(Condition::of(keep), Condition::of(goal))
+            }
+            Asked::Path(Path::Formula(_)) => return None,
+        })
+    }
+
+    /// Whether the code can watch for it.
+    pub(super) fn is_known(&self, program: &Program<'_>) -> bool {
+        let is_curved = |one: Condition| matches!(one, Condition::Curved(_));
+        match *self {
+            Watched::Eventually(one) | Watched::Always(one) => !is_curved(one),
+            Watched::Until(keep, goal) => !is_curved(keep) && !is_curved(goal),
+            Watched::Extreme(value, _) => !program.is_timed(value),
+        }
+    }
+}
 
 /// What the code of a run returns: it goes on if it is called again;
 pub(super) const GOES_ON: i32 = 0;

@@ -152,23 +152,6 @@ impl<'l> Writer<'l> {
         self.at(next);
     }
 
-    /// Writes what is done as long as a condition holds.
-    pub(super) fn repeat(
-        &mut self,
-        condition: impl FnOnce(&mut Self) -> Register,
-        write: impl FnOnce(&mut Self),
-    ) {
-        let (head, body, next) = (self.block(), self.block(), self.block());
-        self.jump(head);
-        self.at(head);
-        let holds = condition(self);
-        self.branch(holds, body, next);
-        self.at(body);
-        write(self);
-        self.jump(head);
-        self.at(next);
-    }
-
     pub(super) fn return_value(&mut self, value: Option<Register>) {
         self.end(Terminator::Return(value));
     }

@@ -23,7 +23,6 @@ pub(in crate::stochastic) struct Candidate<'i, 'a, I> {
 }
 
 /// The number of one of the instances that are enabled; leaves if there are none.
-#[inline]
 pub(in crate::stochastic) fn one_of<'i, 'a: 'i, B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -65,7 +64,6 @@ pub(in crate::stochastic) fn one_of<'i, 'a: 'i, B: Backend>(
 
 /// One of some numbers whose flags are set, all with the same chance; leaves if there are none. A
 /// number without a flag counts always.
-#[inline]
 pub(in crate::stochastic) fn draw<B: Backend>(
     b: &mut B,
     numbers: impl Iterator<Item = (B::Integer, Option<B::Integer>)> + Clone,
@@ -158,7 +156,6 @@ fn leg<B: Backend>(
 }
 
 /// The branch that a mover takes: by weight.
-#[inline]
 pub(in crate::stochastic) fn branch<B: Backend>(
     b: &mut B,
     program: &Program<'_>,

@@ -43,7 +43,6 @@ impl<R: Copy> Span<R> {
 }
 
 /// Goes on if a condition holds now, else leaves.
-#[inline]
 pub(in crate::stochastic) fn require<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -87,7 +86,6 @@ pub(in crate::stochastic) fn require<B: Backend>(
 }
 
 /// When a condition holds; leaves if never.
-#[inline]
 pub(in crate::stochastic) fn span<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -120,7 +118,6 @@ pub(in crate::stochastic) fn span<B: Backend>(
 }
 
 /// The difference of a clock and a number; 0 if they count as equal.
-#[inline]
 fn gap<B: Backend>(b: &mut B, clock: u32, bound: Number, values: &[i32]) -> Flow<B, B::Real> {
     let bound = number(b, bound, values)?;
     let value = b.load_real(clock);
@@ -142,14 +139,12 @@ fn gap<B: Backend>(b: &mut B, clock: u32, bound: Number, values: &[i32]) -> Flow
 }
 
 /// How far a number is from 0.
-#[inline]
 pub(in crate::stochastic) fn size<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let negative = b.negate(value);
     b.greatest(value, negative)
 }
 
 /// A number that does not change as time passes.
-#[inline]
 pub(in crate::stochastic) fn number<B: Backend>(
     b: &mut B,
     number: Number,
@@ -254,7 +249,6 @@ fn at_most<B: Backend>(
 }
 
 /// When a clock that is this far above a number stands in a relation to it.
-#[inline]
 fn compared<B: Backend>(
     b: &mut B,
     relation: Relation,
@@ -293,7 +287,6 @@ fn compared<B: Backend>(
 }
 
 /// The delays that are in both intervals; leaves if there are none.
-#[inline]
 fn both<B: Backend>(
     b: &mut B,
     first: Span<B::Real>,

@@ -26,7 +26,6 @@ impl<R: Copy> Bound<R> {
 }
 
 /// Lets a process plan in a location.
-#[inline]
 pub(in crate::stochastic) fn plan<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -86,7 +85,6 @@ pub(in crate::stochastic) fn stay<B: Backend>(
     Ok(bound(b, program, process, spot)?.map(|bound| bound.end))
 }
 
-#[inline]
 fn bound<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -143,7 +141,6 @@ pub(in crate::stochastic) fn require_invariant<B: Backend>(
 }
 
 /// Goes on if an output of a process is enabled, else leaves.
-#[inline]
 fn require_some_output<B: Backend>(
     b: &mut B,
     program: &Program<'_>,
@@ -194,7 +191,6 @@ struct Planning<'p, 'a, R> {
 
 impl<R: Copy> Planning<'_, '_, R> {
     /// Ends a plan: the process tries to move at a moment that it may stay until.
-    #[inline]
     fn end_in_time<B: Backend<Real = R>>(&self, b: &mut B, moment: R) {
         let stay = self.bound.map(|bound| bound.end);
         b.set_plan(self.process, Some(moment), stay, false);
@@ -216,7 +212,6 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// The end of a window, cut where the process may stay no longer.
-    #[inline]
     fn cut<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>) -> Option<R> {
         let mut high = window.high;
         if let Some(Bound { end, .. }) = self.bound {
@@ -229,7 +224,6 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 
     /// Draws the delay in one window, and ends the plan.
-    #[inline]
     fn in_window<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -258,7 +252,6 @@ impl<R: Copy> Planning<'_, '_, R> {
         self.by_rate(b, window, length, never)
     }
 
-    #[inline]
     fn uniformly<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, length: R) -> Flow<B> {
         if self.spot.is_plain {
             // A moment of no length is drawn as any other.
@@ -278,7 +271,6 @@ impl<R: Copy> Planning<'_, '_, R> {
         Ok(())
     }
 
-    #[inline]
     fn by_rate<B: Backend<Real = R>>(
         &self,
         b: &mut B,
@@ -286,9 +278,7 @@ impl<R: Copy> Planning<'_, '_, R> {
         length: Option<R>,
         never: B::Exit,
     ) -> Flow<B> {
-        let Some(rate) = exponential_rate(b, self.process, self.spot, never)? else {
-            return Ok(());
-        };
+        let rate = exponential_rate(b, self.process, self.spot, never)?;
         let Some(length) = length.filter(|_| !self.spot.is_plain) else {
             let passed = b.draw_exponential(rate);
             let moment = window.after(b, passed);
@@ -391,12 +381,10 @@ impl<R: Copy> Planning<'_, '_, R> {
             Ok(())
         };
         let by_rate = |b: &mut B| {
-            b.attempt(
-                |b, never| match exponential_rate(b, self.process, self.spot, never)? {
-                    None => Ok(()),
-                    rate => draw(b, rate),
-                },
-            )
+            b.attempt(|b, never| {
+                let rate = exponential_rate(b, self.process, self.spot, never)?;
+                draw(b, Some(rate))
+            })
         };
         match self.bound {
             None => by_rate(b),
@@ -409,35 +397,30 @@ impl<R: Copy> Planning<'_, '_, R> {
     }
 }
 
-/// The rate of the exponential delay, which is greater than 0; leaves if it is 0. None if there is
-/// none, which has ended the run or left.
-#[inline]
+/// The rate of the exponential delay, which is greater than 0; leaves if it is 0, and ends the run
+/// if there is none.
 pub(in crate::stochastic) fn exponential_rate<B: Backend>(
     b: &mut B,
     process: usize,
     spot: &Spot,
     never: B::Exit,
-) -> Flow<B, Option<B::Real>> {
+) -> Flow<B, B::Real> {
     let stand = b.stand(process);
     let Some(known) = spot.exponential_rate else {
         b.fail(|_| Failure::NoRate(stand))?;
-        return Ok(None);
+        // What is written behind it as code is not reached.
+        return Ok(b.real(0.0));
     };
-    if known == Number::Known(0.0) {
-        b.leave(never)?;
-        return Ok(None);
-    }
     let rate = number(b, known, &[])?;
     if !matches!(known, Number::Known(rate) if rate > 0.0 && rate.is_finite()) {
         b.insist_on_range(rate, |b| Failure::Rate(stand, b.shown(rate)))?;
         let is_positive = b.compare_real_to(rate, Relation::Greater, 0.0);
         b.unless(is_positive, never)?;
     }
-    Ok(Some(rate))
+    Ok(rate)
 }
 
 /// A number, as much greater as counts as equal.
-#[inline]
 pub(in crate::stochastic) fn tolerant<B: Backend>(b: &mut B, value: B::Real) -> B::Real {
     let (part, tolerance) = (b.real(1.0 + TOLERANCE), b.real(TOLERANCE));
     let value = b.multiply(value, part);

@@ -1,0 +1,111 @@
+//! What is seen of a run, for one thing that is asked of it.
+
+use super::condition::Condition;
+use super::extreme::Extreme;
+use super::failure::Failure;
+use super::machine::{Machine, Mask};
+use super::mitl::Watch;
+use super::program::Program;
+use super::race::Race;
+use crate::ir::{Asked, Path};
+
+/// The changes of a condition that are followed within one delay.
+const MOST_CHANGES: usize = 1_000_000;
+
+/// Looks at the states of a run.
+pub(super) enum Observer<'q> {
+    /// No formula with operators over time.
+    Path(&'q Path),
+    Formula(Watch<'q>),
+    Extreme {
+        extreme: Extreme,
+        /// Whether the value may change as time passes.
+        is_timed: bool,
+    },
+}
+
+impl<'q> Observer<'q> {
+    pub(super) fn new(program: &Program<'_>, asked: Asked<'q>) -> Observer<'q> {
+        match asked {
+            Asked::Path(Path::Formula(formula)) => Observer::Formula(Watch::new(formula)),
+            Asked::Path(path) => Observer::Path(path),
+            Asked::Extreme(value, maximum) => Observer::Extreme {
+                extreme: Extreme::new(value, maximum),
+                is_timed: program.is_timed(value),
+            },
+        }
+    }
+
+    /// Looks at a state and the delay that follows it. Returns whether the run has what is asked,
+    /// and after which time, if that is decided.
+    pub(super) fn look(
+        &mut self,
+        race: &mut Race<'_>,
+        delay: f64,
+    ) -> Result<Option<(bool, f64)>, Failure> {
+        match self {
+            Observer::Path(path) => watched(race, path, delay),
+            Observer::Formula(watch) => watch.state(race, delay),
+            Observer::Extreme { extreme, is_timed } => {
+                extreme.look(&mut race.machine)?;
+                if *is_timed && delay > 0.0 && delay.is_finite() {
+                    extreme.look_through(race, delay)?;
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    /// The result of a run that ends at its bound before anything is decided: its value, or 1 if it
+    /// has what is asked and else 0.
+    pub(super) fn finish(&mut self, machine: &mut Machine<'_>) -> Result<f64, Failure> {
+        Ok(match self {
+            Observer::Path(path) => f64::from(matches!(path, Path::Always(_))),
+            Observer::Formula(watch) => f64::from(watch.finish()),
+            Observer::Extreme { extreme, .. } => {
+                extreme.look(machine)?;
+                extreme.value()
+            }
+        })
+    }
+}
+
+/// Whether a path is decided by the state or within the delay behind it, and after which time.
+pub(super) fn watched(
+    race: &mut Race<'_>,
+    path: &Path,
+    delay: f64,
+) -> Result<Option<(bool, f64)>, Failure> {
+    let mut ahead = 0.0;
+    for _ in 0..MOST_CHANGES {
+        let (keep, reach) = match path {
+            Path::Eventually(goal) => (
+                Mask::constant(true),
+                race.mask(Condition::of(goal), ahead, delay)?,
+            ),
+            Path::Always(keep) => (
+                race.mask(Condition::of(keep), ahead, delay)?,
+                Mask::constant(false),
+            ),
+            Path::Until(keep, goal) => (
+                race.mask(Condition::of(keep), ahead, delay)?,
+                race.mask(Condition::of(goal), ahead, delay)?,
+            ),
+            Path::Formula(_) => unreachable!("formulas have a watch of their own"),
+        };
+        if reach.now || !keep.now {
+            return Ok(Some((reach.now, ahead)));
+        }
+        let is_inside = ahead < delay;
+        if is_inside && (reach.behind || !keep.behind) {
+            return Ok(Some((reach.behind, ahead)));
+        }
+        let horizon = reach.horizon.min(keep.horizon);
+        let next = ahead + horizon;
+        if !is_inside || next.is_infinite() || next > delay || next <= ahead {
+            return Ok(None);
+        }
+        ahead = next;
+    }
+    Ok(None)
+}
