@@ -18,7 +18,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::exec::{Context, EmittedConstraint, Interpreter};
-use crate::ir::{ClockAtom, ClockRange, Edge, FunctionId, Guard, Network, Shape, Update, Variable};
+use crate::ir::{ClockAtom, Edge, FunctionId, Guard, Network, Shape, Update, Variable};
 
 use super::function_reads::read_words;
 use crate::tuning::Tuning;
@@ -466,19 +466,8 @@ struct FunctionRun<'a> {
 
 /// Adds the comparisons that a guard makes where it emits these constraints.
 fn add_atoms(guard: &Guard, emitted: &[EmittedConstraint], atoms: &mut Vec<ClockAtom>) {
-    let fixed = guard
-        .fixed
-        .iter()
-        .map(|&fixed| EmittedConstraint::from(fixed));
-    for constraint in fixed.chain(emitted.iter().copied()) {
-        let single = |first| ClockRange { first, count: 1 };
-        let atom = ClockAtom {
-            left: single(constraint.left),
-            right: single(constraint.right),
-            low: constraint.bound,
-            high: constraint.bound,
-            strict: constraint.strict,
-        };
+    for &constraint in guard.fixed.iter().chain(emitted) {
+        let atom = ClockAtom::from(constraint);
         if !atoms.contains(&atom) {
             atoms.push(atom);
         }

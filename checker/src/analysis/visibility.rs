@@ -41,18 +41,9 @@ impl Watched {
             Predicate::Clock(clock) => {
                 self.add_code(numbers, clock.bound);
                 for side in [clock.left, clock.right] {
-                    match side {
-                        ClockChoice::Fixed(clock) => {
-                            let range = crate::ir::ClockRange {
-                                first: clock,
-                                count: 1,
-                            };
-                            numbers.add_clocks(range, &mut self.cells);
-                        }
-                        ClockChoice::Indexed(range, function) => {
-                            numbers.add_clocks(range, &mut self.cells);
-                            self.add_code(numbers, function);
-                        }
+                    numbers.add_clocks(side.clocks(), &mut self.cells);
+                    if let ClockChoice::Indexed(_, function) = side {
+                        self.add_code(numbers, function);
                     }
                 }
             }

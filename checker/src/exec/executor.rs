@@ -16,27 +16,8 @@ pub struct Context<'a> {
     pub assignments: &'a mut Vec<EmittedAssignment>,
 }
 
-/// `left - right < bound`, or `<=` if not strict.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(C)]
-#[expect(missing_docs, reason = "the formula says it")]
-pub struct EmittedConstraint {
-    pub left: ClockId,
-    pub right: ClockId,
-    pub bound: i32,
-    pub strict: bool,
-}
-
-impl From<FixedConstraint> for EmittedConstraint {
-    fn from(fixed: FixedConstraint) -> EmittedConstraint {
-        EmittedConstraint {
-            left: fixed.left,
-            right: fixed.right,
-            bound: fixed.bound,
-            strict: fixed.strict,
-        }
-    }
-}
+/// A constraint that a call emitted.
+pub type EmittedConstraint = FixedConstraint;
 
 /// `target := value`, or `target := source + value` if the source is not the reference clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,7 @@ use super::{Network, Update};
 impl Network {
     /// All updates: of edges, of their branches, and those around every transition.
     pub fn updates(&self) -> impl Iterator<Item = &Update> {
-        let edges = self.processes.iter().flat_map(|process| &process.edges);
-        let of_edges = edges.flat_map(|edge| {
+        let of_edges = self.edges().flat_map(|edge| {
             let branches = edge.branches.iter().map(|branch| &branch.update);
             std::iter::once(&edge.update).chain(branches)
         });

@@ -68,6 +68,7 @@ pub enum RealBound {
 
 /// `left - right < bound`, or `<=` if not strict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 #[expect(missing_docs, reason = "the formula says it")]
 pub struct FixedConstraint {
     pub left: ClockId,
@@ -93,11 +94,40 @@ pub struct ClockAtom {
     pub strict: bool,
 }
 
+impl From<FixedConstraint> for ClockAtom {
+    fn from(fixed: FixedConstraint) -> ClockAtom {
+        let (left, right) = (fixed.left.into(), fixed.right.into());
+        ClockAtom {
+            strict: fixed.strict,
+            ..ClockAtom::weak(left, right, fixed.bound, fixed.bound)
+        }
+    }
+}
+
 impl ClockAtom {
+    /// A comparison that is not strict.
+    pub fn weak(left: ClockRange, right: ClockRange, low: i32, high: i32) -> ClockAtom {
+        ClockAtom {
+            left,
+            right,
+            low,
+            high,
+            strict: false,
+        }
+    }
     /// Whether the comparison concerns two clocks.
     pub fn is_difference(&self) -> bool {
-        let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
-        is_clock(self.left) && is_clock(self.right)
+        self.left.has_clock() && self.right.has_clock()
+    }
+
+    /// Whether it is a strict upper bound of a clock, or of a difference.
+    pub fn is_strict_upper(&self) -> bool {
+        self.strict && self.left.has_clock()
+    }
+
+    /// Whether it is a strict lower bound of a clock.
+    pub fn is_strict_lower(&self) -> bool {
+        self.strict && !self.left.has_clock()
     }
 }
 
@@ -108,6 +138,19 @@ pub struct ClockRange {
     pub first: ClockId,
     /// How many, at least 1.
     pub count: u32,
+}
+
+impl ClockRange {
+    /// Whether there is another one than the reference clock.
+    pub fn has_clock(self) -> bool {
+        self.first.0 != 0 || self.count > 1
+    }
+}
+
+impl From<ClockId> for ClockRange {
+    fn from(first: ClockId) -> ClockRange {
+        ClockRange { first, count: 1 }
+    }
 }
 
 /// What happens to words and clocks. First `function` runs; then the clocks of `fixed` are set.

@@ -211,3 +211,13 @@ pub enum ClockChoice {
     /// One of consecutive clocks: the function returns the offset from the first.
     Indexed(ClockRange, FunctionId),
 }
+
+impl ClockChoice {
+    /// The clocks that it may be.
+    pub fn clocks(self) -> ClockRange {
+        match self {
+            ClockChoice::Fixed(clock) => clock.into(),
+            ClockChoice::Indexed(range, _) => range,
+        }
+    }
+}

@@ -12,8 +12,8 @@ use super::operators::to_double;
 use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, Root, conjuncts};
 use super::types::{Class, Memory, Type};
 use crate::ir::{
-    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
-    FixedConstraint, FunctionId, Guard, Relation, Update,
+    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, FixedConstraint,
+    FunctionId, Guard, Relation, Update,
 };
 use crate::syntax::ast;
 
@@ -69,7 +69,8 @@ impl Checker<'_> {
             ..Guard::default()
         };
         if !self.can_lower() {
-            guard.atoms = parts.iter().flat_map(fixed_constraints).map(atom).collect();
+            let fixed = parts.iter().flat_map(fixed_constraints);
+            guard.atoms = fixed.map(ClockAtom::from).collect();
             return guard;
         }
         let mut rest = Vec::new();
@@ -78,7 +79,9 @@ impl Checker<'_> {
             if fixed.is_empty() {
                 rest.push(part);
             }
-            guard.atoms.extend(fixed.iter().copied().map(atom));
+            guard
+                .atoms
+                .extend(fixed.iter().copied().map(ClockAtom::from));
             guard.fixed.extend(fixed);
         }
         if rest.is_empty() {
@@ -449,20 +452,6 @@ fn fixed_constraints(expr: &Expr) -> Vec<FixedConstraint> {
         .collect()
 }
 
-fn atom(constraint: FixedConstraint) -> ClockAtom {
-    ClockAtom {
-        left: single(constraint.left),
-        right: single(constraint.right),
-        low: constraint.bound,
-        high: constraint.bound,
-        strict: constraint.strict,
-    }
-}
-
-fn single(first: ClockId) -> ClockRange {
-    ClockRange { first, count: 1 }
-}
-
 /// The clock and the value of `clock = constant`, if both are known and legal.
 fn fixed_reset(expr: &Expr) -> Option<(ClockId, i32)> {
     let Kind::AssignClock {
@@ -488,7 +477,7 @@ fn sets_clocks(expr: &Expr) -> bool {
 
 fn fixed_assignment(clock: ClockId, value: i32) -> ClockAssignment {
     ClockAssignment {
-        target: single(clock),
+        target: clock.into(),
         value: AssignedValue::Integer(value, value),
     }
 }

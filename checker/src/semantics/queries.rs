@@ -260,11 +260,9 @@ impl Checker<'_> {
 
     /// With partial observation the controller must not depend on strict lower bounds.
     fn check_observable(&mut self, span: Span) {
-        let edges = self.world.network.processes.iter().flat_map(|p| &p.edges);
-        let is_strict_lower =
-            |atom: &ir::ClockAtom| atom.strict && atom.left.first.0 == 0 && atom.left.count == 1;
-        let mut controllable = edges.filter(|edge| edge.controllable);
-        if controllable.any(|edge| edge.guard.atoms.iter().any(is_strict_lower)) {
+        let edges = self.world.network.edges();
+        let atoms = |edge: &ir::Edge| edge.guard.atoms.iter().any(ir::ClockAtom::is_strict_lower);
+        if edges.filter(|edge| edge.controllable).any(atoms) {
             self.error(
                 codes::OBSERVATION_REFUSED,
                 span,

@@ -222,13 +222,7 @@ impl Checker<'_> {
 
 /// What a network uses.
 fn features(network: &Network) -> Features {
-    let edges = || network.processes.iter().flat_map(|process| &process.edges);
-    let locations = || {
-        network
-            .processes
-            .iter()
-            .flat_map(|process| &process.locations)
-    };
+    let (edges, locations) = (|| network.edges(), || network.locations());
     let atoms = || {
         let guards = edges().map(|edge| &edge.guard);
         let invariants = locations().map(|location| &location.invariant);
@@ -246,11 +240,11 @@ fn features(network: &Network) -> Features {
     Features {
         priorities: network.features.priorities || levels.any(|level| level > 0),
         default_priority: network.features.default_priority,
-        diagonals: atoms().any(is_diagonal),
+        diagonals: atoms().any(ClockAtom::is_difference),
         stopwatches: locations().any(|location: &Location| !location.rates.is_empty()),
         strict_invariants: locations()
             .flat_map(|location| &location.invariant.atoms)
-            .any(super::templates::is_strict_upper_bound),
+            .any(ClockAtom::is_strict_upper),
         guarded_receivers: synchronises(|channel, send| channel.broadcast && !send),
         clock_guarded_urgent: synchronises(|channel, _| channel.urgent),
         clock_copies: network.updates().any(|update| {
@@ -272,10 +266,6 @@ fn features(network: &Network) -> Features {
 }
 
 /// Whether neither side of a comparison is the reference clock.
-fn is_diagonal(atom: &ClockAtom) -> bool {
-    let is_clock = |range: crate::ir::ClockRange| range.first.0 > 0 || range.count > 1;
-    is_clock(atom.left) && is_clock(atom.right)
-}
 
 fn has_double(shape: &crate::ir::Shape) -> bool {
     match shape {

@@ -9,7 +9,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::ir::{AssignedValue, ClockAtom, ClockChoice, ClockRange, Network, Predicate};
+use crate::ir::{AssignedValue, ClockAtom, Network, Predicate};
 
 use super::moves::{Error, State};
 use super::regions;
@@ -186,14 +186,10 @@ impl Moments {
 
 /// The clock comparisons of a predicate.
 fn collect(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
-    let range = |choice: ClockChoice| match choice {
-        ClockChoice::Fixed(first) => ClockRange { first, count: 1 },
-        ClockChoice::Indexed(range, _) => range,
-    };
     match predicate {
         Predicate::Clock(clock) => atoms.push(ClockAtom {
-            left: range(clock.left),
-            right: range(clock.right),
+            left: clock.left.clocks(),
+            right: clock.right.clocks(),
             low: clock.range.0,
             high: clock.range.1,
             strict: clock.strict,

@@ -2,6 +2,7 @@
 
 use crate::exec::RunTimeError;
 use crate::ir::Network;
+pub use crate::ir::Part;
 
 /// Why a state could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,19 +28,6 @@ pub struct State {
     pub words: Vec<i32>,
     /// The clock values in ticks.
     pub clocks: Vec<i64>,
-}
-
-/// One process's share in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values, the last binding fastest.
-    pub select: u32,
 }
 
 /// A move: the parts of its participants, the sender (or the only process) first.

@@ -226,8 +226,7 @@ fn violation_lines(network: &Network, defect: &Defect, words: &[i32]) -> Vec<Str
         lines.push(format!("  {}", text::words_line(network, words)));
     }
     if let Defect::MoveLeaves(parts) = defect {
-        let parts = parts.iter();
-        let texts = parts.map(|&part| text::part_text(network, part.into()));
+        let texts = parts.iter().map(|&part| text::part_text(network, part));
         lines.extend(texts.map(|text| format!("    {text}")));
     }
     lines

@@ -5,7 +5,6 @@
 use serde_json::Value as Json;
 
 use crate::ir::Network;
-use crate::network::Part;
 use crate::verify::State;
 use crate::verify::replay::{End, Run};
 use crate::zones::dbm::Constraint;
@@ -72,8 +71,7 @@ pub(super) fn compare_trace(
             Some(start) if index == moves.len() => start,
             _ => shown_at(index),
         };
-        let parts: Vec<Part> = step.parts.iter().map(|&one| one.into()).collect();
-        let right = json::parts(network, &parts);
+        let right = json::parts(network, &step.parts);
         compare(moves[place].0, &right, &format!("transitions[{place}]"))?;
     }
     for (index, state) in states.iter().take(run.steps.len() + 1).enumerate() {

@@ -132,7 +132,7 @@ pub(crate) fn follow(
 ) -> Result<Option<(Run, Vec<State>)>, verify::Error> {
     let steps = way.moves.iter().map(|(wait, parts)| replay::Step {
         wait: *wait,
-        parts: parts.iter().map(|&one| one.into()).collect(),
+        parts: parts.clone(),
     });
     let run = Run {
         ticks_per_unit: way.ticks_per_unit,
@@ -276,33 +276,10 @@ pub fn decisions(network: &Network, strategy: &Strategy) -> Vec<Decisions> {
 }
 
 fn decision(decision: &Decision) -> strategy::Decision {
-    let action = decision.action.as_ref();
     strategy::Decision {
         rank: decision.rank,
         zones: zones(&decision.zones),
-        action: action.map(|parts| parts.iter().map(|&one| one.into()).collect()),
-    }
-}
-
-impl From<Part> for verify::Part {
-    fn from(part: Part) -> verify::Part {
-        verify::Part {
-            process: part.process,
-            edge: part.edge,
-            branch: part.branch,
-            select: part.select,
-        }
-    }
-}
-
-impl From<verify::Part> for Part {
-    fn from(part: verify::Part) -> Part {
-        Part {
-            process: part.process,
-            edge: part.edge,
-            branch: part.branch,
-            select: part.select,
-        }
+        action: decision.action.clone(),
     }
 }
 
@@ -400,7 +377,7 @@ fn violation_lines(network: &Network, violation: &Violation) -> Vec<String> {
     lines
 }
 
-fn part_text(network: &Network, part: verify::Part) -> String {
+fn part_text(network: &Network, part: Part) -> String {
     let process = &network.processes[part.process as usize];
     let edge = &process.edges[part.edge as usize];
     let target = edge.branches[part.branch as usize].target;

@@ -15,8 +15,8 @@ use crate::search::liveness::ending::RunEnding;
 use crate::search::timed_trace::schedule::{
     self, Closing, Finish, Schedule, Stays, Unscheduled, Wanted,
 };
+use crate::verify::State;
 use crate::verify::replay::{self, Claim, End, Moment, Outcome, Run, Shown, Step};
-use crate::verify::{self, State};
 use crate::zones::dbm::Constraint;
 
 use super::witness::{Missing, Proof};
@@ -142,11 +142,7 @@ pub fn prove(symbolic: &mut Symbolic<'_>, what: ToProve<'_>) -> Proof {
         }
         Shows::Takes(takes) => Claim::Takes(takes.predicate, takes.measure, takes.shown),
     };
-    match replay::replay(network, &run, &claim) {
-        Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
-        Ok(Outcome::Violated(violation)) => Proof::Violated(run, violation),
-        Err(error) => Proof::Missing(Missing::NotCovered(error)),
-    }
+    Proof::of(network, run, &claim)
 }
 
 impl From<Unscheduled> for Missing {
@@ -183,7 +179,7 @@ pub(crate) fn timed(symbolic: &mut Symbolic<'_>, wanted: &Wanted<'_>) -> Result<
     let mut before = 0;
     let steps = wanted.moves.iter().zip(&times).map(|(parts, &time)| Step {
         wait: time - std::mem::replace(&mut before, time),
-        parts: parts.iter().map(|&one| verify::Part::from(one)).collect(),
+        parts: parts.clone(),
     });
     let steps = steps.collect();
     let entered = |state: usize| state.checked_sub(1).map_or(0, |last| times[last]);

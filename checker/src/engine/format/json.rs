@@ -238,10 +238,10 @@ fn witness(network: &Network, witness: &Witness) -> Json {
 
 /// A run with exact times.
 pub fn run(network: &Network, run: &Run, states: &[State]) -> Json {
-    let steps = run.steps.iter().map(|step| {
-        let edges = step.parts.iter().map(|&one| part(network, one.into()));
-        json!({ "wait": step.wait, "edges": edges.collect::<Vec<_>>() })
-    });
+    let steps = run
+        .steps
+        .iter()
+        .map(|step| json!({ "wait": step.wait, "edges": parts(network, &step.parts) }));
     let end = match run.end {
         End::After(wait) => json!({ "kind": "after", "wait": wait }),
         End::Loop(state) => json!({ "kind": "loop", "state": state }),
@@ -277,10 +277,9 @@ pub fn discrete(network: &Network, words: &[i32]) -> Json {
 /// What can happen in a state: of each choice the edges, and the windows of waits in ticks, null
 /// for one without end.
 pub fn choices(network: &Network, choices: &[Choice]) -> Json {
-    let list = choices.iter().map(|choice| {
-        let edges = choice.parts.iter().map(|&one| part(network, one.into()));
-        json!({ "edges": edges.collect::<Vec<_>>(), "windows": choice.windows })
-    });
+    let list = choices
+        .iter()
+        .map(|choice| json!({ "edges": parts(network, &choice.parts), "windows": choice.windows }));
     list.collect()
 }
 

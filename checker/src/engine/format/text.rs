@@ -344,7 +344,7 @@ pub fn run_text(network: &Network, run: &Run, states: &[State]) -> String {
                 let _ = writeln!(text, "  wait {}", fraction(step.wait, unit));
             }
             for part in &step.parts {
-                let _ = writeln!(text, "  {}", part_text(network, (*part).into()));
+                let _ = writeln!(text, "  {}", part_text(network, *part));
             }
         }
     }

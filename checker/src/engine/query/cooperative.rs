@@ -110,10 +110,7 @@ fn way(zones: &mut Symbolic<'_>, winning: &Winning, trace: &Trace) -> Result<Way
 
 /// The moves and times of a run that ends.
 pub(super) fn to_way(run: &Run) -> Way {
-    let moves = run.steps.iter().map(|step| {
-        let parts = step.parts.iter().map(|&part| part.into());
-        (step.wait, parts.collect())
-    });
+    let moves = run.steps.iter().map(|step| (step.wait, step.parts.clone()));
     Way {
         ticks_per_unit: run.ticks_per_unit,
         moves: moves.collect(),

@@ -2,7 +2,7 @@
 
 use crate::analysis::Abstraction;
 use crate::analysis::clock_differences::greatest_constant;
-use crate::ir::{ClockAtom, ClockId, ClockRange, Network, Predicate};
+use crate::ir::{ClockAtom, ClockId, Network, Predicate};
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first;
@@ -107,15 +107,6 @@ fn best(
 /// there are bounds.
 fn time_atom(network: &Network, clock: usize) -> ClockAtom {
     let longest = Bound::reach(greatest_constant(network));
-    let range = |clock: usize| ClockRange {
-        first: ClockId(clock as u32),
-        count: 1,
-    };
-    ClockAtom {
-        left: range(clock),
-        right: range(0),
-        low: longest,
-        high: longest,
-        strict: false,
-    }
+    let (clock, reference) = (ClockId(clock as u32).into(), ClockId(0).into());
+    ClockAtom::weak(clock, reference, longest, longest)
 }

@@ -27,7 +27,7 @@ use crate::game::solver::Solver;
 use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
-use crate::ir::{ClockAtom, ClockId, ClockRange, Control, TimeBounds};
+use crate::ir::{ClockAtom, ClockId, Control, TimeBounds};
 use crate::network::{Failure, Stepper};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::optimum::extremum::{Extreme, Extremes};
@@ -381,18 +381,11 @@ impl ClockedGame<'_> {
 
 /// The comparisons of the clock with values up to the limit, in both directions.
 fn limits_of(clock: usize, limit: i32) -> [ClockAtom; 2] {
-    let range = |clock: usize| ClockRange {
-        first: ClockId(clock as u32),
-        count: 1,
-    };
-    let atom = |left: usize, right: usize, low: i32, high: i32| ClockAtom {
-        left: range(left),
-        right: range(right),
-        low,
-        high,
-        strict: false,
-    };
-    [atom(clock, 0, 0, limit), atom(0, clock, -limit, 0)]
+    let (clock, reference) = (ClockId(clock as u32).into(), ClockId(0).into());
+    [
+        ClockAtom::weak(clock, reference, 0, limit),
+        ClockAtom::weak(reference, clock, -limit, 0),
+    ]
 }
 
 /// What the greatest winning start of the clock leaves of the limit.

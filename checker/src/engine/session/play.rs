@@ -13,9 +13,9 @@ use hashbrown::hash_table::Entry;
 use rustc_hash::FxBuildHasher;
 use serde_json::{Map, Value as Json, json};
 
+use crate::game::Priorities;
 use crate::game::strategy::closed_loop;
 use crate::game::strategy::{Selection, Start, Strategy};
-use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
@@ -142,12 +142,11 @@ impl Follower {
     /// The entry of the strategy's file for the locations and variables of this JSON.
     pub fn state(&self, network: &Network, state: &Json) -> Result<Json, Unadvised> {
         let words = strategy_json::read_words(network, state)?;
+        let network = &*time_clock::network_of(network, &self.strategy);
         let part = self.at(network, &words);
-        let mut file = strategy_json::write(network, &part, &self.query);
-        match file["states"].get_mut(0) {
-            Some(entry) => Ok(entry.take()),
-            None => Err(Unadvised::UnknownState),
-        }
+        let joined = closed_loop::joined(network, &part);
+        let entry = joined.first().ok_or(Unadvised::UnknownState)?;
+        Ok(strategy_json::state(network, entry))
     }
 
     /// What the strategy says in a state, as JSON: whether play is `over` there; the decisions that
@@ -178,7 +177,7 @@ impl Follower {
             let described = indices.iter().map(|&one| {
                 let action = decisions.decisions[one].action.as_ref();
                 json!({
-                    "edges": action.map(|parts| edges(network, parts)),
+                    "edges": action.map(|parts| json::parts(network, parts)),
                     "rank": ranked[one].rank,
                 })
             });
@@ -207,12 +206,6 @@ impl Follower {
         let result = model.verify_strategy(&text, played, rules, effort)?;
         Ok(Checked::of_strategy(model.network(), &result))
     }
-}
-
-/// The edges of a move.
-fn edges(network: &Network, parts: &[Part]) -> Json {
-    let parts = parts.iter().map(|&one| json::part(network, one.into()));
-    parts.collect()
 }
 
 fn identity<'w>(network: &Network, words: &'w [i32]) -> &'w [i32] {
@@ -481,13 +474,13 @@ impl Play {
         let timings = |moves: &[Timing]| {
             let moves = moves.iter().map(|one| {
                 let windows = one.windows.iter().map(window);
-                json!({ "edges": edges(network, &one.parts), "windows": windows.collect::<Vec<_>>() })
+                json!({ "edges": json::parts(network, &one.parts), "windows": windows.collect::<Vec<_>>() })
             });
             moves.collect::<Vec<_>>()
         };
         let next = match &situation.next {
             Next::Acts { action, .. } => {
-                json!({ "kind": "acts", "edges": edges(network, action) })
+                json!({ "kind": "acts", "edges": json::parts(network, action) })
             }
             Next::Won(winner, ending) => json!({
                 "kind": "won",
@@ -661,18 +654,10 @@ impl Play {
     }
 }
 
-/// The name of a player in files.
+/// The name of an owner in files.
 pub fn owner_name(owner: Owner) -> &'static str {
     match owner {
         Owner::Controller => "controller",
         Owner::Environment => "environment",
-    }
-}
-
-/// The name of a player in files.
-pub fn player_name(player: Player) -> &'static str {
-    match player {
-        Player::Controller => "controller",
-        Player::Environment => "environment",
     }
 }

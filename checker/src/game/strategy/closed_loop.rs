@@ -7,7 +7,7 @@
 //! the closed loop contains every run of every player that follows the strategy.
 
 use crate::cancellation;
-use crate::ir::{ClockAtom, ClockId, ClockRange, Network};
+use crate::ir::{ClockAtom, ClockId, FixedConstraint, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
 use crate::search::StateStore;
 use crate::zones::future::Barriers;
@@ -232,15 +232,11 @@ fn collect_atoms(zones: &Federation, atoms: &mut Vec<ClockAtom>) {
 }
 
 fn atom(left: usize, right: usize, bound: Bound) -> ClockAtom {
-    let clock = |index: usize| ClockRange {
-        first: ClockId(index as u32),
-        count: 1,
-    };
-    ClockAtom {
+    let clock = |index: usize| ClockId(index as u32);
+    ClockAtom::from(FixedConstraint {
         left: clock(left),
         right: clock(right),
-        low: bound.value(),
-        high: bound.value(),
+        bound: bound.value(),
         strict: bound.is_strict(),
-    }
+    })
 }

@@ -5,7 +5,7 @@
 //! * If the guard of an edge does not hold, its channel is not evaluated: it may have none.
 
 use crate::cancellation;
-use crate::exec::{Context, EmittedConstraint, Executor, RunTimeError};
+use crate::exec::{Context, Executor, RunTimeError};
 use crate::ir::{ChannelId, FunctionId, Guard, RunTimeErrorKind};
 
 use super::broadcast_filter::{Scope, Sending};
@@ -298,12 +298,7 @@ impl<'a> Stepper<'a> {
             self.constraints.truncate(first);
             return Ok(false);
         }
-        self.constraints.extend(
-            guard
-                .fixed
-                .iter()
-                .map(|&fixed| EmittedConstraint::from(fixed)),
-        );
+        self.constraints.extend_from_slice(&guard.fixed);
         Ok(true)
     }
 

@@ -2,6 +2,7 @@
 
 use crate::exec::EmittedConstraint;
 use crate::ir::ChannelId;
+pub use crate::ir::Part;
 use crate::network::failure::Failure;
 use crate::zones::federation::block_bytes;
 
@@ -11,20 +12,6 @@ const MOST_MOVES: usize = 1 << 20;
 /// The index of cached moves. Each belongs to one location vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MoveListId(pub(super) u32);
-
-/// The part of one process in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
-    /// binding fastest.
-    pub select: u32,
-}
 
 /// Ranges into the buffers of [`Moves`].
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@
 //! order, and gives the same words. Its effect on clocks is [`FixedMove::effect`] in every state of
 //! its location vector.
 
-use crate::exec::{EmittedConstraint, RunTimeError};
+use crate::exec::RunTimeError;
 use crate::ir::{FunctionId, Update};
 
 use super::clock_effect::to_constraints;
@@ -112,8 +112,7 @@ impl Stepper<'_> {
             if invariant.function.is_some() {
                 return None;
             }
-            let fixed = invariant.fixed.iter().copied();
-            emitted.extend(fixed.map(EmittedConstraint::from));
+            emitted.extend_from_slice(&invariant.fixed);
         }
         to_constraints(&emitted).ok()?
     }

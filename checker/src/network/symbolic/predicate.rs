@@ -3,9 +3,7 @@
 //! The extent of a predicate in a state is the part of the zone in which it holds. Predicates
 //! without clocks hold in all of it or in none, and cost no zone operation.
 
-use crate::ir::{
-    ClockAtom, ClockChoice, ClockId, ClockPredicate, ClockRange, FunctionId, Network, Predicate,
-};
+use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockPredicate, FunctionId, Network, Predicate};
 use crate::zones::{Bound, Federation, Zone};
 
 use crate::network::{Failure, Symbolic};
@@ -263,8 +261,8 @@ fn collect_atoms(predicate: &Predicate, atoms: &mut Vec<ClockAtom>) {
     match predicate {
         Predicate::Clock(clock) => {
             let atom = ClockAtom {
-                left: clock_range(clock.left),
-                right: clock_range(clock.right),
+                left: clock.left.clocks(),
+                right: clock.right.clocks(),
                 low: clock.range.0,
                 high: clock.range.1,
                 strict: clock.strict,
@@ -312,16 +310,6 @@ pub fn negated_atoms(network: &Network) -> Vec<ClockAtom> {
         edges.chain(process.locations.iter().map(|location| &location.invariant))
     });
     guards.flat_map(|guard| &guard.atoms).map(negated).collect()
-}
-
-fn clock_range(choice: ClockChoice) -> ClockRange {
-    match choice {
-        ClockChoice::Fixed(clock) => ClockRange {
-            first: clock,
-            count: 1,
-        },
-        ClockChoice::Indexed(range, _) => range,
-    }
 }
 
 /// The code that decides a predicate, which reads words only.

@@ -22,7 +22,7 @@
 //! derived here.
 
 use crate::analysis::clock_differences;
-use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Network, Predicate};
+use crate::ir::{ClockAtom, ClockChoice, ClockId, Measure, Network, Predicate};
 use crate::network::symbolic::predicate;
 use crate::network::{Failure, Moves, Part, Symbolic};
 use crate::zones::clocks::Assignment;
@@ -207,26 +207,14 @@ impl<'q> Measuring<'q> {
 
     /// The comparisons that the search must keep; those for the least values only with `least`.
     fn atoms(&self, least: bool) -> Vec<ClockAtom> {
-        let reference = ClockRange {
-            first: ClockId(0),
-            count: 1,
-        };
+        let reference = ClockId(0).into();
         let mut atoms = Vec::new();
         for ((measure, _), item) in self.question.items.iter().zip(&self.items) {
             let Measure::Clock(choice) = *measure else {
                 continue;
             };
-            let clock = match choice {
-                ClockChoice::Fixed(first) => ClockRange { first, count: 1 },
-                ClockChoice::Indexed(range, _) => range,
-            };
-            let atom = |left, right, bound| ClockAtom {
-                left,
-                right,
-                low: bound,
-                high: bound,
-                strict: false,
-            };
+            let clock = choice.clocks();
+            let atom = |left, right, bound| ClockAtom::weak(left, right, bound, bound);
             if self.question.greatest && !item.is_infinite {
                 atoms.push(atom(reference, clock, -item.high_ceiling));
             }

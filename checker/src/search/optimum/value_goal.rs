@@ -1,7 +1,7 @@
 //! Which state has a value that was found: the search behind the traces of `sup`, `inf` and
 //! `bounds`.
 
-use crate::ir::{ClockAtom, ClockChoice, ClockId, ClockRange, Measure, Predicate};
+use crate::ir::{ClockAtom, ClockId, Measure, Predicate};
 use crate::network::{Failure, Symbolic};
 use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
@@ -29,25 +29,11 @@ impl Taking<'_> {
         let Measure::Clock(choice) = *self.measure else {
             return Vec::new();
         };
-        let clock = match choice {
-            ClockChoice::Fixed(first) => ClockRange { first, count: 1 },
-            ClockChoice::Indexed(range, _) => range,
-        };
-        let reference = ClockRange {
-            first: ClockId(0),
-            count: 1,
-        };
-        let atom = |left, right, low, high| ClockAtom {
-            left,
-            right,
-            low,
-            high,
-            strict: false,
-        };
+        let (clock, reference) = (choice.clocks(), ClockId(0).into());
         let (low, high) = (self.value.saturating_sub(1), self.value.saturating_add(1));
         vec![
-            atom(clock, reference, low, high),
-            atom(reference, clock, -high, -low),
+            ClockAtom::weak(clock, reference, low, high),
+            ClockAtom::weak(reference, clock, -high, -low),
         ]
     }
 

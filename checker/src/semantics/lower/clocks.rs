@@ -13,10 +13,6 @@ const REFERENCE: ClockOperand = ClockOperand {
 };
 
 /// The reference clock as a set of clocks.
-const REFERENCE_RANGE: ClockRange = ClockRange {
-    first: ClockId(0),
-    count: 1,
-};
 
 /// The comparisons `left - right ≺ bound` that a clock comparison stands for: whether the clocks
 /// are swapped, whether the bound is negated, whether it is strict.
@@ -144,7 +140,7 @@ impl Builder<'_> {
 
     fn clock_or_reference(&mut self, clock: Option<&Expr>) -> (ClockOperand, ClockRange) {
         match clock.map(|clock| self.clock(clock)) {
-            None => (REFERENCE, REFERENCE_RANGE),
+            None => (REFERENCE, REFERENCE.first.into()),
             Some((operand, ClockSet::Range(range))) => (operand, range),
             Some((_, ClockSet::Parameter(_))) => {
                 unreachable!("functions hold no clock comparisons")
