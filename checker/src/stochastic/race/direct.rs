@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use super::Race;
 use crate::exec::RunTimeError;
-use crate::exec::arithmetic::{double, doubles_relate, integers_relate};
+use crate::exec::arithmetic::{double, relate};
 use crate::ir::{DoubleOperator, FunctionId, ProcessId, Relation};
 use crate::stochastic::advice::View;
 use crate::stochastic::condition::Condition;
@@ -88,12 +88,12 @@ impl Backend for Race<'_> {
 
     #[inline]
     fn compare(&mut self, left: i32, relation: Relation, right: i32) -> i32 {
-        integers_relate(relation, left, right).into()
+        relate(relation, left, right).into()
     }
 
     #[inline]
     fn compare_reals(&mut self, left: f64, relation: Relation, right: f64) -> i32 {
-        doubles_relate(relation, left, right).into()
+        relate(relation, left, right).into()
     }
 
     #[inline]
