@@ -14,6 +14,18 @@ impl Network {
             .chain(&self.after_update)
     }
 
+    /// The same, to change them.
+    pub(crate) fn updates_mut(&mut self) -> impl Iterator<Item = &mut Update> {
+        let edges = self.processes.iter_mut().flat_map(|one| &mut one.edges);
+        let of_edges = edges.flat_map(|edge| {
+            let branches = edge.branches.iter_mut().map(|branch| &mut branch.update);
+            std::iter::once(&mut edge.update).chain(branches)
+        });
+        of_edges
+            .chain(&mut self.before_update)
+            .chain(&mut self.after_update)
+    }
+
     /// By word: whether some update may write it. Locations always count as written.
     pub fn written_words(&self) -> Vec<bool> {
         let mut written = vec![false; self.layout.words as usize];

@@ -1,6 +1,6 @@
 //! Moves of a network by numbers: who takes which edge, and what a machine proposes.
 
-use super::ChannelId;
+use super::ids::ChannelId;
 
 /// The part of one process in a move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -5,9 +5,9 @@ use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::{Relocation, chance_words};
-use super::offsets::known_offset;
+use super::offsets::state_offset;
 use super::scope::{Entity, Scope};
-use super::typed::{Expr, Root};
+use super::typed::Expr;
 use super::types::Memory;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{AssignedValue, Chances, Clock, ClockAtom, Features, Location, Network};
@@ -161,15 +161,7 @@ impl Checker<'_> {
         if expr.is_error() {
             return None;
         }
-        let is_channels = expr.ty.size().channels > 0
-            && expr
-                .variable()
-                .is_some_and(|place| place.root == Root::State);
-        let known = if is_channels {
-            known_offset(expr, Memory::Channels)
-        } else {
-            None
-        };
+        let known = state_offset(expr, Memory::Channels).filter(|_| expr.ty.size().channels > 0);
         if known.is_none() {
             self.error(
                 codes::CHANNEL_EXPECTED,
@@ -264,8 +256,6 @@ fn features(network: &Network) -> Features {
         legs: edges().any(|edge| edge.leg.is_some()),
     }
 }
-
-/// Whether neither side of a comparison is the reference clock.
 
 fn has_double(shape: &crate::ir::Shape) -> bool {
     match shape {

@@ -14,7 +14,7 @@ use checker::game::strategy::{Decision, Selection, Start, Strategy, StrategyStat
 use checker::ir;
 use checker::network::Part;
 use checker::verify::regions::Bounding;
-use checker::verify::{self, Regions, Semantics, State};
+use checker::verify::{Regions, Semantics, State};
 use checker::zones::dbm::Constraint;
 use checker::zones::{Bound, Federation, Zone};
 use proptest::prop_assert_eq;
@@ -179,8 +179,7 @@ impl<'s> Said<'s> {
     }
 
     fn entry(&self, parts: &[Part]) -> explicit::Entry {
-        let parts: Vec<verify::Part> = parts.iter().map(|&part| part.into()).collect();
-        explicit::entry(self.3, &parts)
+        explicit::entry(self.3, parts)
     }
 
     pub(crate) fn allows_waiting(&self) -> bool {
@@ -278,11 +277,10 @@ fn close(semantics: &Semantics<'_>, regions: &Regions, strategy: &Strategy) -> O
         let moves = semantics.moves(&state).ok()?;
         let mut steps = Vec::new();
         for one in &moves {
-            let parts: Vec<Part> = one.parts.iter().map(|&part| part.into()).collect();
             let is_allowed = if strategy.owner.owns(one.controllable) {
-                now.allows(&parts)
+                now.allows(&one.parts)
             } else {
-                now.picks(&parts)
+                now.picks(&one.parts)
             };
             if !is_allowed {
                 continue;
@@ -389,12 +387,7 @@ pub(crate) fn own_moves(
     for node in &graph.nodes {
         let moves = semantics.moves(&node.state).unwrap_or_default();
         let own = moves.iter().filter(|one| owner.owns(one.controllable));
-        let own = own.map(|one| {
-            one.parts
-                .iter()
-                .map(|&part| part.into())
-                .collect::<Vec<_>>()
-        });
+        let own = own.map(|one| one.parts.clone());
         let index = words.iter().position(|one| one.0 == node.state.words);
         let index = index.unwrap_or_else(|| {
             words.push((node.state.words.clone(), Vec::new()));

@@ -247,9 +247,8 @@ fn end_of(network: &ir::Network, graph: &Graph, constant: i64, way: &Way) -> Opt
     let semantics = Semantics::new(network, way.ticks_per_unit);
     let mut state = semantics.initial().ok()?;
     for (wait, parts) in &way.moves {
-        let parts: Vec<_> = parts.iter().map(|&part| part.into()).collect();
         state = semantics.after(&state, *wait).ok()?;
-        state = semantics.take(&state, &parts).ok()??;
+        state = semantics.take(&state, parts).ok()??;
     }
     let end = Timed {
         state: semantics.after(&state, way.wait).ok()?,

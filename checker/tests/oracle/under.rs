@@ -7,7 +7,6 @@ use checker::engine::format::strategy_json;
 use checker::engine::{NamedStrategy, Options};
 use checker::game::strategy::Strategy;
 use checker::game::{Player, Priorities};
-use checker::network::Part;
 use checker::verify::{Regions, Semantics};
 use proptest::test_runner::TestCaseError;
 
@@ -25,10 +24,8 @@ fn restrict(graph: &mut Graph, strategy: &Strategy) {
     let network = &graph.network;
     for node in &mut graph.nodes {
         let said = Said::new(network, strategy, &node.state, ticks);
-        node.steps.retain(|step| {
-            let parts: Vec<Part> = step.parts.iter().map(|&part| part.into()).collect();
-            !step.controllable || said.allows(&parts)
-        });
+        node.steps
+            .retain(|step| !step.controllable || said.allows(&step.parts));
         node.is_obliged = !said.allows_waiting();
     }
 }
