@@ -36,6 +36,22 @@ pub struct Span {
 }
 
 impl Span {
+    /// A part of it, by bytes behind its start.
+    #[must_use]
+    pub fn part(self, range: Range<usize>) -> Span {
+        let at = |offset| self.start.saturating_add(to_u32(offset));
+        Span {
+            source: self.source,
+            start: at(range.start),
+            end: at(range.end),
+        }
+    }
+
+    /// The place where it starts.
+    #[must_use]
+    pub fn at_start(self) -> Span {
+        self.part(0..0)
+    }
     /// The smallest span that holds both; `self` where they lie in different sources.
     #[must_use]
     pub fn to(self, other: Span) -> Span {
@@ -48,6 +64,11 @@ impl Span {
             end: self.end.max(other.end),
         }
     }
+}
+
+/// Byte offsets fit: the readers refuse files beyond `u32`.
+pub(crate) fn to_u32(offset: usize) -> u32 {
+    u32::try_from(offset).unwrap_or(u32::MAX)
 }
 
 /// One parsed piece of text, and the file that it came from.
@@ -115,13 +136,19 @@ pub struct SourceMap {
 }
 
 impl SourceMap {
-    /// Adds a source and returns its index.
+    /// Adds a source and returns the span of its whole text.
     ///
     /// # Panics
     /// At the 2^32nd source, which no memory holds.
-    pub fn add(&mut self, source: Source) -> SourceId {
+    pub fn add(&mut self, source: Source) -> Span {
+        let end = to_u32(source.text.len());
+        let id = u32::try_from(self.sources.len()).expect("fewer than 2^32 sources");
         self.sources.push(source);
-        SourceId(u32::try_from(self.sources.len() - 1).expect("fewer than 2^32 sources"))
+        Span {
+            source: SourceId(id),
+            start: 0,
+            end,
+        }
     }
 
     /// The source with this index.
@@ -431,7 +458,7 @@ mod tests {
     fn rendered_text_commands_no_terminal() {
         let mut sources = SourceMap::default();
         let text = "\u{9b}31m\u{202e}E<> \x1b]0;x\x07P.Z \x7f\r\n";
-        let source = sources.add(Source {
+        let whole = sources.add(Source {
             path: "a\x1b[2J.q".into(),
             place: "query \u{2066}".to_owned(),
             text: text.into(),
@@ -441,11 +468,7 @@ mod tests {
             code: "E0000",
             name: "test",
         };
-        let span = Span {
-            source,
-            start: 16,
-            end: 19,
-        };
+        let span = whole.part(16..19);
         let diagnostic = Diagnostic::new(code, span, "unknown \x1b[31m'P'").note("\u{85}");
         let rendered = diagnostic.help("\x08").render(&sources);
         let is_safe = |one: char| one == '\n' || (!one.is_control() && visible_char(one) == one);

@@ -417,10 +417,7 @@ fn spread_over_copies(network: &Network, tables: &mut [Table], everywhere: &mut 
             }
         }
     }
-    let edges = network.processes.iter().flat_map(|process| &process.edges);
-    let updates = edges.flat_map(|edge| {
-        std::iter::once(&edge.update).chain(edge.branches.iter().map(|branch| &branch.update))
-    });
+    let updates = network.updates();
     let copies: Vec<_> = updates.flat_map(|update| &update.assignments).collect();
     // As many rounds as there are clocks reach the end of every chain of copies. Bounds that still
     // grow then do so forever (a cycle of copies that adds a negative number): they become the

@@ -35,7 +35,7 @@ impl Partners {
             receivers: vec![true; channels * clocks],
             is_broadcast: network.channels.iter().map(|c| c.broadcast).collect(),
         };
-        for edge in network.processes.iter().flat_map(|process| &process.edges) {
+        for edge in network.edges() {
             partners.add(edge);
         }
         Some(partners)

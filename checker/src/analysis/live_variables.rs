@@ -181,7 +181,7 @@ impl LiveSearch<'_> {
     /// Finds what those surely write that synchronise on a channel.
     fn find_partner_writes(&mut self) {
         let network = self.network;
-        for edge in network.processes.iter().flat_map(|process| &process.edges) {
+        for edge in network.edges() {
             let Some(sync) = edge.sync.filter(|_| !edge.guard.never_holds) else {
                 continue;
             };

@@ -74,17 +74,11 @@ pub(super) fn replaced(
 }
 
 fn added(text: &str, place: String, sources: &mut SourceMap) -> Span {
-    let source = sources.add(Source {
+    sources.add(Source {
         place,
         text: text.into(),
         ..Source::default()
-    });
-    let end = u32::try_from(text.len()).unwrap_or(u32::MAX);
-    Span {
-        source,
-        start: 0,
-        end,
-    }
+    })
 }
 
 /// Whether the bytes at this place of a file are those of XML outside of CDATA.

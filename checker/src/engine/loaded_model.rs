@@ -191,9 +191,7 @@ impl LoadedModel {
         QueryText {
             span,
             text: text.trim().to_owned(),
-            comment: String::new(),
-            expect: None,
-            options: Vec::new(),
+            ..QueryText::default()
         }
     }
 

@@ -68,7 +68,7 @@ pub(crate) fn value_of(
             left,
             right,
             ..
-        } => Some(integers_relate(relation, known(left)?, known(right)?).into()),
+        } => Some(relate(relation, known(left)?, known(right)?).into()),
         Instruction::ScaleIndex {
             index,
             first,
@@ -96,21 +96,8 @@ fn shift_distance(bits: i32) -> Result<u32, RunTimeErrorKind> {
         .ok_or(RunTimeErrorKind::ShiftDistance)
 }
 
-/// Whether two integers stand in a relation.
-pub(crate) fn integers_relate(relation: Relation, left: i32, right: i32) -> bool {
-    match relation {
-        Relation::Less => left < right,
-        Relation::LessEqual => left <= right,
-        Relation::Greater => left > right,
-        Relation::GreaterEqual => left >= right,
-        Relation::Equal => left == right,
-        Relation::NotEqual => left != right,
-    }
-}
-
-/// Whether two doubles stand in a relation; a NaN is unequal to everything and in no order.
-#[expect(clippy::float_cmp, reason = "the language compares exactly")]
-pub(crate) fn doubles_relate(relation: Relation, left: f64, right: f64) -> bool {
+/// Whether two numbers stand in a relation; a NaN is unequal to everything and in no order.
+pub(crate) fn relate<T: PartialOrd + Copy>(relation: Relation, left: T, right: T) -> bool {
     match relation {
         Relation::Less => left < right,
         Relation::LessEqual => left <= right,

@@ -6,6 +6,7 @@
 
 pub(crate) mod arithmetic;
 
+mod cycles;
 mod executor;
 mod external_words;
 mod libraries;

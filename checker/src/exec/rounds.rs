@@ -5,6 +5,7 @@
 //! call each other twice run as long as any loop. All engines run the counted code, so that they
 //! stop at the same round.
 
+use super::cycles::cycle_heads;
 use crate::ir::{BlockId, Function, Instruction, SiteId};
 
 /// How many rounds a call from outside may take.
@@ -43,40 +44,18 @@ fn count_at(function: &mut Function, block: usize, site: SiteId) {
 /// Where the edges end that close a cycle without a count, in a depth-first walk over blocks
 /// without a count.
 fn uncounted_cycle_heads(function: &Function) -> Vec<usize> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum BlockVisit {
-        New,
-        Open,
-        Done,
-    }
     let counted = |block: usize| function.blocks[block].instructions.iter().any(is_count);
-    let mut visits = vec![BlockVisit::New; function.blocks.len()];
-    let mut heads = Vec::new();
-    for root in 0..function.blocks.len() {
-        if visits[root] != BlockVisit::New || counted(root) {
-            continue;
+    let uncounted_successors = |block: usize| {
+        if counted(block) {
+            return Vec::new();
         }
-        visits[root] = BlockVisit::Open;
-        let mut path = vec![(root, 0)];
-        while let Some((block, next)) = path.last_mut() {
-            let successor = function.blocks[*block].terminator.successors().nth(*next);
-            *next += 1;
-            let Some(BlockId(successor)) = successor else {
-                visits[*block] = BlockVisit::Done;
-                path.pop();
-                continue;
-            };
-            let successor = successor as usize;
-            match visits[successor] {
-                BlockVisit::Open => heads.push(successor),
-                BlockVisit::New if !counted(successor) => {
-                    visits[successor] = BlockVisit::Open;
-                    path.push((successor, 0));
-                }
-                BlockVisit::New | BlockVisit::Done => {}
-            }
-        }
-    }
+        let successors = function.blocks[block].terminator.successors();
+        let successors = successors.map(|BlockId(successor)| successor as usize);
+        successors
+            .filter(|&successor| !counted(successor))
+            .collect()
+    };
+    let mut heads = cycle_heads(function.blocks.len(), uncounted_successors);
     heads.sort_unstable();
     heads.dedup();
     heads

@@ -17,6 +17,7 @@
 
 use std::fmt;
 
+use super::cycles::cycle_heads;
 use super::libraries;
 use crate::builtins::MOST_PARAMETERS;
 use crate::cancellation;
@@ -428,36 +429,10 @@ fn raise_limits(function: &Function, limits: &mut [Option<u64>], give_up: bool) 
 
 /// A function that calls itself, directly or indirectly.
 fn recursive(functions: &[Function]) -> Option<FunctionId> {
-    #[derive(Clone, Copy, PartialEq)]
-    enum Progress {
-        New,
-        Open,
-        Done,
-    }
-    let callees = |index: usize| functions[index].callees().collect::<Vec<_>>();
-    let mut visits = vec![Progress::New; functions.len()];
-    for root in 0..functions.len() {
-        if visits[root] != Progress::New {
-            continue;
-        }
-        visits[root] = Progress::Open;
-        let mut path = vec![(root, callees(root))];
-        while let Some((function, pending)) = path.last_mut() {
-            let Some(FunctionId(callee)) = pending.pop() else {
-                visits[*function] = Progress::Done;
-                path.pop();
-                continue;
-            };
-            let callee = callee as usize;
-            match visits[callee] {
-                Progress::Open => return Some(FunctionId(callee as u32)),
-                Progress::New => {
-                    visits[callee] = Progress::Open;
-                    path.push((callee, callees(callee)));
-                }
-                Progress::Done => {}
-            }
-        }
-    }
-    None
+    let callees = |index: usize| {
+        let callees = functions[index].callees();
+        callees.map(|FunctionId(callee)| callee as usize).collect()
+    };
+    let heads = cycle_heads(functions.len(), callees);
+    heads.first().map(|&head| FunctionId(head as u32))
 }

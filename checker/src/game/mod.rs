@@ -33,6 +33,14 @@ impl Player {
         }
     }
 
+    /// The name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Player::Controller => "controller",
+            Player::Environment => "environment",
+        }
+    }
+
     /// Whether the player owns a move that is, or is not, controllable.
     pub fn owns(self, controllable: bool) -> bool {
         controllable == (self == Player::Controller)

@@ -68,6 +68,7 @@ pub enum RealBound {
 
 /// `left - right < bound`, or `<=` if not strict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
 #[expect(missing_docs, reason = "the formula says it")]
 pub struct FixedConstraint {
     pub left: ClockId,
@@ -93,6 +94,16 @@ pub struct ClockAtom {
     pub strict: bool,
 }
 
+impl From<FixedConstraint> for ClockAtom {
+    fn from(fixed: FixedConstraint) -> ClockAtom {
+        let (left, right) = (fixed.left.into(), fixed.right.into());
+        ClockAtom {
+            strict: fixed.strict,
+            ..ClockAtom::weak(left, right, fixed.bound, fixed.bound)
+        }
+    }
+}
+
 impl ClockAtom {
     /// `left - right <= bound`, for a bound from the least to the greatest value.
     pub fn weak(left: ClockRange, right: ClockRange, low: i32, high: i32) -> ClockAtom {
@@ -107,8 +118,17 @@ impl ClockAtom {
 
     /// Whether the comparison concerns two clocks.
     pub fn is_difference(&self) -> bool {
-        let is_clock = |range: ClockRange| range.first.0 != 0 || range.count > 1;
-        is_clock(self.left) && is_clock(self.right)
+        self.left.has_clock() && self.right.has_clock()
+    }
+
+    /// Whether it is a strict upper bound of a clock, or of a difference.
+    pub fn is_strict_upper(&self) -> bool {
+        self.strict && self.left.has_clock()
+    }
+
+    /// Whether it is a strict lower bound of a clock.
+    pub fn is_strict_lower(&self) -> bool {
+        self.strict && !self.left.has_clock()
     }
 }
 

@@ -57,8 +57,7 @@ impl Network {
 
     /// The functions that taking an edge may run: guards and updates, in file order.
     pub fn functions_of_edges(&self) -> impl Iterator<Item = FunctionId> {
-        let edges = self.processes.iter().flat_map(|process| &process.edges);
-        edges.flat_map(|edge| {
+        self.edges().flat_map(|edge| {
             let branches = edge.branches.iter().map(|branch| branch.update.function);
             [edge.guard.function, edge.update.function]
                 .into_iter()

@@ -14,9 +14,7 @@ use crate::engine::evidence::strategy_check;
 use crate::engine::format::{strategy_json, text};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::unnamed;
-use crate::engine::session::play::{
-    self as engine, Done, Follower, Refused, Unadvised, Wait, player_name,
-};
+use crate::engine::session::play::{self as engine, Done, Follower, Refused, Unadvised, Wait};
 use crate::engine::{LoadedModel, NamedStrategy};
 use crate::game::strategy::{self, Selection};
 use crate::ir::Network;
@@ -148,7 +146,7 @@ impl Strategy {
     /// "controller" or "environment".
     #[getter]
     fn owner(&self) -> &'static str {
-        player_name(self.inner.strategy.owner)
+        self.inner.strategy.owner.name()
     }
 
     /// Whether each decision that applies is allowed, and not only the first.

@@ -125,7 +125,7 @@ impl Checker<'_> {
             } else {
                 "use a value of that type"
             };
-            self.error(
+            return self.refused(
                 codes::TYPE_MISMATCHED,
                 value.span,
                 format!(
@@ -135,7 +135,6 @@ impl Checker<'_> {
                 ),
                 help,
             );
-            return None;
         }
         let span = value.span;
         Some(match ty {

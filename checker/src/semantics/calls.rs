@@ -38,8 +38,7 @@ impl Checker<'_> {
                     span,
                     format!("'{name}' calls itself"),
                     "use a loop",
-                );
-                Expr::error(span)
+                )
             }
             Some(entity) => {
                 self.check_all(arguments);
@@ -84,13 +83,8 @@ impl Checker<'_> {
     ) -> Expr {
         if arguments.len() != signature.parameters.len() {
             self.check_all(arguments);
-            self.wrong_count(
-                &signature.name,
-                signature.parameters.len(),
-                arguments.len(),
-                span,
-            );
-            return Expr::error(span);
+            let wanted = signature.parameters.len();
+            return self.wrong_count(&signature.name, wanted, arguments.len(), span);
         }
         let mut converted = Vec::with_capacity(arguments.len());
         for (argument, parameter) in arguments.iter().zip(&signature.parameters) {
@@ -120,13 +114,19 @@ impl Checker<'_> {
         Expr::new(kind, signature.result.clone(), span)
     }
 
-    fn wrong_count(&mut self, name: &str, wanted: usize, given: usize, span: Span) {
+    pub(super) fn wrong_count(
+        &mut self,
+        name: &str,
+        wanted: usize,
+        given: usize,
+        span: Span,
+    ) -> Expr {
         self.error(
             codes::ARGUMENT_COUNT,
             span,
             format!("'{name}' takes {wanted} arguments, but {given} are given"),
             "give one argument for each parameter",
-        );
+        )
     }
 
     /// An argument by reference. What refers to a variable that is left out must be left out
@@ -247,8 +247,7 @@ impl Checker<'_> {
         };
         let parameters = function.parameters();
         if arguments.len() != parameters.len() {
-            self.wrong_count(name, parameters.len(), arguments.len(), span);
-            return Expr::error(span);
+            return self.wrong_count(name, parameters.len(), arguments.len(), span);
         }
         let mut converted = Vec::new();
         for (argument, &register) in arguments.into_iter().zip(parameters) {
@@ -272,8 +271,7 @@ impl Checker<'_> {
             return Expr::error(span);
         };
         if arguments.len() != distribution.arity() {
-            self.wrong_count(name, distribution.arity(), arguments.len(), span);
-            return Expr::error(span);
+            return self.wrong_count(name, distribution.arity(), arguments.len(), span);
         }
         let wanted = arguments.len();
         let converted: Vec<Expr> = arguments
@@ -313,8 +311,8 @@ impl Checker<'_> {
         let argument = match (arguments.pop(), arguments.len()) {
             (Some(argument), 0) => argument,
             (argument, rest) => {
-                self.wrong_count("fint", 1, rest + usize::from(argument.is_some()), span);
-                return Expr::error(span);
+                let given = rest + usize::from(argument.is_some());
+                return self.wrong_count("fint", 1, given, span);
             }
         };
         if argument.is_error() || argument.ty.is_integral() {

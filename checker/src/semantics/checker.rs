@@ -10,7 +10,7 @@ use super::layout::Relocation;
 use super::left_out::causes::{LeftOut, declared_at};
 use super::lower::{Builder, Images};
 use super::scope::{Entity, Scope};
-use super::typed::{Expr, Kind, Local, LocalId, Place, Root};
+use super::typed::{Element, Expr, Kind, Local, LocalId, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::{Code, Diagnostic, SourceMap, Span};
 use crate::exec::{Context, EmittedAssignment, Executor, Interpreter, Libraries, RunTimeError};
@@ -181,8 +181,27 @@ impl<'a> Checker<'a> {
     }
 
     /// Reports a mistake and how to fix it.
-    pub(super) fn error(&mut self, code: Code, span: Span, message: impl Into<String>, help: &str) {
+    pub(super) fn error(
+        &mut self,
+        code: Code,
+        span: Span,
+        message: impl Into<String>,
+        help: &str,
+    ) -> Expr {
         self.report(Diagnostic::new(code, span, message).help(help));
+        Expr::error(span)
+    }
+
+    /// Reports a mistake where there is nothing to go on with.
+    pub(super) fn refused<T>(
+        &mut self,
+        code: Code,
+        span: Span,
+        message: impl Into<String>,
+        help: &str,
+    ) -> Option<T> {
+        self.error(code, span, message, help);
+        None
     }
 
     /// A value that only statistical queries know; what is said of it is reported if anything
@@ -287,7 +306,7 @@ impl<'a> Checker<'a> {
                 root: Root::Local(local),
                 ..
             }) => self.locals[local.0 as usize].addressed = true,
-            Kind::Index { array: inner, .. }
+            Kind::Index(Element { array: inner, .. })
             | Kind::Field { record: inner, .. }
             | Kind::Assign(inner, _)
             | Kind::Compound(_, inner, _)
@@ -301,8 +320,15 @@ impl<'a> Checker<'a> {
     }
 
     /// A builder for code over the given locals.
-    pub(super) fn builder<'b>(&'b mut self, locals: &'b [Local]) -> Builder<'b> {
+    pub(super) fn builder_over(&mut self, locals: Vec<Local>) -> Builder<'_> {
         Builder::new(&mut self.world.network, &mut self.world.images, locals)
+    }
+
+    /// A builder for code over the locals so far; these are its parameters.
+    pub(super) fn builder(&mut self, parameters: &[LocalId]) -> Builder<'_> {
+        let mut builder = self.builder_over(self.locals.clone());
+        builder.select_parameters(parameters);
+        builder
     }
 
     /// Room for a variable of the state, with the given initial words and the names of its parts.
@@ -365,22 +391,14 @@ impl<'a> Checker<'a> {
         coordinates: &mut Vec<Coordinate>,
     ) {
         match ty {
-            Type::Clock { hybrid } => {
+            Type::Clock { .. } | Type::RealClock => {
+                // A real clock lies among the words; its name is for people.
+                let of_zones = Some(&*coordinates).filter(|_| ty.is_clock());
                 self.world.network.clocks.push(Clock {
                     name: name.to_owned(),
                     owner,
-                    hybrid: *hybrid,
-                    coordinates: coordinates.clone(),
-                });
-                self.world.network.initial_clocks.push(0);
-            }
-            // It lies among the words; the name is for people.
-            Type::RealClock => {
-                self.world.network.clocks.push(Clock {
-                    name: name.to_owned(),
-                    owner,
-                    hybrid: false,
-                    coordinates: Vec::new(),
+                    hybrid: *ty == Type::Clock { hybrid: true },
+                    coordinates: of_zones.cloned().unwrap_or_default(),
                 });
                 self.world.network.initial_clocks.push(0);
             }

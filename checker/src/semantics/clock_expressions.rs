@@ -9,9 +9,9 @@
 
 use super::checker::Checker;
 use super::codes;
-use super::offsets::known_offset;
+use super::offsets::state_offset;
 use super::operators::{integer_operation, is_clock_term, to_double};
-use super::typed::{ClockRelation, ClockSum, Expr, Kind, Root};
+use super::typed::{ClockRelation, ClockSum, Expr, Kind};
 use super::types::{Class, Memory, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{CLOCK_LIMIT, ClockId, IntegerOperator, Relation};
@@ -328,9 +328,7 @@ impl Checker<'_> {
 
     /// Whether the place is one known clock, and which.
     pub(super) fn known_clock(expr: &Expr) -> Option<ClockId> {
-        let root = expr.variable()?;
-        let offset = known_offset(expr, Memory::Clocks)?;
-        (root.root == Root::State).then_some(ClockId(offset))
+        state_offset(expr, Memory::Clocks).map(ClockId)
     }
 }
 

@@ -50,13 +50,12 @@ impl Checker<'_> {
             return None;
         }
         if !Self::is_computable(expr) {
-            self.error(
+            return self.refused(
                 codes::VALUE_NOT_CONSTANT,
                 expr.span,
                 format!("{what} must be known when the model is loaded"),
                 "use constants, and functions that read only constants",
             );
-            return None;
         }
         if *ty == Type::RealClock {
             let words = self.known_words(expr, &Type::Double, what)?;
@@ -73,13 +72,12 @@ impl Checker<'_> {
                 [value] => format!("the value {value}"),
                 _ => String::from("a part of this value"),
             };
-            self.error(
+            return self.refused(
                 codes::CONSTANT_OUT_OF_RANGE,
                 expr.span,
                 format!("{value} is outside {ty}"),
                 "use another value, or widen the range",
             );
-            return None;
         }
         Some(words)
     }
@@ -99,9 +97,8 @@ impl Checker<'_> {
             }
             return None;
         }
-        let locals = self.locals.clone();
         let functions = self.world.network.functions.len();
-        let function = self.builder(&locals).words(String::from("constant"), expr);
+        let function = self.builder(&[]).words(String::from("constant"), expr);
         let result = self.run(function, expr.ty.size().words);
         self.world.network.functions.truncate(functions);
         match result {
@@ -189,15 +186,10 @@ fn failure(expr: &Expr) -> Option<RunTimeErrorKind> {
             let operands = left.constant().zip(right.constant());
             operands.and_then(|(left, right)| arithmetic::integer(*operator, left, right).err())
         }
-        Kind::Index {
-            index,
-            first,
-            length,
-            ..
-        } => index
-            .constant()
-            .filter(|&i| i < *first || i.abs_diff(*first) >= *length)
-            .map(|_| RunTimeErrorKind::IndexOutOfBounds),
+        Kind::Index(element) => {
+            let is_outside = element.index.constant().is_some() && element.position().is_none();
+            is_outside.then_some(RunTimeErrorKind::IndexOutOfBounds)
+        }
         _ => None,
     };
     let mut found = own;

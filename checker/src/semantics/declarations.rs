@@ -9,7 +9,6 @@ use super::typed::{Expr, Kind, Place, Root};
 use super::types::{self, SIZE_LIMIT, Size, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::ir::CLOCK_LIMIT;
 use crate::syntax::ast::{self, Declaration, Dimension, Name, TypeExpr};
 
 impl Checker<'_> {
@@ -49,7 +48,7 @@ impl Checker<'_> {
         let parts = variable
             .initialiser
             .as_ref()
-            .map(|initialiser| self.initialiser(initialiser, &ty));
+            .map(|initialiser| self.initialiser(initialiser, &ty, false));
         if matches!(ty, Type::Void) || (ty == Type::String && !carried.constant) {
             self.misplaced_type(variable.ty.span, &ty);
         }
@@ -147,17 +146,8 @@ impl Checker<'_> {
         }
         let world = &mut self.world;
         let offset = super::lower::store_constant(&mut world.network, &mut world.images, words);
-        let place = Place {
-            root: Root::Constants,
-            base: Size {
-                words: offset,
-                ..Size::default()
-            },
-            mutable: false,
-            declared: Span::default(),
-        };
         Entity::Variable {
-            place,
+            place: Place::unnamed(Root::Constants, Size::of_words(offset), false),
             ty: ty.clone(),
         }
     }
@@ -192,13 +182,10 @@ impl Checker<'_> {
         let words = words.unwrap_or_else(|| vec![0; ty.size().words as usize]);
         let ast::Name { text, span } = &variable.name;
         let place = self.allocate(text, *span, ty, meta, &words);
-        let clock_start = Type::Int {
-            low: 0,
-            high: CLOCK_LIMIT,
-        };
         for part in parts.iter().filter(|part| part.ty.is_clock()) {
             if let Some(value) = part.expr()
-                && let Some(words) = self.known_words(value, &clock_start, "the start of a clock")
+                && let Some(words) =
+                    self.known_words(value, &Type::CLOCK_VALUE, "the start of a clock")
             {
                 let clock = place.base.clocks + part.offset.clocks;
                 self.world.network.initial_clocks[clock as usize] = words[0];

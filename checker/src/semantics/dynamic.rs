@@ -27,10 +27,11 @@ use super::checker::Checker;
 use super::codes;
 use super::groups::Member;
 use super::operators::compare_integers;
-use super::pools::{Dynamic, Slots, slot_type};
+use super::pools::{Dynamic, Slots};
 use super::scope::{Entity, Scope};
 use super::typed::{
-    Effects, Expr, Kind, LOCATION_WORDS, Local, META_WORDS, Parameter, Place, Root, Signature,
+    Effects, Element, Expr, Kind, LOCATION_WORDS, Local, META_WORDS, Parameter, Place, Root,
+    Signature,
 };
 use super::types::{Size, Type};
 use crate::cancellation;
@@ -165,8 +166,7 @@ impl Checker<'_> {
                 name.text
             ),
             "list its processes in the system line, if there is a greatest number of them",
-        );
-        Expr::error(span)
+        )
     }
 
     /// `numOf(T)`
@@ -203,8 +203,7 @@ impl Checker<'_> {
             span,
             "exit() ends the instance that takes the edge: it is an update of a dynamic template",
             "write it into the list of updates of an edge, not into a function or a condition",
-        );
-        Expr::error(span)
+        )
     }
 
     /// Where an edge with these updates leads that would lead to `target`. `others` counts the
@@ -368,7 +367,7 @@ impl Checker<'_> {
             let (name, span) = (formal.name.text.as_str(), formal.name.span);
             let channels = self.world.network.channels.len() as u32;
             let ty = if declared.passes_channel {
-                slot_type(channels)
+                Type::below(channels)
             } else {
                 declared.ty.clone()
             };
@@ -407,7 +406,7 @@ impl Checker<'_> {
             })
             .collect();
         let signature = &dynamic.signature;
-        let mut builder = self.builder(&locals);
+        let mut builder = self.builder_over(locals);
         builder.signature(&signature.parameters, &Type::Void);
         let counter = &dynamic.counter;
         let written = builder.spawn(signature, slots, initial, counter, dynamic.name.span);
@@ -434,13 +433,7 @@ impl Checker<'_> {
         if callers.is_empty() {
             return;
         }
-        let edges = network.processes.iter_mut().flat_map(|one| &mut one.edges);
-        let updates = edges.flat_map(|edge| {
-            let branches = edge.branches.iter_mut().map(|branch| &mut branch.update);
-            std::iter::once(&mut edge.update).chain(branches)
-        });
-        let hooks = [&mut network.before_update, &mut network.after_update];
-        for update in updates.chain(hooks.into_iter().flatten()) {
+        for update in network.updates_mut() {
             if update.function.is_some_and(|one| callers.contains(&one)) {
                 update.writes.extend(&ranges);
             }
@@ -474,7 +467,7 @@ impl Checker<'_> {
             );
             return Some(Expr::error(span));
         };
-        let number = slot_type(slots.count);
+        let number = Type::below(slots.count);
         let local = self.new_local(number.clone());
         let index = Expr::new(Kind::Variable(Place::bound(local)), number, name.span);
         let member = Member::of_instance(dynamic.group(), index);
@@ -580,13 +573,8 @@ fn unwritten(template: &str) -> Function {
 
 /// The channel with this number, or the array of channels that begins there.
 fn channel_of(number: Expr, channels: u32, ty: &Type, span: Span) -> Expr {
-    let first = Place {
-        root: Root::State,
-        base: Size::default(),
-        mutable: true,
-        declared: Span::default(),
-    };
-    let kind = Kind::Index {
+    let first = Place::unnamed(Root::State, Size::default(), true);
+    let kind = Kind::Index(Element {
         array: Box::new(Expr::new(Kind::Variable(first), ty.clone(), span)),
         index: Box::new(number),
         first: 0,
@@ -596,7 +584,7 @@ fn channel_of(number: Expr, channels: u32, ty: &Type, span: Span) -> Expr {
             channels: 1,
             ..Size::default()
         },
-    };
+    });
     Expr::new(kind, ty.clone(), span)
 }
 

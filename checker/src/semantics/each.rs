@@ -8,7 +8,6 @@ use super::codes;
 use super::groups::Member;
 use super::labels::collapse;
 use super::operators::compare_integers;
-use super::pools::slot_type;
 use super::scope::Entity;
 use super::typed::{Expr, Kind};
 use super::types::Type;
@@ -34,7 +33,7 @@ impl Checker<'_> {
             };
             let places = 0..slots.count as i32;
             let shown = places.map(|place| {
-                let index = Expr::int(place, slot_type(slots.count), name.span);
+                let index = Expr::int(place, Type::below(slots.count), name.span);
                 let member = Member::of_instance(dynamic.group(), index);
                 let shown = self.at_place(&item.value, name, &member, slots.absent);
                 (shown, texts(place))

@@ -6,7 +6,7 @@ use super::externals::unescaped;
 use super::offsets::{known_offset, possible_offsets};
 use super::operators::{is_clock_term, to_double};
 use super::scope::Entity;
-use super::typed::{Expr, Kind, Place, Root};
+use super::typed::{Element, Expr, Kind, Place, Root};
 use super::types::{Class, Index, Memory, Size, Type};
 use crate::cancellation;
 use crate::diagnostics::{Diagnostic, Span};
@@ -70,8 +70,7 @@ impl Checker<'_> {
                     span,
                     "the rate of a clock can only be set by == in an invariant",
                     "write x' == 0 as a conjunct of an invariant",
-                );
-                Expr::error(span)
+                )
             }
             ExprKind::Quantifier {
                 quantifier,
@@ -115,8 +114,7 @@ impl Checker<'_> {
                     span,
                     format!("'{name}' is {}, not a value", entity.kind()),
                     &help,
-                );
-                Expr::error(span)
+                )
             }
             None => {
                 self.unknown_name(name, span);
@@ -193,13 +191,13 @@ impl Checker<'_> {
             return Expr::error(span);
         };
         self.check_index_type(ty.index, &index);
-        let kind = Kind::Index {
+        let kind = Kind::Index(Element {
             array: Box::new(array),
             index: Box::new(index),
             first: ty.index.first,
             length: ty.index.length,
             stride: ty.part.size(),
-        };
+        });
         let part = self.folded(Expr::new(kind, ty.part.clone(), span));
         self.unless_left_out(part)
     }
@@ -298,13 +296,12 @@ impl Checker<'_> {
         if is_chain && !left.is_error() && !right.is_error() && right.ty != Type::Bool {
             let is_timed = matches!(left.ty, Type::Constraint(_)) || is_clock_term(&right);
             if is_timed {
-                self.error(
+                return self.error(
                     codes::OPERANDS_MISMATCHED,
                     span,
                     "a comparison is no number that can be compared again",
                     CHAIN_HINT,
                 );
-                return Expr::error(span);
             }
             let message = "the result of a comparison, 0 or 1, is compared with a number";
             self.report(Diagnostic::new(codes::COMPARISON_CHAINED, span, message).help(CHAIN_HINT));

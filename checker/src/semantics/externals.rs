@@ -125,7 +125,7 @@ impl Checker<'_> {
             return super::functions::NO_FUNCTION;
         }
         let locals = std::mem::take(&mut self.locals);
-        let mut builder = self.builder(&locals);
+        let mut builder = self.builder_over(locals);
         builder.signature(&signature.parameters, &signature.result);
         builder.external(signature, id, types, span)
     }
@@ -221,13 +221,12 @@ impl Checker<'_> {
         if matches!(value.kind, Kind::Text(_)) {
             return Some(value);
         }
-        self.error(
+        self.refused(
             codes::TYPE_MISMATCHED,
             value.span,
             format!("a text is needed, but this is {}", value.ty.described()),
             "write it in quotes, or name a constant of type string",
-        );
-        None
+        )
     }
 }
 

@@ -91,24 +91,22 @@ impl Checker<'_> {
         if let ast::TypeKind::Named(template) = &ty.kind
             && self.dynamic(&template.text).is_some()
         {
-            self.error(
+            return self.refused(
                 codes::DYNAMIC_MISUSED,
                 ty.span,
                 "operators over time cannot be asked of each instance of a dynamic template",
                 "let instances count what they do in a global variable, and ask for it",
             );
-            return None;
         }
         let (range, (low, high)) = self.iterated(ty)?;
         let values = i64::from(high) - i64::from(low) + 1;
         if values > MOST_VALUES {
-            self.error(
+            return self.refused(
                 codes::RANGE_TOO_LARGE,
                 ty.span,
                 format!("a quantifier over operators over time has more than {MOST_VALUES} values"),
                 "use a smaller range",
             );
-            return None;
         }
         let mut parts = Vec::new();
         for value in low..=high {
@@ -116,13 +114,12 @@ impl Checker<'_> {
             let entity = Entity::Constant { value, free: false };
             parts.push(self.scoped(name, entity, |checker| checker.temporal(inner, reading))?);
             if reading.atoms.len() > MOST_CONDITIONS {
-                self.error(
+                return self.refused(
                     codes::RANGE_TOO_LARGE,
                     ty.span,
                     format!("this formula asks for more than {MOST_CONDITIONS} conditions"),
                     "use a smaller range",
                 );
-                return None;
             }
         }
         Some(balanced(is_for_all, parts))
@@ -158,13 +155,12 @@ impl Checker<'_> {
         let to = self.known_real(&interval.to, "the second bound of an operator", range);
         let (from, to) = (from?, to?);
         if from > to {
-            self.error(
+            return self.refused(
                 codes::CONSTANT_OUT_OF_RANGE,
                 interval.span,
                 format!("no distance is at least {from} and at most {to}"),
                 "write the smaller bound first",
             );
-            return None;
         }
         Some((from, to))
     }

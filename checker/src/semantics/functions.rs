@@ -82,7 +82,7 @@ impl Checker<'_> {
             None => signature.name.clone(),
         };
         let locals = std::mem::take(&mut self.locals);
-        let mut builder = self.builder(&locals);
+        let mut builder = self.builder_over(locals);
         builder.signature(&signature.parameters, &signature.result);
         let (id, effects) = builder.function(name, body);
         signature.effects = effects;
@@ -206,7 +206,7 @@ impl Checker<'_> {
         let mut parts = variable
             .initialiser
             .as_ref()
-            .map(|initialiser| self.local_initialiser(initialiser, &ty));
+            .map(|initialiser| self.initialiser(initialiser, &ty, true));
         self.expect_values(&ty, variable.ty.span);
         let prefixes = self.carried(&variable.ty);
         if !self.can_be_local(&ty, variable, prefixes) {
@@ -415,13 +415,12 @@ impl Checker<'_> {
         let before = self.unknowns.len();
         let checked = self.expression(expr);
         if matches!(checked.ty, Type::Channel { .. } | Type::Constraint(_)) {
-            self.error(
+            return self.error(
                 codes::NOT_A_STATEMENT,
                 checked.span,
                 format!("{} is not a statement", checked.ty.described()),
                 "write an assignment or a call; channels stand in synchronisations, conditions in guards",
             );
-            return Expr::error(checked.span);
         }
         self.warn_without_effect(&checked);
         let is_work = matches!(checked.kind, Kind::Assign(..) | Kind::Call { .. });
@@ -466,7 +465,7 @@ impl Checker<'_> {
             return self.unknown(diagnostic, checked, Type::Bool);
         }
         if !checked.ty.is_integral() {
-            self.error(
+            return self.error(
                 codes::CONDITION_EXPECTED,
                 checked.span,
                 format!(
@@ -475,7 +474,6 @@ impl Checker<'_> {
                 ),
                 "compare it with something",
             );
-            return Expr::error(checked.span);
         }
         checked
     }
@@ -521,12 +519,7 @@ impl Checker<'_> {
 
 /// The assignment that gives a part of a local its initial value.
 fn initial_assignment(root: Root, offset: Size, ty: Type, value: Expr) -> Expr {
-    let place = Place {
-        root,
-        base: offset,
-        mutable: true,
-        declared: Span::default(),
-    };
+    let place = Place::unnamed(root, offset, true);
     let span = value.span;
     let target = Expr::new(Kind::Variable(place), ty.clone(), span);
     let kind = Kind::Assign(Box::new(target), Box::new(value));

@@ -7,7 +7,6 @@ use super::typed::Expr;
 use super::types::{Size, StructType, Type};
 use crate::diagnostics::{Diagnostic, Span};
 use crate::exec::arithmetic;
-use crate::ir::CLOCK_LIMIT;
 use crate::syntax::ast::{self, ExprKind, Initialiser, Name, UnaryOp};
 use crate::syntax::codes::{MOST_MISTAKES, TOO_MANY_MISTAKES};
 use crate::syntax::{Piece, TableReader};
@@ -96,30 +95,18 @@ impl Checker<'_> {
         }
     }
 
-    /// The initial values of the parts of a variable.
-    pub(super) fn initialiser(&mut self, initialiser: &Initialiser, ty: &Type) -> Vec<InitialPart> {
-        let mut parts = Vec::new();
-        self.initial_parts(initialiser, ty, Size::default(), &mut parts);
-        for part in &parts {
-            if let InitialValue::Expr(value) = &part.value {
-                self.expect_pure(value, "an initial value");
-            }
-        }
-        parts
-    }
-
-    /// The same for a local of a function, whose initial value may be drawn at random.
-    pub(super) fn local_initialiser(
+    /// The initial values of the parts of a variable; those of a local of a function may be drawn
+    /// at random.
+    pub(super) fn initialiser(
         &mut self,
         initialiser: &Initialiser,
         ty: &Type,
+        is_local: bool,
     ) -> Vec<InitialPart> {
         let mut parts = Vec::new();
         self.initial_parts(initialiser, ty, Size::default(), &mut parts);
-        for part in &parts {
-            if let InitialValue::Expr(value) = &part.value
-                && value.changes()
-            {
+        for value in parts.iter().filter_map(InitialPart::expr) {
+            if !is_local || value.changes() {
                 self.expect_pure(value, "an initial value");
             }
         }
@@ -218,13 +205,7 @@ impl Checker<'_> {
             self.clock_with_double(value.span);
             return None;
         }
-        self.converted(
-            value,
-            &Type::Int {
-                low: 0,
-                high: CLOCK_LIMIT,
-            },
-        )
+        self.converted(value, &Type::CLOCK_VALUE)
     }
 
     fn misplaced_initialiser(&mut self, span: Span, ty: &Type) {

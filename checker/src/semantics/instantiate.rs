@@ -138,16 +138,7 @@ impl Checker<'_> {
         let target = self.target(template)?;
         let wanted = formal_parameters(document, target).len();
         if wanted != arguments.len() {
-            self.error(
-                codes::ARGUMENT_COUNT,
-                template.span,
-                format!(
-                    "'{}' takes {wanted} arguments, but {} are given",
-                    template.text,
-                    arguments.len()
-                ),
-                "give one argument for each parameter",
-            );
+            self.wrong_count(&template.text, wanted, arguments.len(), template.span);
         }
         Some(target)
     }
@@ -158,15 +149,12 @@ impl Checker<'_> {
             Some(Entity::Template(i)) => Some(Instantiated::Template(i)),
             Some(Entity::Instantiation(i)) => Some(Instantiated::Instantiation(i)),
             Some(Entity::Broken | Entity::Chart) => None,
-            Some(entity) => {
-                self.error(
-                    codes::TEMPLATE_EXPECTED,
-                    name.span,
-                    format!("'{}' is {}, not a template", name.text, entity.kind()),
-                    "name a template or an instantiation",
-                );
-                None
-            }
+            Some(entity) => self.refused(
+                codes::TEMPLATE_EXPECTED,
+                name.span,
+                format!("'{}' is {}, not a template", name.text, entity.kind()),
+                "name a template or an instantiation",
+            ),
             None => {
                 self.unknown_name(&name.text, name.span);
                 None
@@ -271,7 +259,7 @@ impl Checker<'_> {
                 return None;
             }
             if !is_bounded || formal.reference {
-                self.error(
+                return self.refused(
                     codes::FREE_PARAMETER_UNBOUNDED,
                     name.span,
                     format!(
@@ -280,7 +268,6 @@ impl Checker<'_> {
                     ),
                     "instantiate it with arguments, or give the parameter a range",
                 );
-                return None;
             }
             types.push(ty);
         }
@@ -595,12 +582,7 @@ const UNITS_FOR_PROCESS: usize = 1 << 14;
 
 /// A variable of a template without instance: its type is known, its place is not.
 fn unknown_variable(ty: Type) -> Entity {
-    let place = Place {
-        root: Root::State,
-        base: Size::default(),
-        mutable: true,
-        declared: Span::default(),
-    };
+    let place = Place::unnamed(Root::State, Size::default(), true);
     Entity::Variable { place, ty }
 }
 

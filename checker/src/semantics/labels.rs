@@ -7,13 +7,13 @@ use super::codes;
 use super::layout::merge_ranges;
 use super::lower::clocks::{bound_range, comparisons};
 use super::lower::horizons::curved;
-use super::offsets::known_offset;
+use super::offsets::state_offset;
 use super::operators::to_double;
-use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, Root, conjuncts};
+use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, conjuncts};
 use super::types::{Class, Memory, Type};
 use crate::ir::{
-    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
-    FixedConstraint, FunctionId, Guard, Relation, Update,
+    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, FixedConstraint,
+    FunctionId, Guard, Relation, Update,
 };
 use crate::syntax::ast;
 
@@ -43,13 +43,12 @@ impl Checker<'_> {
         let sets_rates = guard.any(&|e| matches!(e.kind, Kind::Rate { .. }))
             || guard.ty == Type::Constraint(Class::InvariantWithRate);
         if sets_rates || guard.ty == Type::Constraint(Class::Query) {
-            self.error(
+            return self.refused(
                 codes::CONDITION_NOT_A_GUARD,
                 guard.span,
                 "this cannot be a guard: inequalities, negations and disjunctions of clock conditions, and rates, are not guards",
                 "split the edge into one for each case",
             );
-            return None;
         }
         let mut parts = Vec::new();
         conjuncts(guard, &mut parts);
@@ -93,15 +92,12 @@ impl Checker<'_> {
         if guard.never_holds {
             guard.atoms.clear();
         }
-        let known = self.locals.clone();
-        let mut builder = self.builder(&known);
-        builder.select_parameters(locals);
-        let (function, effects, emits) = builder.guard(place.to_owned(), &rest);
+        let (function, effects) = self.builder(locals).guard(place.to_owned(), &rest);
         guard.function = Some(function);
         if !guard.never_holds {
             guard.atoms.extend(effects.atoms);
         }
-        guard.emits = emits;
+        guard.emits = effects.emits;
         guard
     }
 
@@ -110,10 +106,8 @@ impl Checker<'_> {
         if !self.can_lower() || parts.is_empty() {
             return Guard::default();
         }
-        let known = self.locals.clone();
-        let mut builder = self.builder(&known);
-        builder.select_parameters(locals);
         let parts_by_reference: Vec<&Expr> = parts.iter().collect();
+        let builder = self.builder(locals);
         let (function, is_timed) = builder.mask(place.to_owned(), &parts_by_reference);
         // Offsets in queries are final, those in the model are not: only these are relocated.
         let apart = (is_timed && !self.is_query).then(|| self.guard_parts(parts, locals, place));
@@ -152,12 +146,8 @@ impl Checker<'_> {
                 bound,
             });
         }
-        let on_words = (!on_words.is_empty()).then(|| {
-            let known = self.locals.clone();
-            let mut builder = self.builder(&known);
-            builder.select_parameters(locals);
-            builder.mask(place.to_owned(), &on_words).0
-        });
+        let on_words = (!on_words.is_empty())
+            .then(|| self.builder(locals).mask(place.to_owned(), &on_words).0);
         Some(ir::GuardParts {
             on_words,
             comparisons,
@@ -174,11 +164,7 @@ impl Checker<'_> {
         if expr.is_error() || !expr.ty.is_number() || !self.can_lower() {
             return None;
         }
-        let expr = to_double(expr);
-        let known = self.locals.clone();
-        let mut builder = self.builder(&known);
-        builder.select_parameters(locals);
-        Some(builder.real_result(place, &expr))
+        Some(self.builder(locals).real_result(place, &to_double(expr)))
     }
 
     /// What an invariant says of the rates of real clocks.
@@ -190,11 +176,7 @@ impl Checker<'_> {
             let Kind::Rate { clock, rate } = rate.kind else {
                 continue;
             };
-            let offset = known_offset(&clock, Memory::Words);
-            let is_state = clock
-                .variable()
-                .is_some_and(|place| place.root == Root::State);
-            let Some(offset) = offset.filter(|_| is_state) else {
+            let Some(offset) = state_offset(&clock, Memory::Words) else {
                 self.error(
                     codes::RATE_OF_NO_CLOCK,
                     span,
@@ -222,8 +204,7 @@ impl Checker<'_> {
             pairs.push((*clock, *rate));
         }
         if !pairs.is_empty() && self.can_lower() {
-            let known = self.locals.clone();
-            let function = self.builder(&known).rates(place.to_owned(), &pairs);
+            let function = self.builder(&[]).rates(place.to_owned(), &pairs);
             chances.rates = Some(function);
         }
         chances
@@ -236,22 +217,19 @@ impl Checker<'_> {
             return None;
         };
         let Some(clock) = Self::known_clock(&clock) else {
-            self.error(
+            return self.refused(
                 codes::RATE_OF_NO_CLOCK,
                 span,
                 "the rate of a clock that is chosen when the model runs cannot be set",
                 "use a constant index",
             );
-            return None;
         };
         if !self.can_lower() {
             return None;
         }
         let zero_or_one = Type::Int { low: 0, high: 1 };
-        let known = self.locals.clone();
-        let (function, _) = self
-            .builder(&known)
-            .ranged(place.to_owned(), &rate, &zero_or_one);
+        let builder = self.builder(&[]);
+        let (function, _) = builder.ranged(place.to_owned(), &rate, &zero_or_one);
         Some((clock, function))
     }
 
@@ -270,16 +248,15 @@ impl Checker<'_> {
         if matches!(channel.ty, Type::Channel { .. })
             && channel.any(&|e| matches!(e.kind, Kind::Ternary(..)))
         {
-            self.error(
+            return self.refused(
                 codes::CHANNEL_CHOSEN,
                 channel.span,
                 "the channel of a synchronisation cannot be chosen by ?:",
                 "write an edge for each channel and the choice into their guards, or put the channels into an array: c[i]!",
             );
-            return None;
         }
         if !matches!(channel.ty, Type::Channel { .. }) || channel.variable().is_none() {
-            self.error(
+            return self.refused(
                 codes::CHANNEL_EXPECTED,
                 channel.span,
                 format!(
@@ -288,15 +265,12 @@ impl Checker<'_> {
                 ),
                 "write channel! or channel?",
             );
-            return None;
         }
         if !self.can_lower() {
             return None;
         }
-        let known = self.locals.clone();
         let functions = self.world.network.functions.len();
-        let mut builder = self.builder(&known);
-        builder.select_parameters(locals);
+        let mut builder = self.builder(locals);
         let (first, count, index) = builder.offset(&channel, super::types::Memory::Channels);
         let index = index.map(|index| builder.offset_function(place.to_owned(), index));
         if index.is_none() {
@@ -368,12 +342,9 @@ impl Checker<'_> {
         if rest.is_empty() {
             return update;
         }
-        let known = self.locals.clone();
-        let mut builder = self.builder(&known);
-        builder.select_parameters(locals);
-        let (function, effects, emits) = builder.update(place.to_owned(), rest);
+        let (function, effects) = self.builder(locals).update(place.to_owned(), rest);
         update.function = Some(function);
-        update.emits = emits;
+        update.emits = effects.emits;
         update.assignments.extend(assignments(&effects));
         update.writes = merge_ranges(effects.writes);
         update
@@ -512,10 +483,7 @@ fn clock_with_number(condition: &Expr) -> Option<(u32, Relation, &Expr)> {
         (_, Kind::ClockReading(clock)) => (clock, relation.swapped(), left),
         _ => return None,
     };
-    let is_state = clock
-        .variable()
-        .is_some_and(|place| place.root == Root::State);
-    let offset = known_offset(clock, Memory::Words).filter(|_| is_state)?;
+    let offset = state_offset(clock, Memory::Words)?;
     let is_convex = relation != Relation::NotEqual;
     (is_convex && !bound.is_timed()).then_some((offset, relation, bound))
 }

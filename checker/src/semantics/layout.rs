@@ -7,7 +7,7 @@
 
 use super::typed::{LOCATION_WORDS, META_WORDS};
 use super::types::Type;
-use crate::ir::{Address, Base, Function, Instruction, Network, Shape, Update};
+use crate::ir::{Address, Base, Function, Instruction, Network, Shape};
 
 /// Provisional offsets of the words that the stochastic reading puts before all variables.
 pub(super) mod chance_words {
@@ -106,22 +106,12 @@ impl Relocation {
             .layout
             .variables
             .sort_by_key(|variable| variable.offset);
-        let edges = network.processes.iter_mut().flat_map(|p| &mut p.edges);
-        let of_edges = edges.flat_map(|edge| {
-            let branches = edge.branches.iter_mut().map(|branch| &mut branch.update);
-            std::iter::once(&mut edge.update).chain(branches)
-        });
-        let of_all = [&mut network.before_update, &mut network.after_update];
-        for update in of_edges.chain(of_all.into_iter().flatten()) {
-            self.update(update);
+        for update in network.updates_mut() {
+            for (offset, _) in &mut update.writes {
+                *offset = self.offset(*offset);
+            }
+            update.writes.sort_unstable();
         }
-    }
-
-    fn update(self, update: &mut Update) {
-        for (offset, _) in &mut update.writes {
-            *offset = self.offset(*offset);
-        }
-        update.writes.sort_unstable();
     }
 }
 

@@ -287,13 +287,12 @@ impl Checker<'_> {
         if let Endpoint::Location(target) = self.node(nodes, &leg.target)? {
             return Some(LocationId(target));
         }
-        self.error(
+        self.refused(
             codes::BRANCH_POINT_OPEN,
             leg.target.span,
             "a leg of a branch point must end in a location",
             "let one branch point have all legs, with the products of the weights",
-        );
-        None
+        )
     }
 
     fn leads_nowhere(&mut self, branchpoint: &ast::Branchpoint) {

@@ -10,7 +10,7 @@ use super::groups::{Group, Member};
 use super::hints::first_member;
 use super::operators::compare_integers;
 use super::scope::Entity;
-use super::typed::{Expr, Kind, LOCATION_WORDS, Place, Root};
+use super::typed::{Element, Expr, Kind, LOCATION_WORDS, Place, Root};
 use super::types::{Size, Type};
 use crate::diagnostics::Span;
 use crate::ir::Relation;
@@ -248,28 +248,13 @@ impl Checker<'_> {
     ) -> Expr {
         let first = member.group.first;
         let count = self.world.network.processes[first as usize].locations.len();
-        let ty = Type::Int {
-            low: 0,
-            high: count as i32 - 1,
-        };
-        let place = Place {
-            root: Root::State,
-            base: Size {
-                words: LOCATION_WORDS + process.unwrap_or(first),
-                ..Size::default()
-            },
-            mutable: false,
-            declared: Span::default(),
-        };
-        let number = Expr::new(Kind::Variable(place), ty, span);
+        let word = Size::of_words(LOCATION_WORDS + process.unwrap_or(first));
+        let place = Place::unnamed(Root::State, word, false);
+        let number = Expr::new(Kind::Variable(place), Type::below(count as u32), span);
         if process.is_some() {
             return number;
         }
-        let stride = Size {
-            words: 1,
-            ..Size::default()
-        };
-        chosen_member(number, member, stride, span)
+        chosen_member(number, member, Size::of_words(1), span)
     }
 
     /// How far apart a variable lies in the members of a set, if that is the same everywhere.
@@ -314,13 +299,13 @@ fn chosen_member(first: Expr, member: &Member, stride: Size, span: Span) -> Expr
         let length = high.abs_diff(low) + 1;
         later /= length;
         let part = place.ty.clone();
-        let kind = Kind::Index {
+        let kind = Kind::Index(Element {
             array: Box::new(place),
             index: Box::new(argument.clone()),
             first: low,
             length,
             stride: stride.times(later),
-        };
+        });
         place = Expr::new(kind, part, span);
     }
     place

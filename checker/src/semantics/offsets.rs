@@ -1,6 +1,6 @@
 //! Where places lie in their memory.
 
-use super::typed::{Expr, Kind};
+use super::typed::{Expr, Kind, Root};
 use super::types::Memory;
 
 /// So many parts of constant arrays are looked at for the interval of their values.
@@ -11,20 +11,18 @@ pub(super) fn known_offset(expr: &Expr, memory: Memory) -> Option<u32> {
     match &expr.kind {
         Kind::Variable(place) => Some(place.base.of(memory)),
         Kind::Field { record, offset } => Some(known_offset(record, memory)? + offset.of(memory)),
-        Kind::Index {
-            array,
-            index,
-            first,
-            length,
-            stride,
-        } => {
-            let position = i64::from(index.constant()?) - i64::from(*first);
-            let inside = (0..i64::from(*length)).contains(&position);
-            let offset = known_offset(array, memory)?;
-            inside.then(|| offset + position as u32 * stride.of(memory))
+        Kind::Index(element) => {
+            let offset = known_offset(&element.array, memory)?;
+            Some(offset + element.position()? * element.stride.of(memory))
         }
         _ => None,
     }
+}
+
+/// Where a part of the state lies in its memory, if all indices are known and inside.
+pub(super) fn state_offset(expr: &Expr, memory: Memory) -> Option<u32> {
+    let place = expr.variable().filter(|place| place.root == Root::State);
+    place.and_then(|_| known_offset(expr, memory))
 }
 
 /// Where in the constant memory a place may lie, wherever its indices are inside; `None` if these
@@ -39,22 +37,16 @@ pub(super) fn possible_offsets(expr: &Expr) -> Option<Vec<u32>> {
             }
             Some(offsets)
         }
-        Kind::Index {
-            array,
-            index,
-            first,
-            length,
-            stride,
-        } => {
+        Kind::Index(element) => {
             let position = |index: i32| {
-                let position = i64::from(index) - i64::from(*first);
-                position.clamp(-1, i64::from(*length)) as i32
+                let position = i64::from(index) - i64::from(element.first);
+                position.clamp(-1, i64::from(element.length)) as i32
             };
-            let (low, high) = index.interval;
-            let positions = position(low).max(0)..=position(high).min(*length as i32 - 1);
-            let bases = possible_offsets(array)?;
+            let (low, high) = element.index.interval;
+            let positions = position(low).max(0)..=position(high).min(element.length as i32 - 1);
+            let bases = possible_offsets(&element.array)?;
             let count = positions.clone().count().saturating_mul(bases.len());
-            let stride = stride.of(Memory::Words);
+            let stride = element.stride.of(Memory::Words);
             let each = |base: u32| positions.clone().map(move |at| base + at as u32 * stride);
             (count <= MOST_VALUES).then(|| bases.into_iter().flat_map(each).collect())
         }

@@ -85,8 +85,7 @@ impl Checker<'_> {
                 right.ty.described()
             ),
             help,
-        );
-        Expr::error(span)
+        )
     }
 
     fn compare(&mut self, relation: Relation, left: Expr, right: Expr, span: Span) -> Expr {
@@ -295,7 +294,7 @@ fn double_operation(operator: DoubleOperator, left: Expr, right: Expr, span: Spa
 /// A comparison of integers, truth values or scalars.
 pub(super) fn compare_integers(relation: Relation, left: Expr, right: Expr, span: Span) -> Expr {
     if let (Some(a), Some(b)) = (left.constant(), right.constant()) {
-        return Expr::bool(arithmetic::integers_relate(relation, a, b), span);
+        return Expr::bool(arithmetic::relate(relation, a, b), span);
     }
     let interval = comparison_interval(relation, left.interval, right.interval);
     let kind = Kind::Compare(relation, Box::new(left), Box::new(right));
@@ -327,7 +326,7 @@ pub(super) fn truth_interval(condition: &Expr) -> (i32, i32) {
 
 fn compare_doubles(relation: Relation, left: Expr, right: Expr, span: Span) -> Expr {
     if let (Kind::Double(a), Kind::Double(b)) = (&left.kind, &right.kind) {
-        return Expr::bool(arithmetic::doubles_relate(relation, *a, *b), span);
+        return Expr::bool(arithmetic::relate(relation, *a, *b), span);
     }
     let kind = Kind::CompareReal(relation, Box::new(left), Box::new(right));
     Expr::new(kind, Type::Bool, span)

@@ -49,15 +49,7 @@ impl Dynamic {
             .map_or((0, 0), |one| (one.first, one.count));
         Group {
             first,
-            parameters: vec![slot_type(count)],
+            parameters: vec![Type::below(count)],
         }
-    }
-}
-
-/// The numbers of slots.
-pub(super) fn slot_type(count: u32) -> Type {
-    Type::Int {
-        low: 0,
-        high: count as i32 - 1,
     }
 }

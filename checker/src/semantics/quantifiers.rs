@@ -106,13 +106,12 @@ impl Checker<'_> {
         const UNROLLING_LIMIT: i64 = 100_000;
         let (low, high) = values;
         if i64::from(high) - i64::from(low) >= UNROLLING_LIMIT {
-            self.error(
+            return self.error(
                 codes::RANGE_TOO_LARGE,
                 span,
                 "a quantifier over clocks ranges over too many values",
                 "use a smaller range",
             );
-            return Expr::error(span);
         }
         let mut parts = Vec::new();
         for value in low..=high {

@@ -22,22 +22,20 @@ impl Checker<'_> {
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
         if matches!(query.kind, ast::QueryKind::Statistical(_)) && self.reading == Reading::Symbolic
         {
-            self.error(
+            return self.refused(
                 codes::QUERY_UNSUPPORTED,
                 query.formula,
                 "a statistical query has an estimate only, and none is wanted here",
                 "ask it on its own, with `check`",
             );
-            return None;
         }
         if let ast::QueryKind::Unsupported(name) = &query.kind {
-            self.error(
+            return self.refused(
                 codes::QUERY_UNSUPPORTED,
                 name.span,
                 format!("{} queries are not supported", name.text),
                 "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, Pr[<=10](<> p), E[<=10; 1000](max: e) and simulate[<=10; 3]{e}",
             );
-            return None;
         }
         if let Some(under) = &query.under {
             self.known_strategy(under, strategies);
@@ -169,7 +167,7 @@ impl Checker<'_> {
             return Some((Measure::Clock(clock), text));
         }
         if !expr.ty.is_integral() {
-            self.error(
+            return self.refused(
                 codes::MEASURE_EXPECTED,
                 expr.span,
                 format!(
@@ -178,7 +176,6 @@ impl Checker<'_> {
                 ),
                 "name a clock or an integer expression",
             );
-            return None;
         }
         Some((Measure::Integer(self.query_function(&expr)?), text))
     }
@@ -260,11 +257,9 @@ impl Checker<'_> {
 
     /// With partial observation the controller must not depend on strict lower bounds.
     fn check_observable(&mut self, span: Span) {
-        let edges = self.world.network.processes.iter().flat_map(|p| &p.edges);
-        let is_strict_lower =
-            |atom: &ir::ClockAtom| atom.strict && atom.left.first.0 == 0 && atom.left.count == 1;
-        let mut controllable = edges.filter(|edge| edge.controllable);
-        if controllable.any(|edge| edge.guard.atoms.iter().any(is_strict_lower)) {
+        let edges = self.world.network.edges();
+        let atoms = |edge: &ir::Edge| edge.guard.atoms.iter().any(ir::ClockAtom::is_strict_lower);
+        if edges.filter(|edge| edge.controllable).any(atoms) {
             self.error(
                 codes::OBSERVATION_REFUSED,
                 span,
@@ -289,13 +284,12 @@ impl Checker<'_> {
             _ => false,
         };
         if expr.any(&is_bad) {
-            self.error(
+            return self.refused(
                 codes::OBSERVATION_REFUSED,
                 expr.span,
                 "clocks can be observed only by x >= c and x < c",
                 "use weak lower and strict upper bounds, and no differences",
             );
-            return None;
         }
         self.lower_predicate(&expr)
     }
@@ -326,13 +320,12 @@ impl Checker<'_> {
             self.check_deadlock(&expr, allows_deadlock);
         }
         if expr.any(&|e| matches!(e.kind, Kind::Rate { .. })) {
-            self.error(
+            return self.refused(
                 codes::RATE_MISPLACED,
                 span,
                 "the rate of a clock cannot be asked for",
                 "leave it out",
             );
-            return None;
         }
         Some(expr)
     }
@@ -429,15 +422,12 @@ impl Checker<'_> {
                 bound,
                 *negated,
             ),
-            _ => {
-                self.error(
-                    codes::CONDITION_EXPECTED,
-                    expr.span,
-                    "clock conditions are not allowed inside this expression",
-                    "join them with &&, || and not",
-                );
-                None
-            }
+            _ => self.refused(
+                codes::CONDITION_EXPECTED,
+                expr.span,
+                "clock conditions are not allowed inside this expression",
+                "join them with &&, || and not",
+            ),
         }
     }
 
@@ -528,19 +518,17 @@ impl Checker<'_> {
             return Some(ClockChoice::Fixed(clock));
         }
         if clock.variable().is_none() {
-            self.error(
+            return self.refused(
                 codes::CLOCK_CHOSEN,
                 clock.span,
                 "the clock of a query cannot be chosen by ?:",
                 "name a clock",
             );
-            return None;
         }
         if !self.can_lower() {
             return None;
         }
-        let locals = self.locals.clone();
-        let mut builder = self.builder(&locals);
+        let mut builder = self.builder(&[]);
         let (first, count, index) = builder.offset(clock, Memory::Clocks);
         let first = ClockId(first);
         let function = builder.offset_function(String::from("query, clock"), index?);
@@ -551,12 +539,8 @@ impl Checker<'_> {
         if !self.can_lower() {
             return None;
         }
-        let locals = self.locals.clone();
-        Some(
-            self.builder(&locals)
-                .expression(String::from("query"), expr)
-                .0,
-        )
+        let builder = self.builder(&[]);
+        Some(builder.expression(String::from("query"), expr).0)
     }
 
     fn truth_function(&mut self, expr: &Expr) -> Option<FunctionId> {

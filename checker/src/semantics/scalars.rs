@@ -14,7 +14,7 @@
 //! Reduction to UPPAAL", FORMATS 2003 (which trusts loops; here they are looked at).
 
 use super::checker::Checker;
-use super::typed::{Expr, Kind, Local, LocalId, Place, Root, Statement};
+use super::typed::{Element, Expr, Kind, Local, LocalId, Place, Root, Statement};
 use super::types::{Memory, Size, Type};
 use crate::diagnostics::Span;
 use crate::ir::IntegerOperator;
@@ -182,7 +182,9 @@ fn touched(place: &Expr) -> Option<Touched> {
             base: *base,
             size: place.ty.size(),
         }),
-        Kind::Index { array: inner, .. } | Kind::Field { record: inner, .. } => touched(inner),
+        Kind::Index(Element { array: inner, .. }) | Kind::Field { record: inner, .. } => {
+            touched(inner)
+        }
         _ => None,
     }
 }
@@ -279,18 +281,10 @@ impl Body {
     /// If the loop variable chooses a part of a place: how far apart its parts are.
     fn own_stride(&self, place: &Expr) -> Option<(u32, u32)> {
         match &place.kind {
-            Kind::Index {
-                array,
-                index,
-                stride,
-                ..
-            } => {
-                if self.is_loop_variable(index) {
-                    Some((stride.words, stride.clocks))
-                } else {
-                    self.own_stride(array)
-                }
+            Kind::Index(element) if self.is_loop_variable(&element.index) => {
+                Some((element.stride.words, element.stride.clocks))
             }
+            Kind::Index(element) => self.own_stride(&element.array),
             Kind::Field { record, .. } => self.own_stride(record),
             _ => None,
         }
@@ -303,9 +297,9 @@ impl Body {
     /// The indices of a place are read.
     fn indices(&mut self, place: &Expr) {
         match &place.kind {
-            Kind::Index { array, index, .. } => {
-                self.reading(index);
-                self.indices(array);
+            Kind::Index(element) => {
+                self.reading(&element.index);
+                self.indices(&element.array);
             }
             Kind::Field { record, .. } => self.indices(record),
             _ => {}
@@ -315,7 +309,7 @@ impl Body {
     /// An expression that must be without effect.
     fn reading(&mut self, expr: &Expr) {
         match &expr.kind {
-            Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
+            Kind::Variable(_) | Kind::Index(_) | Kind::Field { .. } => {
                 match touched(expr) {
                     Some(variable) => self.reads.push((variable, self.own_stride(expr))),
                     None => self.is_simple = false,

@@ -3,8 +3,8 @@
 use super::checker::Checker;
 use super::codes;
 use super::lower::horizons::curved_number;
-use super::offsets::known_offset;
-use super::typed::{Expr, Kind, Root, conjuncts};
+use super::offsets::state_offset;
+use super::typed::{Expr, Kind, conjuncts};
 use super::types::{Memory, Type};
 use crate::diagnostics::Span;
 use crate::exec::arithmetic;
@@ -19,13 +19,12 @@ impl Checker<'_> {
         span: Span,
     ) -> Option<Statistical> {
         if self.world.network.features.priorities {
-            self.error(
+            return self.refused(
                 codes::QUERY_UNSUPPORTED,
                 span,
                 "statistical queries are not supported on models with priorities",
                 "remove the priorities of channels and processes",
             );
-            return None;
         }
         Some(match asked {
             ast::Statistical::Probability(estimated) => {
@@ -85,7 +84,7 @@ impl Checker<'_> {
         let value = self.expression(value);
         self.expect_pure(&value, "a query");
         if !value.is_error() && !value.ty.is_number() {
-            self.error(
+            return self.refused(
                 codes::NUMBER_EXPECTED,
                 value.span,
                 format!(
@@ -94,7 +93,6 @@ impl Checker<'_> {
                 ),
                 "name a clock, or an expression of integers, doubles and clocks",
             );
-            return None;
         }
         let range = super::value_ranges::range(&value);
         Some((self.make_real(value, &[], String::from("query"))?, range))
@@ -188,10 +186,7 @@ impl Checker<'_> {
             ast::RunLimit::Moves => RunLimit::Moves,
             ast::RunLimit::Clock(clock) => {
                 let place = self.place(clock);
-                let is_state = place
-                    .variable()
-                    .is_some_and(|place| place.root == Root::State);
-                let offset = known_offset(&place, Memory::Words).filter(|_| is_state);
+                let offset = state_offset(&place, Memory::Words);
                 let is_clock = place.ty == Type::RealClock;
                 let Some(offset) = offset.filter(|_| is_clock) else {
                     if !place.is_error() {
@@ -234,13 +229,12 @@ impl Checker<'_> {
             } else {
                 format!("write a number that is at least {low}")
             };
-            self.error(
+            return self.refused(
                 codes::CONSTANT_OUT_OF_RANGE,
                 span,
                 format!("{what} cannot be {value}"),
                 &help,
             );
-            return None;
         }
         Some(value)
     }
@@ -251,13 +245,12 @@ impl Checker<'_> {
         let expr = self.query_condition(expr)?;
         let is_strange = |e: &Expr| matches!(e.kind, Kind::Deadlock | Kind::Rate { .. });
         if expr.any(&is_strange) {
-            self.error(
+            return self.refused(
                 codes::QUERY_UNSUPPORTED,
                 span,
                 "statistical queries cannot ask for deadlocks and rates",
                 "ask for locations, variables and clocks",
             );
-            return None;
         }
         let never = expr.constant() == Some(0);
         let mut parts = Vec::new();

@@ -5,9 +5,9 @@ use super::Reading;
 use super::checker::Checker;
 use super::codes;
 use super::layout::{Relocation, chance_words};
-use super::offsets::known_offset;
+use super::offsets::state_offset;
 use super::scope::{Entity, Scope};
-use super::typed::{Expr, Root};
+use super::typed::Expr;
 use super::types::Memory;
 use crate::diagnostics::{Diagnostic, Span};
 use crate::ir::{AssignedValue, Chances, Clock, ClockAtom, Features, Location, Network};
@@ -161,15 +161,7 @@ impl Checker<'_> {
         if expr.is_error() {
             return None;
         }
-        let is_channels = expr.ty.size().channels > 0
-            && expr
-                .variable()
-                .is_some_and(|place| place.root == Root::State);
-        let known = if is_channels {
-            known_offset(expr, Memory::Channels)
-        } else {
-            None
-        };
+        let known = state_offset(expr, Memory::Channels).filter(|_| expr.ty.size().channels > 0);
         if known.is_none() {
             self.error(
                 codes::CHANNEL_EXPECTED,
@@ -222,13 +214,7 @@ impl Checker<'_> {
 
 /// What a network uses.
 fn features(network: &Network) -> Features {
-    let edges = || network.processes.iter().flat_map(|process| &process.edges);
-    let locations = || {
-        network
-            .processes
-            .iter()
-            .flat_map(|process| &process.locations)
-    };
+    let (edges, locations) = (|| network.edges(), || network.locations());
     let atoms = || {
         let guards = edges().map(|edge| &edge.guard);
         let invariants = locations().map(|location| &location.invariant);
@@ -246,11 +232,11 @@ fn features(network: &Network) -> Features {
     Features {
         priorities: network.features.priorities || levels.any(|level| level > 0),
         default_priority: network.features.default_priority,
-        diagonals: atoms().any(is_diagonal),
+        diagonals: atoms().any(ClockAtom::is_difference),
         stopwatches: locations().any(|location: &Location| !location.rates.is_empty()),
         strict_invariants: locations()
             .flat_map(|location| &location.invariant.atoms)
-            .any(super::templates::is_strict_upper_bound),
+            .any(ClockAtom::is_strict_upper),
         guarded_receivers: synchronises(|channel, send| channel.broadcast && !send),
         clock_guarded_urgent: synchronises(|channel, _| channel.urgent),
         clock_copies: network.updates().any(|update| {
@@ -269,12 +255,6 @@ fn features(network: &Network) -> Features {
         uncontrollable: edges().any(|edge| !edge.controllable),
         legs: edges().any(|edge| edge.leg.is_some()),
     }
-}
-
-/// Whether neither side of a comparison is the reference clock.
-fn is_diagonal(atom: &ClockAtom) -> bool {
-    let is_clock = |range: crate::ir::ClockRange| range.first.0 > 0 || range.count > 1;
-    is_clock(atom.left) && is_clock(atom.right)
 }
 
 fn has_double(shape: &crate::ir::Shape) -> bool {

@@ -251,7 +251,7 @@ impl Checker<'_> {
     }
 
     fn warn_of_strictness(&mut self, invariant: &Guard, span: Span) {
-        if invariant.atoms.iter().any(is_strict_upper_bound) {
+        if invariant.atoms.iter().any(ir::ClockAtom::is_strict_upper) {
             self.report(
                 crate::diagnostics::Diagnostic::new(
                     codes::INVARIANT_STRICT,
@@ -352,9 +352,4 @@ impl Checker<'_> {
         }
         selects
     }
-}
-
-/// Whether a comparison bounds a clock, or a difference of clocks, strictly from above.
-pub(super) fn is_strict_upper_bound(atom: &ir::ClockAtom) -> bool {
-    atom.strict && (atom.left.first.0 != 0 || atom.left.count > 1)
 }

@@ -141,13 +141,12 @@ impl Checker<'_> {
             Type::Int { low, high } => {
                 let length = i64::from(*high) - i64::from(*low) + 1;
                 let Ok(length) = u32::try_from(length) else {
-                    self.error(
+                    return self.refused(
                         codes::ARRAY_TOO_LARGE,
                         span,
                         "this array has too many parts",
                         "use a smaller range",
                     );
-                    return None;
                 };
                 Some(Index {
                     first: *low,
@@ -165,13 +164,12 @@ impl Checker<'_> {
                     "arrays are indexed by ranges and scalars, not by {}",
                     other.described()
                 );
-                self.error(
+                self.refused(
                     codes::TYPE_MISPLACED,
                     span,
                     message,
                     "write [size] or [int[a,b]]",
-                );
-                None
+                )
             }
         }
     }
@@ -186,13 +184,12 @@ impl Checker<'_> {
         self.expect_pure(&size, "the size of an array");
         let value = self.known_int(&size, "the size of an array")?;
         let Ok(length) = u32::try_from(value) else {
-            self.error(
+            return self.refused(
                 codes::SIZE_NOT_POSITIVE,
                 expr.span,
                 format!("the size of an array cannot be negative, but this is {value}"),
                 "write the number of its parts",
             );
-            return None;
         };
         Some(Index {
             first: 0,
@@ -369,18 +366,15 @@ impl Checker<'_> {
                 let bounds = resolved.bounds();
                 Some((resolved, bounds))
             }
-            other => {
-                self.error(
-                    codes::RANGE_EXPECTED,
-                    ty.span,
-                    format!(
-                        "loops and quantifiers run over bounded integers and scalars only, not over {}",
-                        other.described()
-                    ),
-                    "write int[a,b]",
-                );
-                None
-            }
+            other => self.refused(
+                codes::RANGE_EXPECTED,
+                ty.span,
+                format!(
+                    "loops and quantifiers run over bounded integers and scalars only, not over {}",
+                    other.described()
+                ),
+                "write int[a,b]",
+            ),
         }
     }
 }

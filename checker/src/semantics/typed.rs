@@ -45,14 +45,39 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// A local that a quantifier, a loop or a `select` binds.
-    pub(super) fn bound(local: LocalId) -> Place {
+    /// A place that no declaration in the text names.
+    pub(super) fn unnamed(root: Root, base: Size, mutable: bool) -> Place {
         Place {
-            root: Root::Local(local),
-            base: Size::default(),
-            mutable: false,
+            root,
+            base,
+            mutable,
             declared: Span::default(),
         }
+    }
+
+    /// A local that a quantifier, a loop or a `select` binds.
+    pub(super) fn bound(local: LocalId) -> Place {
+        Place::unnamed(Root::Local(local), Size::default(), false)
+    }
+}
+
+/// An element of an array: its index counts from `first`, and its place from the start of the array
+/// in strides.
+#[derive(Clone, Debug)]
+pub(super) struct Element {
+    pub(super) array: Box<Expr>,
+    pub(super) index: Box<Expr>,
+    pub(super) first: i32,
+    pub(super) length: u32,
+    pub(super) stride: Size,
+}
+
+impl Element {
+    /// How many elements stand before it; `None` if the index is not known, or outside.
+    pub(super) fn position(&self) -> Option<u32> {
+        let index = self.index.constant()?;
+        let position = index.abs_diff(self.first);
+        (index >= self.first && position < self.length).then_some(position)
     }
 }
 
@@ -89,13 +114,7 @@ pub(super) enum Kind {
     /// A variable.
     Variable(Place),
     /// A part of an array, or a member of a process set's variable.
-    Index {
-        array: Box<Expr>,
-        index: Box<Expr>,
-        first: i32,
-        length: u32,
-        stride: Size,
-    },
+    Index(Element),
     /// A field of a struct, by its offset from the start in words, clocks and channels.
     Field { record: Box<Expr>, offset: Size },
     /// An integer as a double.
@@ -249,6 +268,8 @@ pub(super) struct Effects {
     pub(super) atoms: Vec<ClockAtom>,
     /// Whether a variable of the state is read.
     pub(super) reads_state: bool,
+    /// Whether it may emit constraints or assignments of clocks.
+    pub(super) emits: bool,
     /// Whether a clock is mentioned.
     pub(super) mentions_clocks: bool,
 }
@@ -378,7 +399,7 @@ impl Expr {
     /// Whether it names a place.
     pub(super) fn is_place(&self) -> bool {
         match &self.kind {
-            Kind::Index { array: inner, .. } | Kind::Field { record: inner, .. } => {
+            Kind::Index(Element { array: inner, .. }) | Kind::Field { record: inner, .. } => {
                 inner.is_place()
             }
             Kind::Variable(_)
@@ -397,7 +418,7 @@ impl Expr {
     pub(super) fn is_mutable_place(&self) -> bool {
         match &self.kind {
             Kind::Variable(place) => place.mutable,
-            Kind::Index { array: inner, .. } | Kind::Field { record: inner, .. } => {
+            Kind::Index(Element { array: inner, .. }) | Kind::Field { record: inner, .. } => {
                 inner.is_mutable_place()
             }
             Kind::Ternary(_, then, otherwise) => {
@@ -411,7 +432,7 @@ impl Expr {
     pub(super) fn variable(&self) -> Option<&Place> {
         match &self.kind {
             Kind::Variable(place) => Some(place),
-            Kind::Index { array: inner, .. } | Kind::Field { record: inner, .. } => {
+            Kind::Index(Element { array: inner, .. }) | Kind::Field { record: inner, .. } => {
                 inner.variable()
             }
             _ => None,
@@ -445,11 +466,11 @@ impl Expr {
             | Kind::Not(inner)
             | Kind::Step { target: inner, .. }
             | Kind::Quantifier { body: inner, .. } => visit(inner),
-            Kind::Index {
+            Kind::Index(Element {
                 array: left,
                 index: right,
                 ..
-            }
+            })
             | Kind::Integer(_, left, right)
             | Kind::Real(_, left, right)
             | Kind::Compare(_, left, right)

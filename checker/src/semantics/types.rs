@@ -15,6 +15,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::exec::arithmetic;
+use crate::ir;
 
 /// The least and the greatest of some integers; empty if the first is the greater one.
 pub(super) type Interval = (i32, i32);
@@ -126,6 +127,13 @@ pub(super) enum Memory {
 }
 
 impl Size {
+    /// So many words, and nothing else.
+    pub(super) fn of_words(words: u32) -> Size {
+        Size {
+            words,
+            ..Size::default()
+        }
+    }
     /// The amount in one memory.
     pub(super) fn of(self, memory: Memory) -> u32 {
         match memory {
@@ -167,6 +175,20 @@ impl Type {
         low: i32::MIN,
         high: i32::MAX,
     };
+
+    /// The values that a clock may be set to.
+    pub(super) const CLOCK_VALUE: Type = Type::Int {
+        low: 0,
+        high: ir::CLOCK_LIMIT,
+    };
+
+    /// The numbers of so many things.
+    pub(super) fn below(count: u32) -> Type {
+        Type::Int {
+            low: 0,
+            high: count as i32 - 1,
+        }
+    }
 
     /// The words of a real clock with this value, which runs at rate 1.
     pub(super) fn clock_words(value: f64) -> [i32; 4] {

@@ -10,7 +10,7 @@
 use crate::diagnostics::Span;
 
 /// A name and where it stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Name {
     /// The identifier.
     pub text: String,
@@ -57,7 +57,7 @@ pub enum UnsupportedPart {
 }
 
 /// The text of a query in a file, before it is parsed.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct QueryText {
     /// The formula's source; the span covers the formula without surrounding blanks and comments.
     pub span: Span,
@@ -282,14 +282,12 @@ pub struct Function {
 }
 
 /// `{ declarations statements }`
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Block {
     /// Local declarations.
     pub declarations: Vec<Declaration>,
     /// The statements after them.
     pub statements: Vec<Statement>,
-    /// Where.
-    pub span: Span,
 }
 
 /// A statement.
@@ -460,7 +458,7 @@ pub enum Quantifier {
 }
 
 /// A template, or the single process of an XTA `process` definition.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Template {
     /// Its name.
     pub name: Name,
@@ -501,7 +499,7 @@ pub enum LabelKind {
 }
 
 /// A location.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Location {
     /// What edges refer to it by: the `id` in XML, the name in XTA.
     pub id: String,
@@ -537,7 +535,7 @@ pub struct Branchpoint {
 }
 
 /// A transition element: an edge, the entry of a branch point, or a leg of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Edge {
     /// The `id` of the location or branch point that it leaves.
     pub source: Name,
@@ -734,8 +732,6 @@ pub struct RunBound {
     pub value: Expr,
     /// The number of runs.
     pub runs: Option<Expr>,
-    /// Where it stands.
-    pub span: Span,
 }
 
 /// What limits a run.

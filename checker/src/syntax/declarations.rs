@@ -111,11 +111,7 @@ impl Parser<'_> {
         let is_before = self.at_word("before_update");
         self.bump();
         self.expect(TokenKind::LeftBrace, "before the updates");
-        let updates = if self.at(TokenKind::RightBrace) {
-            Vec::new()
-        } else {
-            self.expression_list()
-        };
+        let updates = self.expressions_until(TokenKind::RightBrace);
         self.closing(TokenKind::RightBrace, "after the updates");
         declarations.push(if is_before {
             Declaration::BeforeUpdate(updates, span)
@@ -281,11 +277,7 @@ impl Parser<'_> {
         } else {
             self.expected("`{` before the body of the function");
             self.recover();
-            Block {
-                declarations: Vec::new(),
-                statements: Vec::new(),
-                span: name.span,
-            }
+            Block::default()
         };
         Function {
             return_type,
@@ -326,18 +318,15 @@ impl Parser<'_> {
         let start = self.here();
         self.bump();
         let mut items = Vec::new();
-        loop {
-            let named = self.is_name_at(0) && self.peek(1).kind == TokenKind::Colon;
+        self.comma_separated(|parser| {
+            let named = parser.is_name_at(0) && parser.peek(1).kind == TokenKind::Colon;
             let name = named.then(|| {
-                let name = self.name("the name of a field");
-                self.bump();
+                let name = parser.name("the name of a field");
+                parser.bump();
                 name
             });
-            items.push((name, self.initialiser()));
-            if !self.eat(TokenKind::Comma) {
-                break;
-            }
-        }
+            items.push((name, parser.initialiser()));
+        });
         self.closing(TokenKind::RightBrace, "after the values");
         Initialiser::List(items, self.since(start))
     }

@@ -9,7 +9,7 @@
 //! [`MAX_HEIGHT`] levels, so that every walk over a tree may recurse.
 
 use super::ast::{
-    BinaryOp, Expr, ExprKind, Name, Quantifier, UnaryOp, Unsupported, UnsupportedPart,
+    BinaryOp, Expr, ExprKind, Name, Quantifier, TypeExpr, UnaryOp, Unsupported, UnsupportedPart,
 };
 use super::codes;
 use super::keywords::{self, Dialect};
@@ -64,10 +64,8 @@ impl Parser<'_> {
 
     /// One or more expressions with commas between them.
     pub(super) fn expression_list(&mut self) -> Vec<Expr> {
-        let mut list = vec![self.expression()];
-        while self.eat(TokenKind::Comma) {
-            list.push(self.expression());
-        }
+        let mut list = Vec::new();
+        self.comma_separated(|parser| list.push(parser.expression()));
         list
     }
 
@@ -337,13 +335,10 @@ impl Parser<'_> {
         let mut arguments = Vec::new();
         let mut highest = 0;
         if !self.at(TokenKind::RightParenthesis) {
-            loop {
-                arguments.push(self.expression());
-                highest = highest.max(self.height);
-                if !self.eat(TokenKind::Comma) {
-                    break;
-                }
-            }
+            self.comma_separated(|parser| {
+                arguments.push(parser.expression());
+                highest = highest.max(parser.height);
+            });
         }
         self.closing(TokenKind::RightParenthesis, "after the arguments");
         self.height = highest;
@@ -456,12 +451,8 @@ impl Parser<'_> {
     fn quantified(&mut self, quantifier: Quantifier) -> Expr {
         let start = self.here();
         self.bump();
-        self.expect(TokenKind::LeftParenthesis, "after the quantifier");
-        let name = self.declared_name("the name of the bound variable");
-        self.expect(TokenKind::Colon, "between the variable and its type");
-        let ty = Box::new(self.type_expr());
-        let type_height = self.height;
-        self.closing(TokenKind::RightParenthesis, "after the type");
+        let (name, ty) = self.bound_variable("after the quantifier");
+        let (ty, type_height) = (Box::new(ty), self.height);
         let body = Box::new(self.expression());
         let kind = ExprKind::Quantifier {
             quantifier,
@@ -470,6 +461,16 @@ impl Parser<'_> {
             body,
         };
         self.node(start, kind, type_height)
+    }
+
+    /// A variable and its type in parentheses; the height is that of the type.
+    pub(super) fn bound_variable(&mut self, context: &str) -> (Name, TypeExpr) {
+        self.expect(TokenKind::LeftParenthesis, context);
+        let name = self.declared_name("the name of the bound variable");
+        self.expect(TokenKind::Colon, "between the variable and its type");
+        let ty = self.type_expr();
+        self.closing(TokenKind::RightParenthesis, "after the type");
+        (name, ty)
     }
 
     /// `spawn T(…)`, `exit()`, `numOf(T)`; `foreach (i : T) e` is read and recorded.

@@ -111,15 +111,15 @@ impl Parser<'_> {
             return state;
         }
         match self.kind() {
-            TokenKind::Diamond => {
+            kind @ (TokenKind::Diamond | TokenKind::Box) => {
                 self.bump();
-                let (interval, inner) = (self.interval(), self.formula());
-                self.level_above(0, Formula::Eventually(interval, Box::new(inner)))
-            }
-            TokenKind::Box => {
-                self.bump();
-                let (interval, inner) = (self.interval(), self.formula());
-                self.level_above(0, Formula::Always(interval, Box::new(inner)))
+                let (interval, inner) = (self.interval(), Box::new(self.formula()));
+                let formula = if kind == TokenKind::Diamond {
+                    Formula::Eventually(interval, inner)
+                } else {
+                    Formula::Always(interval, inner)
+                };
+                self.level_above(0, formula)
             }
             TokenKind::Word if self.at_next() => {
                 self.bump();
@@ -145,12 +145,8 @@ impl Parser<'_> {
     fn quantified_formula(&mut self) -> Formula {
         let is_for_all = self.at_word("forall");
         self.bump();
-        self.expect(TokenKind::LeftParenthesis, "after the quantifier");
-        let name = self.declared_name("the name of the bound variable");
-        self.expect(TokenKind::Colon, "between the variable and its type");
-        let ty = self.type_expr();
+        let (name, ty) = self.bound_variable("after the quantifier");
         let height = self.height;
-        self.closing(TokenKind::RightParenthesis, "after the type");
         let inner = Box::new(self.formula());
         self.level_above(height, Formula::Quantified(is_for_all, name, ty, inner))
     }

@@ -14,7 +14,7 @@ use crate::cancellation;
 
 use super::codes;
 use super::tables::Finder;
-use crate::diagnostics::{Diagnostic, SourceId, Span};
+use crate::diagnostics::{Diagnostic, SourceId, Span, to_u32};
 
 /// What bounds the memory for a text that is nothing but tokens: a tree takes up to 100 bytes for
 /// each.
@@ -368,9 +368,4 @@ fn end_of_digits(bytes: &[u8], start: usize) -> usize {
         .take_while(|b| b.is_ascii_digit())
         .count();
     start + length
-}
-
-/// Byte offsets fit: the readers refuse files beyond `u32`.
-pub(super) fn to_u32(offset: usize) -> u32 {
-    u32::try_from(offset).unwrap_or(u32::MAX)
 }

@@ -161,16 +161,9 @@ fn limit(diagnostics: &mut Vec<Diagnostic>) {
 
 /// Adds a whole file as one source and returns the span of all of it.
 fn add_file(path: &str, text: impl Into<Text>, sources: &mut SourceMap) -> Span {
-    let text = text.into();
-    let end = lexer::to_u32(text.len());
-    let source = sources.add(Source {
+    sources.add(Source {
         path: path.into(),
-        text,
+        text: text.into(),
         ..Source::default()
-    });
-    Span {
-        source,
-        start: 0,
-        end,
-    }
+    })
 }

@@ -186,10 +186,7 @@ impl<'a> Parser<'a> {
             Some(last) if self.tokens[last].end >= start.start => {
                 start.to(self.span_of(self.tokens[last]))
             }
-            _ => Span {
-                end: start.start,
-                ..start
-            },
+            _ => start.at_start(),
         }
     }
 
@@ -360,11 +357,8 @@ impl<'a> Parser<'a> {
         if word.is_empty() {
             self.expected(what);
             return Name {
-                text: String::new(),
-                span: Span {
-                    end: span.start,
-                    ..span
-                },
+                span: span.at_start(),
+                ..Name::default()
             };
         }
         if keywords::is_reserved(word, self.dialect) {
@@ -375,8 +369,8 @@ impl<'a> Parser<'a> {
             );
             if self.is_structural_word() {
                 return Name {
-                    text: String::new(),
                     span,
+                    ..Name::default()
                 };
             }
         }
@@ -431,13 +425,19 @@ impl<'a> Parser<'a> {
     /// An error node at the current token.
     pub(super) fn error_expr(&mut self) -> Expr {
         self.height = 1;
-        let span = self.here();
         Expr {
             kind: ExprKind::Error,
-            span: Span {
-                end: span.start,
-                ..span
-            },
+            span: self.here().at_start(),
+        }
+    }
+
+    /// Reads parts with commas between them.
+    pub(super) fn comma_separated(&mut self, mut read: impl FnMut(&mut Self)) {
+        loop {
+            read(self);
+            if !self.eat(TokenKind::Comma) {
+                return;
+            }
         }
     }
 

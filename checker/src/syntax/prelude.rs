@@ -4,7 +4,7 @@
 use super::ast::Declaration;
 use super::keywords::Dialect;
 use super::parser::Parser;
-use crate::diagnostics::{Source, SourceMap, Span};
+use crate::diagnostics::{Source, SourceMap};
 
 /// The declarations that UPPAAL puts before every model. `UINT8_MAX` is 255; the reference manual's
 /// 256 is a slip.
@@ -31,16 +31,11 @@ const double M_SQRT2 = 1.4142135623730951, M_SQRT1_2 = 0.7071067811865476;
 /// # Panics
 /// Never: the text is fixed, and a test parses it.
 pub fn prelude(sources: &mut SourceMap) -> Vec<Declaration> {
-    let source = sources.add(Source {
+    let span = sources.add(Source {
         place: "the prelude".to_owned(),
         text: PRELUDE.into(),
         ..Source::default()
     });
-    let span = Span {
-        source,
-        start: 0,
-        end: super::lexer::to_u32(PRELUDE.len()),
-    };
     let mut diagnostics = Vec::new();
     let mut parser = Parser::new(span, sources, Dialect::New, &mut diagnostics);
     let declarations = parser.local_declarations();

@@ -219,19 +219,16 @@ impl Parser<'_> {
             self.closing(TokenKind::RightParenthesis, "after the bound names");
         }
         self.expect(TokenKind::Colon, "before the bars of the line");
-        loop {
-            if self.eat_word("for") {
-                self.expect(TokenKind::LeftParenthesis, "after `for`");
-                self.select_list();
-                self.closing(TokenKind::RightParenthesis, "after the bound names");
+        self.comma_separated(|parser| {
+            if parser.eat_word("for") {
+                parser.expect(TokenKind::LeftParenthesis, "after `for`");
+                parser.select_list();
+                parser.closing(TokenKind::RightParenthesis, "after the bound names");
             }
-            self.expression();
-            self.expect(TokenKind::Arrow, "between condition and value of a bar");
-            self.expression();
-            if !self.eat(TokenKind::Comma) {
-                return;
-            }
-        }
+            parser.expression();
+            parser.expect(TokenKind::Arrow, "between condition and value of a bar");
+            parser.expression();
+        });
     }
 
     /// `query { … }`: the span of the formula.
@@ -266,10 +263,7 @@ impl Parser<'_> {
             name,
             parameters,
             declarations: self.local_declarations(),
-            locations: Vec::new(),
-            branchpoints: Vec::new(),
-            initial: None,
-            edges: Vec::new(),
+            ..Template::default()
         };
         let mut marks = Vec::new();
         while !self.at_end() && !self.at(TokenKind::RightBrace) {
@@ -320,36 +314,27 @@ impl Parser<'_> {
     /// `state A{invariant; rate}, B;`
     fn states(&mut self, template: &mut Template) {
         self.bump();
-        loop {
-            let name = self.name("the name of a location");
+        self.comma_separated(|parser| {
+            let name = parser.name("the name of a location");
             let mut location = Location {
                 id: name.text.clone(),
                 span: name.span,
                 name: Some(name),
-                invariant: None,
-                exponential_rate: None,
-                urgent: false,
-                committed: false,
-                position: None,
-                labels: Vec::new(),
-                color: None,
+                ..Location::default()
             };
-            if self.eat(TokenKind::LeftBrace) {
-                if !self.at(TokenKind::Semicolon) {
-                    location.invariant = Some(self.condition_list());
+            if parser.eat(TokenKind::LeftBrace) {
+                if !parser.at(TokenKind::Semicolon) {
+                    location.invariant = Some(parser.condition_list());
                 }
-                if self.eat(TokenKind::Semicolon) {
-                    location.exponential_rate = Some(self.exponential_rate());
+                if parser.eat(TokenKind::Semicolon) {
+                    location.exponential_rate = Some(parser.exponential_rate());
                 }
-                self.closing(TokenKind::RightBrace, "after the invariant");
+                parser.closing(TokenKind::RightBrace, "after the invariant");
             }
             if !location.id.is_empty() {
                 template.locations.push(location);
             }
-            if !self.eat(TokenKind::Comma) {
-                return;
-            }
-        }
+        });
     }
 
     /// `a` or `a : b`, the rate a/b.
@@ -399,28 +384,20 @@ impl Parser<'_> {
 
     fn branchpoints(&mut self, template: &mut Template) {
         self.bump();
-        loop {
-            let name = self.name("the name of a branch point");
+        self.comma_separated(|parser| {
+            let name = parser.name("the name of a branch point");
             template.branchpoints.push(Branchpoint {
                 id: name.text,
                 position: None,
                 span: name.span,
             });
-            if !self.eat(TokenKind::Comma) {
-                return;
-            }
-        }
+        });
     }
 
     /// `commit A, B` and `urgent A, B`
     fn marks(&mut self, mark: Mark, marks: &mut Vec<(Mark, Name)>) {
         self.bump();
-        loop {
-            marks.push((mark, self.name("the name of a location")));
-            if !self.eat(TokenKind::Comma) {
-                return;
-            }
-        }
+        self.comma_separated(|parser| marks.push((mark, parser.name("the name of a location"))));
     }
 
     /// Sets the marks once all locations are known.
@@ -455,25 +432,22 @@ impl Parser<'_> {
     fn transitions(&mut self, template: &mut Template) {
         self.bump();
         let mut source: Option<Name> = None;
-        loop {
-            let start = self.here();
+        self.comma_separated(|parser| {
+            let start = parser.here();
             let reused = matches!(
-                self.kind(),
+                parser.kind(),
                 TokenKind::Arrow | TokenKind::UncontrollableArrow
             );
             let from = match (&source, reused) {
                 (Some(source), true) => source.clone(),
-                _ => self.name("the location that the edge leaves"),
+                _ => parser.name("the location that the edge leaves"),
             };
-            match self.transition(start, from.clone()) {
+            match parser.transition(start, from.clone()) {
                 Some(edge) => template.edges.push(edge),
-                None => self.skip_to(&[TokenKind::Comma, TokenKind::Semicolon]),
+                None => parser.skip_to(&[TokenKind::Comma, TokenKind::Semicolon]),
             }
             source = Some(from);
-            if !self.eat(TokenKind::Comma) {
-                return;
-            }
-        }
+        });
     }
 
     /// `-> B { … }`
@@ -487,16 +461,8 @@ impl Parser<'_> {
         let mut edge = Edge {
             source,
             target,
-            select: Vec::new(),
-            guard: None,
-            sync: None,
-            update: Vec::new(),
-            probability: None,
             controllable,
-            nails: Vec::new(),
-            labels: Vec::new(),
-            color: None,
-            span: start,
+            ..Edge::default()
         };
         if self.expect(TokenKind::LeftBrace, "before the labels of the edge") {
             while !self.at_end() && !self.at(TokenKind::RightBrace) {
@@ -604,9 +570,7 @@ pub(super) fn query_texts(spans: &[Span], sources: &SourceMap) -> Vec<QueryText>
         .map(|&span| QueryText {
             span,
             text: super::q_file::collapsed(sources.text(span)),
-            comment: String::new(),
-            expect: None,
-            options: Vec::new(),
+            ..QueryText::default()
         })
         .collect()
 }

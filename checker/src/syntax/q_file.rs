@@ -7,7 +7,6 @@
 
 use super::ast::{Expectation, QueryText};
 use super::codes;
-use super::lexer::to_u32;
 use crate::diagnostics::{Diagnostic, SourceMap, Span};
 
 /// A piece of a `.q` file or of a formula.
@@ -97,12 +96,7 @@ impl<'a> Splitter<'a> {
         let mut found = None;
         for token in tokens.split(',').filter(|token| !token.is_empty()) {
             let Ok(expected) = expectation(token) else {
-                let start = to_u32(position);
-                let span = Span {
-                    start,
-                    end: start + 2,
-                    ..self.file
-                };
+                let span = self.file.part(position..position + 2);
                 let message = format!("`{token}` is not an expectation");
                 self.diagnostics.push(
                     Diagnostic::new(codes::UNKNOWN_EXPECTATION, span, message)
@@ -120,15 +114,11 @@ impl<'a> Splitter<'a> {
             return;
         };
         self.queries.push(QueryText {
-            span: Span {
-                start: to_u32(start),
-                end: to_u32(end),
-                ..self.file
-            },
+            span: self.file.part(start..end),
             text: collapsed(&self.text[start..end]),
             comment: self.comments.join("\n"),
             expect: self.expectation.take(),
-            options: Vec::new(),
+            ..QueryText::default()
         });
         self.comments.clear();
     }

@@ -49,16 +49,11 @@ pub(crate) fn parse_expression(span: Span, sources: &SourceMap) -> (Option<Expr>
 
 /// Adds a query given as bare text as a source of its own and returns its span.
 pub fn add_query_text(text: &str, sources: &mut SourceMap) -> Span {
-    let source = sources.add(Source {
+    sources.add(Source {
         place: "query".to_owned(),
         text: text.into(),
         ..Source::default()
-    });
-    Span {
-        source,
-        start: 0,
-        end: super::lexer::to_u32(text.len()),
-    }
+    })
 }
 
 /// Path quantifiers as other tools and people write them, each with that of UPPAAL.
@@ -205,13 +200,18 @@ impl Parser<'_> {
     /// The rest up to `under` is not read.
     pub(super) fn unsupported_query(&mut self, kind: &str) -> QueryKind {
         let start = self.here();
-        while !self.at_end() && !self.at_word("under") {
-            self.bump();
-        }
+        self.skip_query();
         QueryKind::Unsupported(Name {
             text: kind.to_owned(),
             span: self.since(start),
         })
+    }
+
+    /// Passes over all but what stands behind `under`.
+    pub(super) fn skip_query(&mut self) {
+        while !self.at_end() && !self.at_word("under") {
+            self.bump();
+        }
     }
 
     /// `P[<=10` and not an array named `P`.
@@ -261,9 +261,7 @@ impl Parser<'_> {
         let token = self.bump();
         let operand = self.here();
         let is_missing = self.at_end() || self.at_word("under");
-        while !self.at_end() && !self.at_word("under") {
-            self.bump();
-        }
+        self.skip_query();
         let operand = self.since(operand);
         let words = self.text[operand.start as usize..operand.end as usize].split_whitespace();
         let operand = words.collect::<Vec<_>>().join(" ");
@@ -360,15 +358,13 @@ impl Parser<'_> {
 
     fn observations(&mut self) -> Vec<ObservedPredicate> {
         let mut list = Vec::new();
-        loop {
-            let start = self.here();
-            let predicate = self.expression();
-            let span = self.since(start);
+        self.comma_separated(|parser| {
+            let start = parser.here();
+            let predicate = parser.expression();
+            let span = parser.since(start);
             list.push(ObservedPredicate { predicate, span });
-            if !self.eat(TokenKind::Comma) {
-                return list;
-            }
-        }
+        });
+        list
     }
 
     /// `control: objective`
@@ -438,9 +434,7 @@ impl Parser<'_> {
                 "write `A<> p`, `A[] p`, `A[ p U q ]`, `A[ p W q ]` or `A[] (p && A<> q)` after `control:`",
             ),
         );
-        while !self.at_end() && !self.at_word("under") {
-            self.bump();
-        }
+        self.skip_query();
         Objective::Reach(self.error_expr())
     }
 
@@ -502,8 +496,8 @@ impl Parser<'_> {
         self.expect(TokenKind::LeftParenthesis, "after `saveStrategy`");
         let file = self.file_name();
         let mut strategy = Name {
-            text: String::new(),
             span: self.here(),
+            ..Name::default()
         };
         if self.expect(TokenKind::Comma, "after the name of the file") {
             strategy = self.name("the name of a strategy");

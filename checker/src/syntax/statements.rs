@@ -11,16 +11,10 @@ use crate::diagnostics::Diagnostic;
 impl Parser<'_> {
     /// `{ declarations statements }`; the current token is the brace.
     pub(super) fn block(&mut self) -> Block {
-        let start = self.here();
-        let mut block = Block {
-            declarations: Vec::new(),
-            statements: Vec::new(),
-            span: start,
-        };
+        let mut block = Block::default();
         self.bump();
         self.nested(|parser| parser.block_items(&mut block));
         self.expect(TokenKind::RightBrace, "at the end of the block");
-        block.span = self.since(start);
         block
     }
 
@@ -158,7 +152,7 @@ impl Parser<'_> {
         for_loop(init, condition, step, body)
     }
 
-    fn expressions_until(&mut self, end: TokenKind) -> Vec<Expr> {
+    pub(super) fn expressions_until(&mut self, end: TokenKind) -> Vec<Expr> {
         if self.at(end) {
             Vec::new()
         } else {
@@ -223,16 +217,15 @@ fn for_loop(
 }
 
 fn in_sequence(first: Vec<Statement>, then: Vec<Expr>, last: Option<Statement>) -> Statement {
-    let span = then.first().map(|expr| expr.span);
+    let is_alone = then.is_empty();
     let mut statements = first;
     statements.extend(then.into_iter().map(Statement::Expr));
     statements.extend(last);
-    match span {
-        Some(span) => Statement::Block(Block {
-            declarations: Vec::new(),
-            statements,
-            span,
-        }),
-        None => statements.pop().unwrap_or(Statement::Empty),
+    if is_alone {
+        return statements.pop().unwrap_or(Statement::Empty);
     }
+    Statement::Block(Block {
+        statements,
+        ..Block::default()
+    })
 }

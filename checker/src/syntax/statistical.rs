@@ -75,9 +75,7 @@ impl Parser<'_> {
 
     /// Leaves the rest unread because of a mistake.
     fn skip_rest(&mut self) {
-        while !self.at_end() && !self.at_word("under") {
-            self.bump();
-        }
+        self.skip_query();
         self.suppress_reports();
     }
 
@@ -170,14 +168,8 @@ impl Parser<'_> {
 
     /// `a`, or `foreach (name : type) a`
     fn shown(&mut self) -> Shown {
-        let each = self.eat_word("foreach").then(|| {
-            self.expect(TokenKind::LeftParenthesis, "after foreach");
-            let name = self.declared_name("the name of the bound variable");
-            self.expect(TokenKind::Colon, "between the variable and its type");
-            let ty = self.type_expr();
-            self.closing(TokenKind::RightParenthesis, "after the type");
-            (name, ty)
-        });
+        let is_each = self.eat_word("foreach");
+        let each = is_each.then(|| self.bound_variable("after foreach"));
         Shown {
             each,
             value: self.expression(),
@@ -206,7 +198,6 @@ impl Parser<'_> {
 
     /// `[<=10]`, `[x<=10]` or `[#<=10]`, each with a number of runs behind `;` or not.
     fn run_bound(&mut self) -> RunBound {
-        let start = self.here();
         self.expect(TokenKind::LeftBracket, "before the bound of the runs");
         let (limit, value) = if self.eat(TokenKind::Hash) {
             self.expect(TokenKind::LessEqual, "before the number of moves");
@@ -218,13 +209,7 @@ impl Parser<'_> {
         };
         let runs = self.eat(TokenKind::Semicolon).then(|| self.expression());
         self.closing(TokenKind::RightBracket, "after the bound of the runs");
-        let span = self.since(start);
-        RunBound {
-            limit,
-            value,
-            runs,
-            span,
-        }
+        RunBound { limit, value, runs }
     }
 
     /// `x<=10` as a limit and its value.

@@ -220,12 +220,7 @@ impl<'s> TableReader<'s> {
 
     /// Where the last piece stands; of a list, its `{`.
     pub fn place(&self) -> Span {
-        let (start, end) = self.last;
-        Span {
-            start: self.span.start + start as u32,
-            end: self.span.start + end as u32,
-            ..self.span
-        }
+        self.span.part(self.last.0..self.last.1)
     }
 
     /// Steps over the parts and the end of a list that was just begun.

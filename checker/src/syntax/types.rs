@@ -191,21 +191,15 @@ impl Parser<'_> {
             self.old_parameters(&mut parameters);
             return parameters;
         }
-        loop {
-            let ty = self.type_expr();
-            let reference = self.eat(TokenKind::And);
-            let name = self.declared_name("the name of a parameter");
-            let dimensions = self.dimensions();
+        self.comma_separated(|parser| {
             parameters.push(Parameter {
-                ty,
-                reference,
-                name,
-                dimensions,
+                ty: parser.type_expr(),
+                reference: parser.eat(TokenKind::And),
+                name: parser.declared_name("the name of a parameter"),
+                dimensions: parser.dimensions(),
             });
-            if !self.eat(TokenKind::Comma) {
-                return parameters;
-            }
-        }
+        });
+        parameters
     }
 
     /// `clock x, y; const n`: groups of one type; all but constants are passed by reference.

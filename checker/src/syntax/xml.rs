@@ -11,7 +11,7 @@ use super::ast::{Document, Expectation, Name, QueryText, Unsupported, Unsupporte
 use super::codes;
 use super::keywords::Dialect;
 use super::keywords::is_reserved;
-use super::lexer::{end_of_word, lex, to_u32};
+use super::lexer::{end_of_word, lex};
 use super::parser::Parser;
 use super::processes::{Part, query_texts};
 use super::q_file::{collapsed, expectation_in, trimmed};
@@ -101,11 +101,7 @@ fn malformed(error: &roxmltree::Error, file: &XmlFile, sources: &mut SourceMap) 
         .map_or(line.len(), |(index, _)| index);
     let range = line_start..line_start + line.len();
     let span = file.add_raw(range, String::new(), sources);
-    let span = Span {
-        start: to_u32(column),
-        end: to_u32(column),
-        ..span
-    };
+    let span = span.part(column..column);
     let text = error.to_string();
     let cause = text
         .rsplit_once(" at ")
@@ -134,10 +130,7 @@ fn dialect_of(root: Node) -> Dialect {
         .filter_map(|node| node.text())
         .filter(|text| text.contains("const"))
         .any(|text| {
-            let span = Span {
-                end: to_u32(text.len()),
-                ..Span::default()
-            };
+            let span = Span::default().part(0..text.len());
             is_old_syntax(text, &lex(text, span, &mut Vec::new()))
         });
     if is_old { Dialect::Old } else { Dialect::New }
@@ -271,11 +264,7 @@ impl Reader<'_, '_> {
         if word.is_empty() {
             return None;
         }
-        let span = Span {
-            start: to_u32(start),
-            end: to_u32(start + word.len()),
-            ..span
-        };
+        let span = span.part(start..start + word.len());
         let begins = |byte: u8| byte.is_ascii_alphabetic() || byte == b'_';
         let bytes = word.as_bytes();
         if !begins(bytes[0]) || end_of_word(bytes, 0) != bytes.len() {
@@ -319,11 +308,7 @@ impl Reader<'_, '_> {
         // UPPAAL keeps the last result of a query in the file.
         let expected = expected.or_else(|| child(query, "result").and_then(expected_outcome));
         Some(QueryText {
-            span: Span {
-                start: to_u32(start),
-                end: to_u32(end),
-                ..span
-            },
+            span: span.part(start..end),
             text: collapsed(text),
             comment: comment.unwrap_or("").trim().to_owned(),
             expect: expected.or_else(|| expectation_in(text)),

@@ -12,23 +12,11 @@ use super::ast::{Branchpoint, Edge, LabelKind, Location, Name, Point, Template, 
 use super::codes;
 use super::keywords::Dialect;
 use super::keywords::{is_built_in_function, is_reserved};
-use super::lexer::to_u32;
 
 use super::xml::{Reader, child, is_element};
 use crate::diagnostics::{Diagnostic, Span};
 use roxmltree::Node;
 use std::collections::{HashMap, HashSet};
-
-/// The kinds of labels that mean something; the others are notes of people and tools.
-const LABELS: [&str; 7] = [
-    "invariant",
-    "exponentialrate",
-    "select",
-    "guard",
-    "synchronisation",
-    "assignment",
-    "probability",
-];
 
 impl Reader<'_, '_> {
     pub(super) fn template(&mut self, node: Node) {
@@ -61,10 +49,7 @@ impl Reader<'_, '_> {
             name,
             parameters: parameters.unwrap_or_default(),
             declarations: declarations.unwrap_or_default(),
-            locations: Vec::new(),
-            branchpoints: Vec::new(),
-            initial: None,
-            edges: Vec::new(),
+            ..Template::default()
         };
         self.nodes_of_graph(node, &place, &mut template);
         let names = names_of_locations(&template);
@@ -141,8 +126,6 @@ impl Reader<'_, '_> {
         let mut location = Location {
             id,
             name,
-            invariant: None,
-            exponential_rate: None,
             urgent: child(node, "urgent").is_some(),
             committed: child(node, "committed").is_some(),
             position: point(node),
@@ -153,19 +136,20 @@ impl Reader<'_, '_> {
                 .collect(),
             color: color(node),
             span,
+            ..Location::default()
         };
         if location.urgent && location.committed {
             let message = "this location is both urgent and committed";
             self.error(codes::URGENT_AND_COMMITTED, span, message);
         }
         for (kind, label) in self.labels(node, &place) {
-            location.labels.extend(drawn_label(kind, label));
+            location.labels.extend(point(label).map(|at| (kind, at)));
             match kind {
-                "invariant" => {
+                LabelKind::Invariant => {
                     let place = format!("{place}, invariant");
                     location.invariant = self.parse(label, place, |parser| parser.condition_list());
                 }
-                "exponentialrate" => {
+                LabelKind::ExponentialRate => {
                     let place = format!("{place}, rate");
                     location.exponential_rate =
                         self.parse(label, place, |parser| parser.exponential_rate());
@@ -181,10 +165,10 @@ impl Reader<'_, '_> {
         &mut self,
         node: Node<'a, 'input>,
         place: &str,
-    ) -> Vec<(&'a str, Node<'a, 'input>)> {
-        let mut labels: Vec<(&'a str, Node<'a, 'input>)> = Vec::new();
+    ) -> Vec<(LabelKind, Node<'a, 'input>)> {
+        let mut labels: Vec<(LabelKind, Node<'a, 'input>)> = Vec::new();
         for label in node.children().filter(|n| is_element(*n, "label")) {
-            let Some(kind) = label.attribute("kind") else {
+            let Some(name) = label.attribute("kind") else {
                 let span = self.tag(label, place);
                 self.error(codes::MISSING_PART, span, "this label has no `kind`");
                 continue;
@@ -194,14 +178,14 @@ impl Reader<'_, '_> {
                 .filter(Node::is_text)
                 .filter_map(|child| child.text())
                 .all(|text| text.trim().is_empty());
-            if is_blank || !LABELS.contains(&kind) {
+            let Some(kind) = label_kind(name).filter(|_| !is_blank) else {
                 continue;
-            }
+            };
             let earlier = labels.iter_mut().find(|(other, _)| *other == kind);
             if let Some(earlier) = earlier {
                 earlier.1 = label;
                 let span = self.tag(label, place);
-                let message = format!("a second `{kind}` label replaces the first one");
+                let message = format!("a second `{name}` label replaces the first one");
                 self.error(codes::DUPLICATE_LABEL, span, message);
             } else {
                 labels.push((kind, label));
@@ -234,15 +218,11 @@ impl Reader<'_, '_> {
             self.error(codes::MISSING_PART, tag, message);
             return None;
         };
-        let start = node.range().start;
         let value = attribute.range_value();
+        let behind_start = |at: usize| at.saturating_sub(node.range().start);
         Some(Name {
             text: attribute.value().trim().to_owned(),
-            span: Span {
-                start: to_u32(value.start.saturating_sub(start)),
-                end: to_u32(value.end.saturating_sub(start)),
-                ..tag
-            },
+            span: tag.part(behind_start(value.start)..behind_start(value.end)),
         })
     }
 
@@ -267,19 +247,13 @@ impl Reader<'_, '_> {
         let mut edge = Edge {
             source: source?,
             target: target?,
-            select: Vec::new(),
-            guard: None,
-            sync: None,
-            update: Vec::new(),
-            probability: None,
             controllable: matches!(node.attribute("controllable"), None | Some("true")),
-            nails: Vec::new(),
-            labels: Vec::new(),
             color: color(node),
             span,
+            ..Edge::default()
         };
         for (kind, label) in self.labels(node, &place) {
-            edge.labels.extend(drawn_label(kind, label));
+            edge.labels.extend(point(label).map(|at| (kind, at)));
             self.edge_label(kind, label, &place, &mut edge);
         }
         let nails = node.children().filter(|n| is_element(*n, "nail"));
@@ -287,29 +261,29 @@ impl Reader<'_, '_> {
         Some(edge)
     }
 
-    fn edge_label(&mut self, kind: &str, label: Node, place: &str, edge: &mut Edge) {
+    fn edge_label(&mut self, kind: LabelKind, label: Node, place: &str, edge: &mut Edge) {
         match kind {
-            "select" => {
+            LabelKind::Select => {
                 let select = self.parse(label, format!("{place}, select"), |parser| {
                     parser.select_list()
                 });
                 edge.select = select.unwrap_or_default();
             }
-            "guard" => {
+            LabelKind::Guard => {
                 edge.guard = self.parse(label, format!("{place}, guard"), |parser| {
                     parser.condition_list()
                 });
             }
-            "synchronisation" => {
+            LabelKind::Synchronisation => {
                 let place = format!("{place}, synchronisation");
                 edge.sync = self.parse(label, place, |parser| parser.synchronisation());
             }
-            "assignment" => {
+            LabelKind::Update => {
                 let place = format!("{place}, update");
                 let update = self.parse(label, place, |parser| parser.expression_list());
                 edge.update = update.unwrap_or_default();
             }
-            "probability" => {
+            LabelKind::Probability => {
                 let place = format!("{place}, probability");
                 edge.probability = self.parse(label, place, |parser| parser.expression());
             }
@@ -345,8 +319,8 @@ fn color(node: Node) -> Option<u32> {
 }
 
 /// Where a label stands, if the file says so.
-fn drawn_label(kind: &str, label: Node) -> Option<(LabelKind, Point)> {
-    let kind = match kind {
+fn label_kind(name: &str) -> Option<LabelKind> {
+    Some(match name {
         "invariant" => LabelKind::Invariant,
         "exponentialrate" => LabelKind::ExponentialRate,
         "select" => LabelKind::Select,
@@ -355,8 +329,7 @@ fn drawn_label(kind: &str, label: Node) -> Option<(LabelKind, Point)> {
         "assignment" => LabelKind::Update,
         "probability" => LabelKind::Probability,
         _ => return None,
-    };
-    Some((kind, point(label)?))
+    })
 }
 
 fn names_of_locations(template: &Template) -> HashMap<String, String> {

@@ -1,9 +1,9 @@
 //! The text of XML elements with the places in the file that it comes from: entities, character
 //! references, CDATA and line ends make the text that is parsed differ from the bytes of the file.
 
-use super::lexer::to_u32;
 use super::xml_tables::Cuts;
-use crate::diagnostics::{Source, SourceId, SourceMap, Span, Text};
+use crate::diagnostics::to_u32;
+use crate::diagnostics::{Source, SourceMap, Span, Text};
 use roxmltree::Node;
 use std::ops::Range;
 use std::sync::Arc;
@@ -84,8 +84,7 @@ impl<'a> XmlFile<'a> {
         let lines = &self.line_starts;
         let first = lines.partition_point(|&line| line as usize <= range.start) - 1;
         let last = lines.partition_point(|&line| line as usize <= range.end);
-        let end = to_u32(text.len());
-        let source: SourceId = sources.add(Source {
+        sources.add(Source {
             path: Arc::clone(&self.path),
             place,
             text,
@@ -93,12 +92,7 @@ impl<'a> XmlFile<'a> {
             offsets,
             line_starts: Arc::clone(lines),
             lines: to_u32(first)..to_u32(last),
-        });
-        Span {
-            source,
-            start: 0,
-            end,
-        }
+        })
     }
 
     /// The bytes between an element's tags; empty for `<a/>`.

@@ -5,27 +5,10 @@
 
 use std::collections::HashMap;
 
+pub use crate::ir::Action;
 use crate::ir::{Network, Predicate};
 
 use super::moves::{Part, entry};
-
-/// What the controller proposes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Nothing.
-    Wait,
-    /// Synchronisations on the channel with this index between controllable edges.
-    Channel(u32),
-    /// A controllable edge without a channel.
-    Edge {
-        /// Index of the process.
-        process: u32,
-        /// Index of the edge in its process.
-        edge: u32,
-        /// Which combination of `select` values.
-        select: u32,
-    },
-}
 
 /// A state of the machine; the first one is the initial one.
 #[derive(Clone, Debug)]
@@ -126,19 +109,7 @@ pub(super) fn proposes(
     };
     match action {
         Action::Wait => false,
-        Action::Channel(meant) => !is_edge && channel == Some(meant),
-        Action::Edge {
-            process,
-            edge,
-            select,
-        } => {
-            let proposed = Part {
-                process,
-                edge,
-                branch: 0,
-                select,
-            };
-            is_edge && entry(network, &[part]) == entry(network, &[proposed])
-        }
+        Action::Channel(meant) => !is_edge && channel == Some(meant.0),
+        Action::Edge(proposed) => is_edge && entry(network, &[part]) == entry(network, &[proposed]),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::exec::RunTimeError;
 use crate::ir::Network;
+pub use crate::ir::Part;
 
 pub use crate::ir::Part;
 

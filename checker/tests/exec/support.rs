@@ -54,7 +54,8 @@ fn compiled(functions: &[Function], constants: &[i32], overflow: Overflow) -> ch
 
 #[cfg(feature = "jit")]
 fn sharing(functions: &[Function], constants: &[i32], overflow: Overflow) -> checker::exec::Jit {
-    let jit = checker::exec::Jit::with_overflow(functions, constants, overflow);
+    let tuning = checker::tuning::Tuning::default();
+    let jit = checker::exec::Jit::tuned(functions, constants, overflow, tuning);
     jit.expect("the host is supported")
 }
 

@@ -436,11 +436,11 @@ fn compare(
     let Some(closed) = close(&semantics, &regions, &strategy) else {
         return Ok(());
     };
-    let states = strategy_json::write(&ir, &strategy, "");
-    let read = strategy_json::read(&ir, states.to_string().as_bytes());
-    let read = read.map(|(query, strategy)| strategy_json::write(&ir, &strategy, &query));
+    let states = strategy_json::text(&ir, &strategy, "");
+    let read = strategy_json::read(&ir, states.as_bytes());
+    let read = read.map(|(query, strategy)| strategy_json::text(&ir, &strategy, &query));
     prop_assert_eq!(read.as_ref(), Ok(&states), "{}", text);
-    let description = format!("{text}\n{states:#}");
+    let description = format!("{text}\n{states}");
     model.keep_strategy(NamedStrategy::new(
         "S".to_owned(),
         String::new(),

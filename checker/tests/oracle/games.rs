@@ -373,13 +373,11 @@ pub(crate) fn check_file(
         );
         return Ok(());
     };
-    let file = strategy_json::write(model.network(), strategy, query);
-    let read = strategy_json::read(model.network(), file.to_string().as_bytes());
+    let file = strategy_json::text(model.network(), strategy, query);
+    let read = strategy_json::read(model.network(), file.as_bytes());
     let again =
-        read.map(|(query, strategy)| strategy_json::write(model.network(), &strategy, &query));
+        read.map(|(query, strategy)| strategy_json::text(model.network(), &strategy, &query));
     prop_assert_eq!(again.as_ref(), Ok(&file), "{}", describe());
-    let text = strategy_json::text(model.network(), strategy, query);
-    prop_assert_eq!(text, file.to_string(), "{}", describe());
     Ok(())
 }
 

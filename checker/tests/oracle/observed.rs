@@ -14,7 +14,7 @@ use checker::engine::query::partial_observation;
 use checker::engine::{LoadedModel, Options, Rules, Verdict};
 use checker::game::Forced;
 use checker::game::partial_observation::Machine;
-use checker::ir::{Control, QueryKind};
+use checker::ir::{ChannelId, Control, Part, QueryKind};
 use checker::verify::Effort;
 use checker::verify::observed::{Action, MachineState};
 use checker::verify::strategy::Outcome;
@@ -178,12 +178,8 @@ fn wins(game: &Game<'_>, machine: &[MachineState]) -> Option<bool> {
         let here = numbers[&(state, set.clone())];
         let label = match machine[state].action {
             Action::Wait => None,
-            Action::Channel(channel) => Some(Label::Channel(channel)),
-            Action::Edge {
-                process,
-                edge,
-                select,
-            } => Some(Label::Edge(process, edge, select)),
+            Action::Channel(channel) => Some(Label::Channel(channel.0)),
+            Action::Edge(part) => Some(Label::Edge(part.process, part.edge, part.select)),
         };
         let Some(exits) = game.outcome(&set, label) else {
             return Some(false);
@@ -240,12 +236,13 @@ fn check_machine(
         .map(|step| step.label)
         .collect();
     let actions = labels.into_iter().map(|label| match label {
-        Label::Channel(channel) => Action::Channel(channel),
-        Label::Edge(process, edge, select) => Action::Edge {
+        Label::Channel(channel) => Action::Channel(ChannelId(channel)),
+        Label::Edge(process, edge, select) => Action::Edge(Part {
             process,
             edge,
+            branch: 0,
             select,
-        },
+        }),
     });
     let actions: Vec<Action> = actions.chain([Action::Wait]).collect();
     for changed in 0..states.len().min(4) {

@@ -59,12 +59,12 @@ fn compare(
             return Ok(());
         };
         // In the file, the decisions of states with the same words are together.
-        let file = strategy_json::write(model.network(), &strategy, "control: A[] true");
-        let read = strategy_json::read(model.network(), file.to_string().as_bytes());
+        let file = strategy_json::text(model.network(), &strategy, "control: A[] true");
+        let read = strategy_json::read(model.network(), file.as_bytes());
         read.expect("what is written is read").1
     };
     restrict(&mut graph, &strategy);
-    let description = strategy_json::write(model.network(), &strategy, "control: A[] true");
+    let description = strategy_json::text(model.network(), &strategy, "control: A[] true");
     model.keep_strategy(NamedStrategy::new(
         "S".to_owned(),
         "control: A[] true".to_owned(),

@@ -142,11 +142,7 @@ pub fn prove(symbolic: &mut Symbolic<'_>, what: ToProve<'_>) -> Proof {
         }
         Shows::Takes(takes) => Claim::Takes(takes.predicate, takes.measure, takes.shown),
     };
-    match replay::replay(network, &run, &claim) {
-        Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
-        Ok(Outcome::Violated(violation)) => Proof::Violated(run, violation),
-        Err(error) => Proof::Missing(Missing::NotCovered(error)),
-    }
+    Proof::of(network, run, &claim)
 }
 
 impl From<Unscheduled> for Missing {

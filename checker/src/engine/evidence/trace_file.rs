@@ -5,7 +5,7 @@ use serde_json::Value as Json;
 
 use crate::ir::{Network, Objective, Predicate, QueryKind};
 use crate::network::discrete::selects::select_combination;
-use crate::verify::replay::{self, Claim, End, Moment, Run, Shown, Step};
+use crate::verify::replay::{Claim, End, Moment, Run, Shown, Step};
 use crate::verify::{self, Part};
 
 use super::checked::{Checked, Unreadable};
@@ -161,11 +161,7 @@ fn replay_of(
         }
         _ => return Err("a control query has no trace but that of a play".to_owned()),
     };
-    let proof = match replay::replay(network, &run, &claim) {
-        Ok(replay::Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
-        Ok(replay::Outcome::Violated(violation)) => Proof::Violated(run, violation),
-        Err(error) => Proof::Missing(Missing::NotCovered(error)),
-    };
+    let proof = Proof::of(network, run, &claim);
     let agreement = match &proof {
         Proof::Replayed(run, states, _) => {
             match shown_states::compare_trace(network, trace, run, states) {

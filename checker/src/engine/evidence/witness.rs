@@ -1,9 +1,10 @@
 //! What backs a verdict or a value: a symbolic run, and the run with exact times that proves it.
 
+use crate::ir::Network;
 use crate::network::{Failure, Part};
 use crate::search::Trace;
 use crate::search::liveness::ending::RunEnding;
-use crate::verify::replay::{Coverage, Run, Shown};
+use crate::verify::replay::{self, Claim, Coverage, Outcome, Run, Shown};
 use crate::verify::{self, State, Violation};
 
 /// What backs a verdict or a value: a witness, a counterexample, or the way to a failure.
@@ -62,6 +63,14 @@ pub enum Proof {
 }
 
 impl Proof {
+    /// What the replay of a run says of a claim.
+    pub(crate) fn of(network: &Network, run: Run, claim: &Claim<'_>) -> Proof {
+        match replay::replay(network, &run, claim) {
+            Ok(Outcome::Replayed(states, coverage)) => Proof::Replayed(run, states, coverage),
+            Ok(Outcome::Violated(violation)) => Proof::Violated(run, violation),
+            Err(error) => Proof::Missing(Missing::NotCovered(error)),
+        }
+    }
     /// Whether the run shows what it should; `None` if there is none.
     pub(crate) fn holds(&self) -> Option<bool> {
         match self {

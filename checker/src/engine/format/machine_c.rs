@@ -10,7 +10,7 @@ use crate::game::partial_observation::{Action, Machine};
 use crate::ir::Network;
 
 use super::machine_json::action_text;
-use super::strategy_c::{array, comment, quoted, starts};
+use super::strategy_c::{array, comment, starts, texts};
 use crate::engine::query_form::observations;
 
 /// What does not depend on the machine.
@@ -30,39 +30,27 @@ pub fn write(network: &Network, machine: &Machine, query: &str) -> String {
     let mut text = opening(query, &names);
     let _ = write!(
         text,
-        "#define CONTROLLER_STATES {}\n#define CONTROLLER_OBSERVATIONS {}\n#define CONTROLLER_ACTIONS {}\n\n\
-         #ifndef CONTROLLER_WITHOUT_TEXTS\nconst char *const controller_texts[] = {{\n",
+        "#define CONTROLLER_STATES {}\n#define CONTROLLER_OBSERVATIONS {}\n#define CONTROLLER_ACTIONS {}\n\n",
         machine.states.len(),
         names.len(),
         actions.len()
     );
-    for &action in &actions {
-        let _ = writeln!(text, "    {},", quoted(&action_text(network, action)));
-    }
-    if actions.is_empty() {
-        text.push_str("    0,\n");
-    }
-    text.push_str("};\n#endif\n\n");
+    texts(
+        &mut text,
+        actions.iter().map(|&one| action_text(network, one)),
+    );
     let states = || machine.states.iter();
     let text = &mut text;
-    array(
-        text,
-        "controller_actions",
-        states().map(|state| number(state.action)),
-    );
+    array(text, "actions", states().map(|state| number(state.action)));
     let seen = states().flat_map(|state| &state.knowledge.observation[..]);
-    array(text, "controller_seen", seen.map(|&value| value.into()));
+    array(text, "seen", seen.map(|&value| value.into()));
     array(
         text,
-        "controller_starts",
+        "starts",
         starts(states().map(|state| state.next.len())),
     );
     let targets = states().flat_map(|state| &state.next);
-    array(
-        text,
-        "controller_targets",
-        targets.map(|&(_, next)| next as i64),
-    );
+    array(text, "targets", targets.map(|&(_, next)| next as i64));
     text.push_str(RUNTIME);
     std::mem::take(text)
 }

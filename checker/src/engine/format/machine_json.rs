@@ -11,9 +11,9 @@ use std::fmt::Write as _;
 
 use serde_json::{Value as Json, json};
 
-use crate::game::partial_observation::{Action, Knowledge, Machine};
-use crate::ir::Network;
-use crate::network::{Part, entry_of};
+use crate::game::partial_observation::{Knowledge, Machine};
+use crate::ir::{Action, ChannelId, Network};
+use crate::network::entry_of;
 use crate::verify::observed as check;
 use crate::zones::{Federation, Zone};
 
@@ -59,21 +59,7 @@ fn action(network: &Network, action: Action) -> Json {
     match action {
         Action::Wait => Json::Null,
         Action::Channel(channel) => json!({ "channel": network.channels[channel.0 as usize].name }),
-        Action::Edge {
-            process,
-            edge,
-            select,
-        } => json!({ "edge": json::part(network, part(process, edge, select)) }),
-    }
-}
-
-/// An edge without a channel, by its first branch.
-fn part(process: u32, edge: u32, select: u32) -> Part {
-    Part {
-        process,
-        edge,
-        branch: 0,
-        select,
+        Action::Edge(part) => json!({ "edge": json::part(network, part) }),
     }
 }
 
@@ -143,9 +129,9 @@ pub fn read(
     states.collect()
 }
 
-fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch> {
+fn read_action(network: &Network, at: &At<'_>) -> Result<Action, Mismatch> {
     if at.0.is_null() {
-        return Ok(check::Action::Wait);
+        return Ok(Action::Wait);
     }
     at.only(&["channel", "edge"])?;
     if at.0.get("channel").is_some() {
@@ -154,34 +140,17 @@ fn read_action(network: &Network, at: &At<'_>) -> Result<check::Action, Mismatch
         let Some(channel) = channels.position(|one| one.name == name) else {
             return Err(at.wrong(format!("the model has no channel {name}"), OTHER_MODEL));
         };
-        return Ok(check::Action::Channel(channel as u32));
+        return Ok(Action::Channel(ChannelId(channel as u32)));
     }
     let part = NetworkReader::new(network).part(&at.field("edge")?)?;
-    let part = entry_of(network, &[part])[0];
-    Ok(check::Action::Edge {
-        process: part.process,
-        edge: part.edge,
-        select: part.select,
-    })
+    Ok(Action::Edge(entry_of(network, &[part])[0]))
 }
 
 /// What a machine does, for the check.
 pub fn to_check(machine: &Machine) -> Vec<check::MachineState> {
     let states = machine.states.iter();
     let states = states.map(|state| check::MachineState {
-        action: match state.action {
-            Action::Wait => check::Action::Wait,
-            Action::Channel(channel) => check::Action::Channel(channel.0),
-            Action::Edge {
-                process,
-                edge,
-                select,
-            } => check::Action::Edge {
-                process,
-                edge,
-                select,
-            },
-        },
+        action: state.action,
         next: state
             .next
             .iter()
@@ -242,14 +211,7 @@ pub fn action_text(network: &Network, action: Action) -> String {
         Action::Channel(channel) => {
             format!("propose {}", network.channels[channel.0 as usize].name)
         }
-        Action::Edge {
-            process,
-            edge,
-            select,
-        } => {
-            let part = part(process, edge, select);
-            format!("propose {}", text::entry_text(network, part))
-        }
+        Action::Edge(part) => format!("propose {}", text::entry_text(network, part)),
     }
 }
 

@@ -317,11 +317,6 @@ fn state(network: &Network) -> Json {
 /// The names of what a model uses beyond plain timed automata, in a fixed order.
 fn features(model: &LoadedModel) -> Vec<&'static str> {
     let network = model.network();
-    let locations = || {
-        let processes = network.processes.iter();
-        processes.flat_map(|process| &process.locations)
-    };
-    let edges = || network.processes.iter().flat_map(|process| &process.edges);
     let is_used = |template: &&Template| {
         let mut processes = network.processes.iter();
         processes.any(|process| process.template == template.name.text)
@@ -345,7 +340,7 @@ fn features(model: &LoadedModel) -> Vec<&'static str> {
         uncontrollable,
         legs: _,
     } = &network.features;
-    let has_urgency = |wanted| locations().any(|location| location.urgency == wanted);
+    let has_urgency = |wanted| network.locations().any(|one| one.urgency == wanted);
     let has_rates = used().any(|template| {
         let mut locations = template.locations.iter();
         locations.any(|location| location.exponential_rate.is_some())
@@ -364,7 +359,7 @@ fn features(model: &LoadedModel) -> Vec<&'static str> {
         ("priorities", *priorities),
         (
             "select-bindings",
-            edges().any(|edge| !edge.select.is_empty()),
+            network.edges().any(|edge| !edge.select.is_empty()),
         ),
         (
             "branch-points",

@@ -10,7 +10,7 @@
 //! The same strategy gives the same text.
 
 use std::collections::HashMap;
-use std::fmt::{Display, Write as _};
+use std::fmt::Write as _;
 use std::hash::Hash;
 
 use crate::game::Player;
@@ -28,29 +28,15 @@ use crate::engine::query::time_clock;
 const RUNTIME: &str = include_str!("controller_runtime.c");
 
 /// Why there is no controller.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoController {
-    /// How long to wait cannot be known where clocks stand still.
-    Stopwatches,
-}
-
-impl Display for NoController {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            NoController::Stopwatches => f.write_str(
-                "there is no controller for a model with stopwatches: how long to wait depends on when clocks stand still",
-            ),
-        }
-    }
-}
+const STOPWATCHES: &str = "there is no controller for a model with stopwatches: how long to wait depends on when clocks stand still";
 
 /// A strategy for a query as the text of a C file.
 ///
 /// # Errors
-/// See [`NoController`].
-pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Result<String, NoController> {
+/// The reason why there is no controller.
+pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Result<String, &'static str> {
     if network.features.stopwatches {
-        return Err(NoController::Stopwatches);
+        return Err(STOPWATCHES);
     }
     let network = &*time_clock::network_of(network, strategy);
     let tables = Tables::new(network, strategy);
@@ -220,77 +206,41 @@ impl Tables {
     fn write(&self, network: &Network, text: &mut String) {
         self.write_actions(network, text);
         let spans = || self.spans.iter();
-        array(text, "controller_lows", spans().map(|span| span.low.into()));
-        array(
-            text,
-            "controller_ranges",
-            spans().map(|span| span.range().into()),
-        );
-        array(
-            text,
-            "controller_widths",
-            spans().map(|span| span.width() as i64),
-        );
+        array(text, "lows", spans().map(|span| span.low.into()));
+        array(text, "ranges", spans().map(|span| span.range().into()));
+        array(text, "widths", spans().map(|span| span.width() as i64));
 
         let constraints = || self.constraints.all.iter();
-        array(
-            text,
-            "controller_left",
-            constraints().map(|one| one.left as i64),
-        );
-        array(
-            text,
-            "controller_right",
-            constraints().map(|one| one.right as i64),
-        );
+        array(text, "left", constraints().map(|one| one.left as i64));
+        array(text, "right", constraints().map(|one| one.right as i64));
         let bounds = || constraints().map(|one| one.bound);
+        array(text, "bounds", bounds().map(|bound| bound.value().into()));
         array(
             text,
-            "controller_bounds",
-            bounds().map(|bound| bound.value().into()),
-        );
-        array(
-            text,
-            "controller_strict",
+            "strict",
             bounds().map(|bound| bound.is_strict().into()),
         );
 
         let zones = || self.zones.all.iter();
-        array(text, "controller_zones", starts(zones().map(Vec::len)));
+        array(text, "zones", starts(zones().map(Vec::len)));
         let constraints = zones().flatten();
-        array(
-            text,
-            "controller_constraints",
-            constraints.map(|&one| one as i64),
-        );
+        array(text, "constraints", constraints.map(|&one| one as i64));
 
         let rows = || self.rows.all.iter();
         array(
             text,
-            "controller_row_starts",
+            "row_starts",
             starts(rows().map(|row| row.rules.len())),
         );
         if self.has_legs() {
-            array(
-                text,
-                "controller_row_owns",
-                rows().map(|row| row.own as i64),
-            );
+            array(text, "row_owns", rows().map(|row| row.own as i64));
         }
         let rules = || rows().flat_map(|row| &row.rules);
-        array(
-            text,
-            "controller_rule_zones",
-            rules().map(|rule| rule.0 as i64),
-        );
-        array(
-            text,
-            "controller_rule_actions",
-            rules().map(|rule| rule.1 as i64),
-        );
+        array(text, "rule_zones", rules().map(|rule| rule.0 as i64));
+        array(text, "rule_actions", rules().map(|rule| rule.1 as i64));
 
         let rows = self.states.iter().map(|state| state.1 as i64);
-        array(text, "controller_rows", rows);
+        array(text, "rows", rows);
         self.write_keys(text);
     }
 
@@ -303,24 +253,11 @@ impl Tables {
     fn write_actions(&self, network: &Network, text: &mut String) {
         let count = self.actions.all.len();
         let _ = writeln!(text, "#define CONTROLLER_ACTIONS {count}\n");
-        text.push_str(
-            "#ifndef CONTROLLER_WITHOUT_TEXTS\nconst char *const controller_texts[] = {\n",
+        let all = self.actions.all.iter();
+        texts(
+            text,
+            all.map(|parts| strategy_text::edges(network, self.owner, parts)),
         );
-        for parts in &self.actions.all {
-            let parts = parts.iter().map(|&part| match self.owner {
-                Player::Controller => text::entry_text(network, part),
-                Player::Environment => text::part_text(network, part),
-            });
-            let _ = writeln!(
-                text,
-                "    {},",
-                quoted(&parts.collect::<Vec<_>>().join(" "))
-            );
-        }
-        if count == 0 {
-            text.push_str("    0,\n");
-        }
-        text.push_str("};\n#endif\n\n");
     }
 
     fn write_keys(&self, text: &mut String) {
@@ -494,6 +431,19 @@ pub(super) fn starts(lengths: impl Iterator<Item = usize>) -> impl Iterator<Item
     std::iter::once(0).chain(ends)
 }
 
+/// The texts of the actions, which a program may leave out.
+pub(super) fn texts(text: &mut String, actions: impl Iterator<Item = String>) {
+    text.push_str("#ifndef CONTROLLER_WITHOUT_TEXTS\nconst char *const controller_texts[] = {\n");
+    let before = text.len();
+    for action in actions {
+        let _ = writeln!(text, "    {},", quoted(&action));
+    }
+    if text.len() == before {
+        text.push_str("    0,\n");
+    }
+    text.push_str("};\n#endif\n\n");
+}
+
 /// A table of the smallest type that holds its values.
 pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = i64>) {
     let values: Vec<i64> = values.collect();
@@ -507,7 +457,7 @@ pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = 
         (-0x8000.., ..=0x7fff) => "int16_t",
         _ => "int32_t",
     };
-    let _ = write!(text, "static const {kind} {name}[] = {{");
+    let _ = write!(text, "static const {kind} controller_{name}[] = {{");
     let values = if values.is_empty() { vec![0] } else { values };
     wrapped(
         text,

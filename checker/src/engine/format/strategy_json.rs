@@ -36,20 +36,8 @@ pub const VERSION: u64 = 1;
 const OTHER_MODEL: &str =
     "the strategy was made for another model, or the model has changed: synthesise it again";
 
-/// A strategy as JSON. Decisions of states with the same words are joined and come in the order of
-/// their ranks.
-pub fn write(network: &Network, strategy: &Strategy, query: &str) -> Json {
-    let network = &*time_clock::network_of(network, strategy);
-    let mut file = frame(network, strategy, query);
-    let states = closed_loop::joined(network, strategy);
-    file["states"] = states.iter().map(|one| state(network, one)).collect();
-    if let Some(under) = &strategy.under {
-        file["under"] = write(network, &under.strategy, &under.query);
-    }
-    file
-}
-
-/// The text of what [`write`] gives, made state by state, since the whole takes twenty times the
+/// A strategy as the text of JSON. Decisions of states with the same words are joined and come in
+/// the order of their ranks. It is made state by state, since the whole takes twenty times the
 /// memory of the text.
 pub fn text(network: &Network, strategy: &Strategy, query: &str) -> String {
     let network = &*time_clock::network_of(network, strategy);
@@ -83,7 +71,7 @@ const NO_STATES: &str = "\"states\":[]";
 const NO_UNDER: &str = "\"under\":null";
 
 /// A discrete state with its joined decisions.
-fn state(network: &Network, joined: &Joined<'_>) -> Json {
+pub(crate) fn state(network: &Network, joined: &Joined<'_>) -> Json {
     let all = |decisions: &[&Decision]| -> Vec<Json> {
         let decisions = decisions.iter();
         decisions.map(|one| decision(network, one)).collect()
@@ -106,10 +94,7 @@ fn frame(network: &Network, strategy: &Strategy, query: &str) -> Json {
         "format": FORMAT,
         "version": VERSION,
         "query": query,
-        "owner": match strategy.owner {
-            Player::Controller => "controller",
-            Player::Environment => "environment",
-        },
+        "owner": strategy.owner.name(),
         "selection": match strategy.selection {
             Selection::First => "first",
             Selection::Any => "any",

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use crate::game::Player;
 use crate::game::strategy::{Selection, Start, Strategy, Way};
-use crate::ir::Network;
+use crate::ir::{Network, Part};
 use crate::zones::{Federation, Zone};
 
 use super::decision_table::{self, Rule};
@@ -62,8 +62,7 @@ pub(super) fn way_lines(network: &Network, way: &Way) -> String {
     let mut text = String::new();
     let wait = |ticks: i64| text::fraction(ticks, way.ticks_per_unit);
     for (ticks, parts) in &way.moves {
-        let parts = parts.iter().map(|&one| text::part_text(network, one));
-        let parts = parts.collect::<Vec<_>>().join(" ");
+        let parts = edges(network, Player::Environment, parts);
         // Writing to a string cannot fail.
         let _ = writeln!(text, "wait {}, take transition {parts}", wait(*ticks));
     }
@@ -77,25 +76,26 @@ fn line(network: &Network, owner: Player, rule: &Rule) -> String {
     let Some(parts) = &rule.action else {
         return format!("While you are in\t{zones}, wait.\n");
     };
+    let parts = edges(network, owner, parts);
+    format!("When you are in {zones}, take transition {parts}\n")
+}
+
+/// The edges of a move of this player: the controller names its entry, and picks no leg.
+pub(super) fn edges(network: &Network, owner: Player, parts: &[Part]) -> String {
     let parts = parts.iter().map(|&one| match owner {
         Player::Controller => text::entry_text(network, one),
         Player::Environment => text::part_text(network, one),
     });
-    let parts: Vec<String> = parts.collect();
-    format!(
-        "When you are in {zones}, take transition {}\n",
-        parts.join(" ")
-    )
+    parts.collect::<Vec<_>>().join(" ")
 }
 
 /// Which leg the environment picks, as a line.
 fn leg_line(network: &Network, leg: &Rule) -> String {
-    let parts = leg.action.iter().flatten();
-    let parts: Vec<String> = parts.map(|&one| text::part_text(network, one)).collect();
+    let picked = leg.action.as_deref().unwrap_or_default();
     format!(
         "When the controller moves in {}, pick leg {}\n",
         zones(network, &leg.zones),
-        parts.join(" ")
+        edges(network, Player::Environment, picked)
     )
 }
 

@@ -123,9 +123,12 @@ pub(crate) fn unsupported(network: &Network, priorities: Priorities) -> Option<&
 /// Whether some invariant says `x > c`: then an action that leads into its location has no first
 /// moment at which it is possible.
 fn has_strict_lower_invariant(network: &Network) -> bool {
-    let mut locations = network.processes.iter().flat_map(|one| &one.locations);
+    let mut locations = network.locations();
     locations.any(|location| {
-        let mut atoms = location.invariant.atoms.iter();
-        atoms.any(|atom| atom.strict && atom.left.first.0 == 0 && atom.left.count == 1)
+        location
+            .invariant
+            .atoms
+            .iter()
+            .any(ClockAtom::is_strict_lower)
     })
 }

@@ -13,9 +13,9 @@ use hashbrown::hash_table::Entry;
 use rustc_hash::FxBuildHasher;
 use serde_json::{Map, Value as Json, json};
 
+use crate::game::Priorities;
 use crate::game::strategy::closed_loop;
 use crate::game::strategy::{Selection, Start, Strategy};
-use crate::game::{Player, Priorities};
 use crate::ir::{Network, Query};
 use crate::verify::play::{self, Ending, Gap, Next, Situation, Timing, Window};
 use crate::verify::replay::{End, Moment, Run, Step};
@@ -142,12 +142,11 @@ impl Follower {
     /// The entry of the strategy's file for the locations and variables of this JSON.
     pub fn state(&self, network: &Network, state: &Json) -> Result<Json, Unadvised> {
         let words = strategy_json::read_words(network, state)?;
+        let network = &*time_clock::network_of(network, &self.strategy);
         let part = self.at(network, &words);
-        let mut file = strategy_json::write(network, &part, &self.query);
-        match file["states"].get_mut(0) {
-            Some(entry) => Ok(entry.take()),
-            None => Err(Unadvised::UnknownState),
-        }
+        let joined = closed_loop::joined(network, &part);
+        let entry = joined.first().ok_or(Unadvised::UnknownState)?;
+        Ok(strategy_json::state(network, entry))
     }
 
     /// What the strategy says in a state, as JSON: whether play is `over` there; the decisions that
@@ -655,18 +654,10 @@ impl Play {
     }
 }
 
-/// The name of a player in files.
+/// The name of an owner in files.
 pub fn owner_name(owner: Owner) -> &'static str {
     match owner {
         Owner::Controller => "controller",
         Owner::Environment => "environment",
-    }
-}
-
-/// The name of a player in files.
-pub fn player_name(player: Player) -> &'static str {
-    match player {
-        Player::Controller => "controller",
-        Player::Environment => "environment",
     }
 }

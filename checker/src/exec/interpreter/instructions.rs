@@ -82,7 +82,7 @@ impl Execution<'_, '_> {
                 right,
             } => {
                 let (left, right) = (self.integer(active, left), self.integer(active, right));
-                let holds = arithmetic::integers_relate(relation, left, right);
+                let holds = arithmetic::relate(relation, left, right);
                 self.set_integer(active, target, holds.into());
             }
             Instruction::CompareDoubles {
@@ -92,7 +92,7 @@ impl Execution<'_, '_> {
                 right,
             } => {
                 let (left, right) = (self.double(active, left), self.double(active, right));
-                let holds = arithmetic::doubles_relate(relation, left, right);
+                let holds = arithmetic::relate(relation, left, right);
                 self.set_integer(active, target, holds.into());
             }
             Instruction::Not { target, source } => {

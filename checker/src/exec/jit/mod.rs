@@ -84,19 +84,11 @@ impl Entry {
 impl Jit {
     /// An engine that compiles a function once it has run for a while.
     pub fn new(functions: &[Function], constants: impl Into<Constants>) -> Result<Jit, JitError> {
-        Jit::with_overflow(functions, constants, Overflow::default())
+        Jit::tuned(functions, constants, Overflow::default(), Tuning::default())
     }
 
-    /// The same, with what happens where results of integer arithmetic do not fit.
-    pub fn with_overflow(
-        functions: &[Function],
-        constants: impl Into<Constants>,
-        overflow: Overflow,
-    ) -> Result<Jit, JitError> {
-        Jit::tuned(functions, constants, overflow, Tuning::default())
-    }
-
-    /// The same, with these heuristics only.
+    /// The same, with these heuristics only; `overflow` is what happens where results of integer
+    /// arithmetic do not fit.
     pub fn tuned(
         functions: &[Function],
         constants: impl Into<Constants>,
@@ -125,7 +117,7 @@ impl Jit {
         constants: impl Into<Constants>,
         overflow: Overflow,
     ) -> Result<Jit, JitError> {
-        let jit = Jit::with_overflow(functions, constants, overflow)?;
+        let jit = Jit::tuned(functions, constants, overflow, Tuning::default())?;
         for index in 0..functions.len() as u32 {
             jit.compile_function(FunctionId(index))?;
         }

@@ -1,29 +1,11 @@
 //! The question that a game under partial observation answers, and the form of its strategies.
 
-use crate::ir::{ChannelId, Network, Predicate};
+pub use crate::ir::Action;
+use crate::ir::{Network, Predicate};
 use crate::network::{MoveRef, entry_of};
 
 use super::knowledge::{Knowledge, Observation};
 use crate::game::Forced;
-
-/// What the controller proposes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Action {
-    /// Nothing.
-    Wait,
-    /// A synchronisation on this channel between controllable edges.
-    Channel(ChannelId),
-    /// A controllable edge without a channel, or one to a branch point whose legs have channels;
-    /// all legs have the name of the first.
-    Edge {
-        /// Index of the process.
-        process: u32,
-        /// Index of the edge in its process.
-        edge: u32,
-        /// Which combination of `select` values.
-        select: u32,
-    },
-}
 
 impl Action {
     /// The action that allows a move; `None` if the move is the environment's.
@@ -35,14 +17,7 @@ impl Action {
         let has_channels = leg.is_some_and(|leg| !leg.follows_sync);
         Some(match one.channel {
             Some(channel) if !has_channels => Action::Channel(channel),
-            _ => {
-                let entry = entry_of(network, one.parts)[0];
-                Action::Edge {
-                    process: entry.process,
-                    edge: entry.edge,
-                    select: entry.select,
-                }
-            }
+            _ => Action::Edge(entry_of(network, one.parts)[0]),
         })
     }
 }

@@ -137,7 +137,7 @@ impl Builder<'_> {
             range @ ClockSet::Range(_) => range,
         };
         for effect in &effects.assignments {
-            self.emits = true;
+            self.effects.emits = true;
             self.effects.assignments.push(ClockEffect {
                 target: substitute(effect.target),
                 source: effect.source.map(substitute),
@@ -153,24 +153,16 @@ fn extent(expr: &Expr) -> (u32, u32) {
     let mut place = expr;
     loop {
         match &place.kind {
-            Kind::Index {
-                array,
-                index,
-                first,
-                length,
-                stride,
-            } => {
-                if *length == 0 {
+            Kind::Index(element) => {
+                if element.length == 0 {
                     // The index is an error, and nothing is touched.
                     return (0, 0);
                 }
-                match index.constant() {
-                    Some(i) if i >= *first && i.abs_diff(*first) < *length => {
-                        offset += i.abs_diff(*first) * stride.words;
-                    }
-                    _ => reach += (length - 1) * stride.words,
+                match element.position() {
+                    Some(position) => offset += position * element.stride.words,
+                    None => reach += (element.length - 1) * element.stride.words,
                 }
-                place = array;
+                place = &element.array;
             }
             Kind::Field { record, offset: by } => {
                 offset += by.words;

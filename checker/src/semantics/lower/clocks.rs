@@ -109,7 +109,7 @@ impl Builder<'_> {
         let left = self.clock_or_reference(left);
         let right = self.clock_or_reference(right);
         let register = self.value(bound);
-        self.emits = true;
+        self.effects.emits = true;
         for (swapped, negated, strict) in comparisons {
             let (left, right) = if swapped {
                 (right, left)
@@ -155,7 +155,7 @@ impl Builder<'_> {
         source: Option<&Expr>,
         value: Option<&Expr>,
     ) -> (ClockOperand, ClockSet) {
-        self.emits = true;
+        self.effects.emits = true;
         let (clock, target_set) = self.clock(target);
         let Some(source) = source else {
             let value = value.expect("a clock is set to a clock or a value");

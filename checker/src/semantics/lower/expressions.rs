@@ -12,7 +12,7 @@ impl Builder<'_> {
         match &expr.kind {
             Kind::Int(value) => self.integer(*value),
             Kind::Double(value) => self.double(*value),
-            Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
+            Kind::Variable(_) | Kind::Index(_) | Kind::Field { .. } => {
                 let target = self.target(expr, false);
                 self.load(target, &expr.ty)
             }
@@ -59,28 +59,26 @@ impl Builder<'_> {
             Kind::Random(distribution, arguments) => {
                 let arguments = self.stable_values(arguments);
                 let site = self.site(expr.span);
-                let target = self.register(RegisterType::Double);
                 // The random numbers lie in the state.
                 self.effects.reads_state = true;
-                self.emit(Instruction::Random {
+                self.compute(RegisterType::Double, |target| Instruction::Random {
                     distribution: *distribution,
                     target,
                     arguments,
                     stream: at(Base::State, chance_words::STREAM),
                     site,
-                });
-                target
+                })
             }
             Kind::ToInteger(inner) => {
                 let source = self.value(inner);
                 let site = self.site(expr.span);
-                let target = self.register(RegisterType::Integer);
-                self.emit(Instruction::DoubleToInteger {
-                    target,
-                    source,
-                    site,
-                });
-                target
+                self.compute(RegisterType::Integer, |target| {
+                    Instruction::DoubleToInteger {
+                        target,
+                        source,
+                        site,
+                    }
+                })
             }
             Kind::Integer(operator, left, right) => {
                 let (left, right) = self.operands(left, right);
@@ -93,14 +91,12 @@ impl Builder<'_> {
             Kind::Math(function, arguments) => {
                 let arguments = self.stable_values(arguments);
                 let site = self.site(expr.span);
-                let target = self.register(register_type(&expr.ty));
-                self.emit(Instruction::Math {
+                self.compute(register_type(&expr.ty), |target| Instruction::Math {
                     function: *function,
                     target,
                     arguments,
                     site,
-                });
-                target
+                })
             }
             _ => self.comparison(expr),
         }
@@ -120,14 +116,18 @@ impl Builder<'_> {
                 let words = left.ty.size().words;
                 let left = self.stable_address(left, right);
                 let right = self.address(right);
-                let target = self.register(RegisterType::Integer);
-                self.emit(Instruction::EqualWords {
-                    target,
-                    left,
-                    right,
-                    words,
-                });
-                if *equal { target } else { self.not(target) }
+                let are_equal =
+                    self.compute(RegisterType::Integer, |target| Instruction::EqualWords {
+                        target,
+                        left,
+                        right,
+                        words,
+                    });
+                if *equal {
+                    are_equal
+                } else {
+                    self.not(are_equal)
+                }
             }
             other => unreachable!("checking leaves no such value: {other:?}"),
         }

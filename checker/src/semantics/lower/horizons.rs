@@ -141,8 +141,12 @@ impl Builder<'_> {
                 let all = self.integer(ALWAYS);
                 self.arithmetic(IntegerOperator::Xor, inner, all, expr.span)
             }
-            Kind::And(left, right) => self.both(left, right, shared, expr.span),
-            Kind::Or(left, right) => self.either(left, right, shared, expr.span),
+            Kind::And(left, right) => {
+                self.joined(IntegerOperator::And, [left, right], shared, expr.span)
+            }
+            Kind::Or(left, right) => {
+                self.joined(IntegerOperator::Or, [left, right], shared, expr.span)
+            }
             Kind::Ternary(condition, then, otherwise) => {
                 let condition = self.timed(condition, shared);
                 let then = self.timed(then, shared);
@@ -222,33 +226,29 @@ impl Builder<'_> {
         mask
     }
 
-    fn both(&mut self, left: &Expr, right: &Expr, shared: Horizon, span: Span) -> Register {
+    /// `and` or `or`: the second side is not looked at where the first one decides.
+    fn joined(
+        &mut self,
+        operator: IntegerOperator,
+        [left, right]: [&Expr; 2],
+        shared: Horizon,
+        span: Span,
+    ) -> Register {
         let mask = self.register(RegisterType::Integer);
         let first = self.timed(left, shared);
         self.copy(mask, first);
         let (next, end) = (self.new_block(), self.new_block());
-        self.terminate(Terminator::Branch(mask, next, end));
+        if operator == IntegerOperator::And {
+            self.terminate(Terminator::Branch(mask, next, end));
+        } else {
+            let all = self.integer(ALWAYS);
+            let is_decided = self.compare(Relation::Equal, mask, all);
+            self.terminate(Terminator::Branch(is_decided, end, next));
+        }
         self.switch(next);
         let second = self.timed(right, shared);
-        let both = self.arithmetic(IntegerOperator::And, mask, second, span);
-        self.copy(mask, both);
-        self.jump(end);
-        self.switch(end);
-        mask
-    }
-
-    fn either(&mut self, left: &Expr, right: &Expr, shared: Horizon, span: Span) -> Register {
-        let mask = self.register(RegisterType::Integer);
-        let first = self.timed(left, shared);
-        self.copy(mask, first);
-        let (next, end) = (self.new_block(), self.new_block());
-        let all = self.integer(ALWAYS);
-        let is_decided = self.compare(Relation::Equal, mask, all);
-        self.terminate(Terminator::Branch(is_decided, end, next));
-        self.switch(next);
-        let second = self.timed(right, shared);
-        let either = self.arithmetic(IntegerOperator::Or, mask, second, span);
-        self.copy(mask, either);
+        let joined = self.arithmetic(operator, mask, second, span);
+        self.copy(mask, joined);
         self.jump(end);
         self.switch(end);
         mask

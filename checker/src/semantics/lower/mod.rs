@@ -70,7 +70,7 @@ enum Home {
 pub(super) struct Builder<'n> {
     network: &'n mut Network,
     images: &'n mut Images,
-    locals: &'n [Local],
+    locals: Vec<Local>,
     homes: Vec<Option<Home>>,
     registers: Vec<RegisterType>,
     parameters: u32,
@@ -82,8 +82,6 @@ pub(super) struct Builder<'n> {
     result_address: Option<Register>,
     /// What the code does to the state.
     pub(super) effects: Effects,
-    /// Whether clock constraints or assignments are emitted.
-    pub(super) emits: bool,
 }
 
 impl<'n> Builder<'n> {
@@ -91,13 +89,13 @@ impl<'n> Builder<'n> {
     pub(super) fn new(
         network: &'n mut Network,
         images: &'n mut Images,
-        locals: &'n [Local],
+        locals: Vec<Local>,
     ) -> Builder<'n> {
         Builder {
             network,
             images,
-            locals,
             homes: vec![None; locals.len()],
+            locals,
             registers: Vec::new(),
             parameters: 0,
             frame_words: 0,
@@ -107,7 +105,6 @@ impl<'n> Builder<'n> {
             result: Type::Void,
             result_address: None,
             effects: Effects::default(),
-            emits: false,
         }
     }
 
@@ -218,22 +215,16 @@ impl<'n> Builder<'n> {
     }
 
     /// A function that evaluates expressions for their effects.
-    pub(super) fn update(mut self, name: String, exprs: &[Expr]) -> (FunctionId, Effects, bool) {
+    pub(super) fn update(mut self, name: String, exprs: &[Expr]) -> (FunctionId, Effects) {
         for expr in exprs {
             self.effect(expr);
         }
         self.terminate(Terminator::Return(None));
-        let emits = self.emits;
-        let (function, effects) = self.finish(name, None);
-        (function, effects, emits)
+        self.finish(name, None)
     }
 
     /// A function that returns whether all conditions may hold and emits their clock constraints.
-    pub(super) fn guard(
-        mut self,
-        name: String,
-        conditions: &[&Expr],
-    ) -> (FunctionId, Effects, bool) {
+    pub(super) fn guard(mut self, name: String, conditions: &[&Expr]) -> (FunctionId, Effects) {
         let fail = self.new_block();
         for condition in conditions {
             self.constrain(condition, fail);
@@ -243,9 +234,7 @@ impl<'n> Builder<'n> {
         self.switch(fail);
         let zero = self.integer(0);
         self.terminate(Terminator::Return(Some(zero)));
-        let emits = self.emits;
-        let (function, effects) = self.finish(name, Some(RegisterType::Integer));
-        (function, effects, emits)
+        self.finish(name, Some(RegisterType::Integer))
     }
 
     /// A function that returns the value of an expression, checked against the range of a type.
@@ -303,6 +292,13 @@ impl<'n> Builder<'n> {
         self.blocks[self.current].instructions.push(instruction);
     }
 
+    /// Emits an instruction with a new register of this type as its target.
+    fn compute(&mut self, ty: RegisterType, of: impl FnOnce(Register) -> Instruction) -> Register {
+        let target = self.register(ty);
+        self.emit(of(target));
+        target
+    }
+
     fn new_block(&mut self) -> BlockId {
         self.blocks.push(open_block());
         BlockId(self.blocks.len() as u32 - 1)
@@ -351,10 +347,11 @@ impl<'n> Builder<'n> {
     }
 
     fn double(&mut self, value: f64) -> Register {
-        let target = self.register(RegisterType::Double);
         let value = value.into();
-        self.emit(Instruction::Double { target, value });
-        target
+        self.compute(RegisterType::Double, |target| Instruction::Double {
+            target,
+            value,
+        })
     }
 
     fn zero(&mut self, ty: RegisterType) -> Register {
@@ -365,15 +362,15 @@ impl<'n> Builder<'n> {
     }
 
     fn as_double(&mut self, source: Register) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.emit(Instruction::IntegerToDouble { target, source });
-        target
+        let convert = |target| Instruction::IntegerToDouble { target, source };
+        self.compute(RegisterType::Double, convert)
     }
 
     fn not(&mut self, source: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::Not { target, source });
-        target
+        self.compute(RegisterType::Integer, |target| Instruction::Not {
+            target,
+            source,
+        })
     }
 
     fn copy(&mut self, target: Register, source: Register) {
@@ -391,9 +388,8 @@ impl<'n> Builder<'n> {
     }
 
     fn address_of(&mut self, address: Address) -> Register {
-        let target = self.register(RegisterType::Address);
-        self.emit(Instruction::AddressOf { target, address });
-        target
+        let take = |target| Instruction::AddressOf { target, address };
+        self.compute(RegisterType::Address, take)
     }
 
     /// The offset of a part of an array, checked against its length.
@@ -406,49 +402,47 @@ impl<'n> Builder<'n> {
         span: Span,
     ) -> Register {
         let site = self.site(span);
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::ScaleIndex {
+        self.compute(RegisterType::Integer, |target| Instruction::ScaleIndex {
             target,
             index,
             first,
             length,
             stride,
             site,
-        });
-        target
+        })
     }
 
     fn compare(&mut self, relation: Relation, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::CompareIntegers {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
+        self.compute(RegisterType::Integer, |target| {
+            Instruction::CompareIntegers {
+                relation,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     fn compare_doubles(&mut self, relation: Relation, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::CompareDoubles {
-            relation,
-            target,
-            left,
-            right,
-        });
-        target
+        self.compute(RegisterType::Integer, |target| {
+            Instruction::CompareDoubles {
+                relation,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     fn real(&mut self, operator: DoubleOperator, left: Register, right: Register) -> Register {
-        let target = self.register(RegisterType::Double);
-        self.emit(Instruction::DoubleArithmetic {
-            operator,
-            target,
-            left,
-            right,
-        });
-        target
+        self.compute(RegisterType::Double, |target| {
+            Instruction::DoubleArithmetic {
+                operator,
+                target,
+                left,
+                right,
+            }
+        })
     }
 
     fn arithmetic(
@@ -459,15 +453,13 @@ impl<'n> Builder<'n> {
         span: Span,
     ) -> Register {
         let site = self.site(span);
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::Arithmetic {
+        self.compute(RegisterType::Integer, |target| Instruction::Arithmetic {
             operator,
             target,
             left,
             right,
             site,
-        });
-        target
+        })
     }
 }
 

@@ -1,6 +1,6 @@
 //! Places: variables, their parts, and what is loaded from and stored to them.
 
-use super::super::typed::{ClockSet, Expr, Kind, LocalId, Place, Root};
+use super::super::typed::{ClockSet, Element, Expr, Kind, LocalId, Place, Root};
 use super::super::types::{Memory, Type};
 use super::{Builder, Home, at, register_type};
 use crate::ir::{
@@ -53,15 +53,9 @@ impl Builder<'_> {
                 path.offset += offset.of(memory);
                 path
             }
-            Kind::Index {
-                array,
-                index,
-                first,
-                length,
-                stride,
-            } => {
-                let path = self.path(array, memory);
-                self.indexed(path, index, *first, *length, stride.of(memory))
+            Kind::Index(element) => {
+                let path = self.path(&element.array, memory);
+                self.indexed(path, element, memory)
             }
             _ => {
                 let address = self.address(expr);
@@ -98,23 +92,15 @@ impl Builder<'_> {
         fixed_path(start, offset)
     }
 
-    fn indexed(
-        &mut self,
-        mut path: Path,
-        index: &Expr,
-        first: i32,
-        length: u32,
-        stride: u32,
-    ) -> Path {
-        let position = index.constant().map(|i| i64::from(i) - i64::from(first));
-        if let Some(position) = position
-            && (0..i64::from(length)).contains(&position)
-        {
-            path.offset += position as u32 * stride;
+    fn indexed(&mut self, mut path: Path, element: &Element, memory: Memory) -> Path {
+        let &Element { first, length, .. } = element;
+        let stride = element.stride.of(memory);
+        if let Some(position) = element.position() {
+            path.offset += position * stride;
             return path;
         }
-        let source = self.value(index);
-        let scaled = self.scaled_index(source, first, length, stride, index.span);
+        let source = self.value(&element.index);
+        let scaled = self.scaled_index(source, first, length, stride, element.index.span);
         if length == 0 {
             // Any index is an error, so nothing is touched; what comes after must lie somewhere all
             // the same.
@@ -127,13 +113,11 @@ impl Builder<'_> {
 
     pub(super) fn add_indices(&mut self, left: Option<Register>, right: Register) -> Register {
         let Some(left) = left else { return right };
-        let target = self.register(RegisterType::Integer);
-        self.emit(Instruction::AddIndices {
+        self.compute(RegisterType::Integer, |target| Instruction::AddIndices {
             target,
             left,
             right,
-        });
-        target
+        })
     }
 
     /// The address of a place in the words that is not a register.
@@ -155,7 +139,7 @@ impl Builder<'_> {
     /// Where an assignment to a place stores; `written` records the words as changed.
     pub(super) fn target(&mut self, expr: &Expr, written: bool) -> Destination {
         match &expr.kind {
-            Kind::Variable(_) | Kind::Index { .. } | Kind::Field { .. } => {
+            Kind::Variable(_) | Kind::Index(_) | Kind::Field { .. } => {
                 let path = self.path(expr, Memory::Words);
                 if written {
                     self.record_write(path, expr.ty.size().words);
@@ -257,15 +241,13 @@ impl Builder<'_> {
     pub(super) fn load(&mut self, target: Destination, ty: &Type) -> Register {
         match target {
             Destination::Register(register) => register,
-            Destination::Memory(address) => {
-                let target = self.register(register_type(ty));
-                self.emit(if ty.is_real() {
+            Destination::Memory(address) => self.compute(register_type(ty), |target| {
+                if ty.is_real() {
                     Instruction::LoadDouble { target, address }
                 } else {
                     Instruction::LoadInteger { target, address }
-                });
-                target
-            }
+                }
+            }),
         }
     }
 

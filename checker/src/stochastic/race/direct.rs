@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use super::Race;
 use crate::exec::RunTimeError;
-use crate::exec::arithmetic::{double, doubles_relate, integers_relate};
+use crate::exec::arithmetic::{double, relate};
 use crate::ir::{DoubleOperator, FunctionId, ProcessId, Relation};
 use crate::stochastic::advice::View;
 use crate::stochastic::condition::Condition;
@@ -80,11 +80,11 @@ impl Backend for Race<'_> {
     }
 
     fn compare(&mut self, left: i32, relation: Relation, right: i32) -> i32 {
-        integers_relate(relation, left, right).into()
+        relate(relation, left, right).into()
     }
 
     fn compare_reals(&mut self, left: f64, relation: Relation, right: f64) -> i32 {
-        doubles_relate(relation, left, right).into()
+        relate(relation, left, right).into()
     }
 
     fn when(&mut self, condition: i32, then: impl FnOnce(&mut Self) -> Flow<Self>) -> Flow<Self> {

@@ -18,9 +18,7 @@ impl Translator<'_> {
     pub(super) fn compute(&mut self, instruction: &Instruction) {
         let (target, value) = match *instruction {
             Instruction::Integer { target, value } => (target, self.integer(value)),
-            Instruction::Double { target, value } => {
-                (target, self.builder.ins().f64const(value.value()))
-            }
+            Instruction::Double { target, value } => (target, self.ins().f64const(value.value())),
             Instruction::Copy { target, source } => (target, self.get(source)),
             Instruction::CompareIntegers {
                 relation,
@@ -29,10 +27,7 @@ impl Translator<'_> {
                 right,
             } => {
                 let (left, right) = (self.get(left), self.get(right));
-                let holds = self
-                    .builder
-                    .ins()
-                    .icmp(integer_condition(relation), left, right);
+                let holds = self.ins().icmp(integer_condition(relation), left, right);
                 (target, self.truth(holds))
             }
             Instruction::CompareDoubles {
@@ -42,15 +37,12 @@ impl Translator<'_> {
                 right,
             } => {
                 let (left, right) = (self.get(left), self.get(right));
-                let holds = self
-                    .builder
-                    .ins()
-                    .fcmp(double_condition(relation), left, right);
+                let holds = self.ins().fcmp(double_condition(relation), left, right);
                 (target, self.truth(holds))
             }
             Instruction::Not { target, source } => {
                 let source = self.get(source);
-                let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, source, 0);
+                let is_zero = self.ins().icmp_imm_s(IntCC::Equal, source, 0);
                 (target, self.truth(is_zero))
             }
             Instruction::Select {
@@ -61,10 +53,7 @@ impl Translator<'_> {
             } => {
                 let [condition, then, otherwise] =
                     [condition, then, otherwise].map(|register| self.get(register));
-                (
-                    target,
-                    self.builder.ins().select(condition, then, otherwise),
-                )
+                (target, self.ins().select(condition, then, otherwise))
             }
             Instruction::DoubleArithmetic {
                 operator,
@@ -77,7 +66,7 @@ impl Translator<'_> {
             }
             Instruction::IntegerToDouble { target, source } => {
                 let source = self.get(source);
-                (target, self.builder.ins().fcvt_from_sint(F64, source))
+                (target, self.ins().fcvt_from_sint(F64, source))
             }
             Instruction::AddIndices {
                 target,
@@ -85,7 +74,7 @@ impl Translator<'_> {
                 right,
             } => {
                 let (left, right) = (self.get(left), self.get(right));
-                (target, self.builder.ins().iadd(left, right))
+                (target, self.ins().iadd(left, right))
             }
             _ => unreachable!("sorted out by instruction"),
         };
@@ -137,9 +126,9 @@ impl Translator<'_> {
                 let index = self.get(index);
                 let position = match first {
                     0 => index,
-                    _ => self.builder.ins().iadd_imm_s(index, -i64::from(first)),
+                    _ => self.ins().iadd_imm_s(index, -i64::from(first)),
                 };
-                let outside = self.builder.ins().icmp_imm_u(
+                let outside = self.ins().icmp_imm_u(
                     IntCC::UnsignedGreaterThanOrEqual,
                     position,
                     i64::from(length),
@@ -147,7 +136,7 @@ impl Translator<'_> {
                 self.fail_if(outside, RunTimeErrorKind::IndexOutOfBounds, site);
                 let scaled = match stride {
                     1 => position,
-                    _ => self.builder.ins().imul_imm_u(position, i64::from(stride)),
+                    _ => self.ins().imul_imm_u(position, i64::from(stride)),
                 };
                 (target, scaled)
             }
@@ -157,7 +146,7 @@ impl Translator<'_> {
     }
 
     fn double_arithmetic(&mut self, operator: DoubleOperator, left: Value, right: Value) -> Value {
-        let ins = self.builder.ins();
+        let ins = self.ins();
         match operator {
             DoubleOperator::Add => ins.fadd(left, right),
             DoubleOperator::Subtract => ins.fsub(left, right),
@@ -165,12 +154,12 @@ impl Translator<'_> {
             DoubleOperator::Divide => ins.fdiv(left, right),
             DoubleOperator::Minimum => {
                 let less = ins.fcmp(FloatCC::LessThan, left, right);
-                self.builder.ins().select(less, left, right)
+                self.ins().select(less, left, right)
             }
             DoubleOperator::Maximum => {
                 // Cranelift knows the instruction for a maximum by this comparison only.
                 let greater = ins.fcmp(FloatCC::LessThan, right, left);
-                self.builder.ins().select(greater, left, right)
+                self.ins().select(greater, left, right)
             }
         }
     }
@@ -182,7 +171,7 @@ impl Translator<'_> {
         right: Value,
         site: SiteId,
     ) -> Value {
-        let ins = self.builder.ins();
+        let ins = self.ins();
         match operator {
             IntegerOperator::Add => {
                 let (sum, overflow) = ins.sadd_overflow(left, right);
@@ -202,20 +191,20 @@ impl Translator<'_> {
             IntegerOperator::Divide => {
                 self.check_divisor(right, site);
                 let divisor = self.divisor_that_fits(left, right, site);
-                self.builder.ins().sdiv(left, divisor)
+                self.ins().sdiv(left, divisor)
             }
             IntegerOperator::Remainder => {
                 self.check_divisor(right, site);
-                self.builder.ins().srem(left, right)
+                self.ins().srem(left, right)
             }
             IntegerOperator::Power => self.power(left, right, site),
             IntegerOperator::ShiftLeft => {
                 self.check_distance(right, site);
-                self.builder.ins().ishl(left, right)
+                self.ins().ishl(left, right)
             }
             IntegerOperator::ShiftRight => {
                 self.check_distance(right, site);
-                self.builder.ins().sshr(left, right)
+                self.ins().sshr(left, right)
             }
             IntegerOperator::And => ins.band(left, right),
             IntegerOperator::Or => ins.bor(left, right),
@@ -241,7 +230,7 @@ impl Translator<'_> {
         if self.constant(divisor).is_some_and(|divisor| divisor != 0) {
             return;
         }
-        let is_zero = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, 0);
+        let is_zero = self.ins().icmp_imm_s(IntCC::Equal, divisor, 0);
         self.fail_if(is_zero, RunTimeErrorKind::DivisionByZero, site);
     }
 
@@ -251,14 +240,13 @@ impl Translator<'_> {
             return divisor;
         }
         let is_least = self
-            .builder
             .ins()
             .icmp_imm_s(IntCC::Equal, dividend, i64::from(i32::MIN));
-        let is_minus_one = self.builder.ins().icmp_imm_s(IntCC::Equal, divisor, -1);
-        let both = self.builder.ins().band(is_least, is_minus_one);
+        let is_minus_one = self.ins().icmp_imm_s(IntCC::Equal, divisor, -1);
+        let both = self.ins().band(is_least, is_minus_one);
         self.overflow_if(both, site);
         let one = self.integer(1);
-        self.builder.ins().select(both, one, divisor)
+        self.ins().select(both, one, divisor)
     }
 
     fn check_distance(&mut self, distance: Value, site: SiteId) {
@@ -266,17 +254,13 @@ impl Translator<'_> {
             return;
         }
         let outside = self
-            .builder
             .ins()
             .icmp_imm_u(IntCC::UnsignedGreaterThan, distance, 31);
         self.fail_if(outside, RunTimeErrorKind::ShiftDistance, site);
     }
 
     fn power(&mut self, base: Value, exponent: Value, site: SiteId) -> Value {
-        let negative = self
-            .builder
-            .ins()
-            .icmp_imm_s(IntCC::SignedLessThan, exponent, 0);
+        let negative = self.ins().icmp_imm_s(IntCC::SignedLessThan, exponent, 0);
         self.fail_if(negative, RunTimeErrorKind::NegativeExponent, site);
         let code = runtime::power as *const () as usize;
         let power = self.call_back(code, Some(I64), &[base, exponent]);
@@ -285,24 +269,24 @@ impl Translator<'_> {
 
     /// The integer of an [`IntegerResult`] that is one.
     fn unwrapped(&mut self, result: Value, site: SiteId) -> Value {
-        let has_wrapped = self.builder.ins().icmp_imm_s(
+        let has_wrapped = self.ins().icmp_imm_s(
             IntCC::SignedGreaterThanOrEqual,
             result,
             IntegerResult::HAS_WRAPPED,
         );
         self.overflow_if(has_wrapped, site);
-        self.builder.ins().ireduce(I32, result)
+        self.ins().ireduce(I32, result)
     }
 
     fn truncate(&mut self, source: Value, site: SiteId) -> Value {
         // Both comparisons are false for a NaN, and the conversion is exact between the two.
-        let high = self.builder.ins().f64const(2_147_483_648.0);
-        let below = self.builder.ins().fcmp(FloatCC::LessThan, source, high);
+        let high = self.ins().f64const(2_147_483_648.0);
+        let below = self.ins().fcmp(FloatCC::LessThan, source, high);
         self.fail_unless(below, RunTimeErrorKind::NotAnInteger, site);
-        let low = self.builder.ins().f64const(-2_147_483_649.0);
-        let above = self.builder.ins().fcmp(FloatCC::GreaterThan, source, low);
+        let low = self.ins().f64const(-2_147_483_649.0);
+        let above = self.ins().fcmp(FloatCC::GreaterThan, source, low);
         self.fail_unless(above, RunTimeErrorKind::NotAnInteger, site);
-        self.builder.ins().fcvt_to_sint_sat(I32, source)
+        self.ins().fcvt_to_sint_sat(I32, source)
     }
 
     fn math(&mut self, function: MathFunction, arguments: &[Register], site: SiteId) -> Value {
@@ -310,7 +294,7 @@ impl Translator<'_> {
             .iter()
             .map(|&register| self.get(register))
             .collect();
-        let ins = self.builder.ins();
+        let ins = self.ins();
         // Where the processor has an instruction that gives what the library gives, it is taken.
         match function {
             MathFunction::Fabs => return ins.fabs(arguments[0]),
@@ -319,7 +303,7 @@ impl Translator<'_> {
                 let least = i64::from(i32::MIN);
                 let is_least = ins.icmp_imm_s(IntCC::Equal, arguments[0], least);
                 self.overflow_if(is_least, site);
-                return self.builder.ins().iabs(arguments[0]);
+                return self.ins().iabs(arguments[0]);
             }
             _ => {}
         }
@@ -336,17 +320,14 @@ impl Translator<'_> {
         if !function.may_fail_or_wrap() {
             return result;
         }
-        let is_none = self
-            .builder
-            .ins()
-            .icmp_imm_s(IntCC::SignedLessThan, result, 0);
+        let is_none = self.ins().icmp_imm_s(IntCC::SignedLessThan, result, 0);
         self.fail_if(is_none, RunTimeErrorKind::NotAnInteger, site);
         self.unwrapped(result, site)
     }
 
     /// A condition as 0 or 1.
     pub(super) fn truth(&mut self, condition: Value) -> Value {
-        self.builder.ins().uextend(I32, condition)
+        self.ins().uextend(I32, condition)
     }
 }
 

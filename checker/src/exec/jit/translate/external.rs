@@ -38,12 +38,12 @@ impl Translator<'_> {
                 ExternalArgument::Memory { address, .. } => self.pointer(address),
             };
             let offset = 8 * number as i32;
-            self.builder.ins().stack_store(I64, value, given, offset);
+            self.ins().stack_store(I64, value, given, offset);
         }
         let pointer = std::ptr::from_ref(called) as usize;
-        let called_at = self.builder.ins().iconst(I64, pointer as i64);
-        let given = self.builder.ins().stack_addr(I64, given, 0);
-        let result = self.builder.ins().stack_addr(I64, left, 0);
+        let called_at = self.ins().iconst(I64, pointer as i64);
+        let given = self.ins().stack_addr(I64, given, 0);
+        let result = self.ins().stack_addr(I64, left, 0);
         let place = self.integer(site.0 as i32);
         let code = runtime::call_external as *const () as usize;
         let status = self.call_back(code, Some(I64), &[called_at, given, result, place]);
@@ -53,7 +53,7 @@ impl Translator<'_> {
                 ExternalType::Integer | ExternalType::Bool => I32,
                 ExternalType::Double => F64,
             };
-            let value = self.builder.ins().stack_load(I64, native, left, 0);
+            let value = self.ins().stack_load(I64, native, left, 0);
             self.set(target, value);
         }
     }

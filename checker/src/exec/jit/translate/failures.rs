@@ -26,7 +26,7 @@ impl Translator<'_> {
                 let flags = MemFlagsData::trusted();
                 let left = self.builder.ins().load(I64, flags, self.context, offset);
                 let left = self.refill_rounds(left, site);
-                let left = self.builder.ins().iadd_imm_s(left, -1);
+                let left = self.ins().iadd_imm_s(left, -1);
                 self.builder.ins().store(flags, left, self.context, offset);
             }
             Instruction::Require {
@@ -46,7 +46,7 @@ impl Translator<'_> {
         let (refill, next) = (self.builder.create_block(), self.builder.create_block());
         self.builder.set_cold_block(refill);
         self.builder.append_block_param(next, I64);
-        let ins = self.builder.ins();
+        let ins = self.ins();
         ins.brif(left, next, &[left.into()], refill, &[]);
         self.builder.switch_to_block(refill);
         let site = self.integer(site as i32);
@@ -56,7 +56,7 @@ impl Translator<'_> {
         let offset = offset_of!(NativeContext<'static>, rounds_left) as i32;
         let flags = MemFlagsData::trusted();
         let left = self.builder.ins().load(I64, flags, self.context, offset);
-        self.builder.ins().jump(next, &[left.into()]);
+        self.ins().jump(next, &[left.into()]);
         self.builder.switch_to_block(next);
         self.builder.block_params(next)[0]
     }
@@ -76,7 +76,7 @@ impl Translator<'_> {
             self.fail_if(always, kind, site);
             return;
         }
-        let ins = self.builder.ins();
+        let ins = self.ins();
         let outside = if low == i32::MIN {
             ins.icmp_imm_s(IntCC::SignedGreaterThan, value, i64::from(high))
         } else if high == i32::MAX {
@@ -85,8 +85,7 @@ impl Translator<'_> {
             // Counted from the least value without a sign, too small values are too large as well.
             let position = ins.iadd_imm_s(value, -i64::from(low));
             let width = i64::from(high.wrapping_sub(low) as u32);
-            self.builder
-                .ins()
+            self.ins()
                 .icmp_imm_u(IntCC::UnsignedGreaterThan, position, width)
         };
         self.fail_if(outside, kind, site);
@@ -100,14 +99,9 @@ impl Translator<'_> {
             self.builder.set_cold_block(block);
             block
         });
-        let failed = self
-            .builder
-            .ins()
-            .icmp_imm_s(IntCC::SignedLessThan, status, 0);
+        let failed = self.ins().icmp_imm_s(IntCC::SignedLessThan, status, 0);
         let next = self.builder.create_block();
-        self.builder
-            .ins()
-            .brif(failed, cold, &[status.into()], next, &[]);
+        self.ins().brif(failed, cold, &[status.into()], next, &[]);
         self.builder.switch_to_block(next);
     }
 
@@ -117,15 +111,15 @@ impl Translator<'_> {
             // Without a call, which would make the hot path save registers.
             let offset = offset_of!(NativeContext<'static>, wrapped) as i32;
             let (flags, context) = (MemFlagsData::trusted(), self.context);
-            let first = self.builder.ins().load(I32, flags, context, offset);
+            let first = self.ins().load(I32, flags, context, offset);
             let site = self.integer(site as i32);
-            let first = self.builder.ins().umin(first, site);
-            self.builder.ins().store(flags, first, context, offset);
-            self.builder.ins().jump(next, &[]);
+            let first = self.ins().umin(first, site);
+            self.ins().store(flags, first, context, offset);
+            self.ins().jump(next, &[]);
         }
         for (status, block) in std::mem::take(&mut self.failures) {
             self.builder.switch_to_block(block);
-            let status = self.builder.ins().iconst(I64, status);
+            let status = self.ins().iconst(I64, status);
             self.return_status(status);
         }
         if let Some(block) = self.failed_call {
@@ -163,19 +157,19 @@ impl Translator<'_> {
         let (cold, next) = (self.builder.create_block(), self.builder.create_block());
         self.builder.set_cold_block(cold);
         self.wraps.push((site, cold, next));
-        self.builder.ins().brif(condition, cold, &[], next, &[]);
+        self.ins().brif(condition, cold, &[], next, &[]);
         self.builder.switch_to_block(next);
     }
 
     pub(super) fn fail_if(&mut self, condition: Value, kind: RunTimeErrorKind, site: SiteId) {
         let (cold, next) = (self.failure(kind, site), self.builder.create_block());
-        self.builder.ins().brif(condition, cold, &[], next, &[]);
+        self.ins().brif(condition, cold, &[], next, &[]);
         self.builder.switch_to_block(next);
     }
 
     pub(super) fn fail_unless(&mut self, condition: Value, kind: RunTimeErrorKind, site: SiteId) {
         let (cold, next) = (self.failure(kind, site), self.builder.create_block());
-        self.builder.ins().brif(condition, next, &[], cold, &[]);
+        self.ins().brif(condition, next, &[], cold, &[]);
         self.builder.switch_to_block(next);
     }
 }

@@ -17,18 +17,18 @@ impl Translator<'_> {
         match *instruction {
             Instruction::LoadInteger { target, address } => {
                 let (base, offset) = self.place(address);
-                let value = self.builder.ins().load(I32, MODEL_MEMORY, base, offset);
+                let value = self.ins().load(I32, MODEL_MEMORY, base, offset);
                 self.set(target, value);
             }
             Instruction::LoadDouble { target, address } => {
                 let (base, offset) = self.place(address);
-                let value = self.builder.ins().load(F64, MODEL_MEMORY, base, offset);
+                let value = self.ins().load(F64, MODEL_MEMORY, base, offset);
                 self.set(target, value);
             }
             Instruction::StoreInteger { address, source } => {
                 let source = self.get(source);
                 let (base, offset) = self.place(address);
-                self.builder.ins().store(MODEL_MEMORY, source, base, offset);
+                self.ins().store(MODEL_MEMORY, source, base, offset);
             }
             Instruction::StoreDouble {
                 address,
@@ -41,10 +41,10 @@ impl Translator<'_> {
                 }
                 if let Some(double) = self.double(source) {
                     // The bits of a constant need no register of doubles.
-                    source = self.builder.ins().iconst(I64, double.to_bits() as i64);
+                    source = self.ins().iconst(I64, double.to_bits() as i64);
                 }
                 let (base, offset) = self.place(address);
-                self.builder.ins().store(MODEL_MEMORY, source, base, offset);
+                self.ins().store(MODEL_MEMORY, source, base, offset);
             }
             Instruction::CopyWords {
                 target,
@@ -73,9 +73,9 @@ impl Translator<'_> {
         if self.is_number(value) {
             return value;
         }
-        let is_nan = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
-        let nan = self.builder.ins().f64const(f64::NAN);
-        self.builder.ins().select(is_nan, nan, value)
+        let is_nan = self.ins().fcmp(FloatCC::Unordered, value, value);
+        let nan = self.ins().f64const(f64::NAN);
+        self.ins().select(is_nan, nan, value)
     }
 
     /// The double that a value always is, if it is a constant.
@@ -99,7 +99,7 @@ impl Translator<'_> {
     fn copy_words(&mut self, target: Address, source: Address, words: u32) {
         if words > INLINE_WORDS {
             let (target, source) = (self.pointer(target), self.pointer(source));
-            let count = self.builder.ins().iconst(I64, i64::from(words));
+            let count = self.ins().iconst(I64, i64::from(words));
             let code = runtime::copy_words as *const () as usize;
             self.call_back(code, None, &[target, source, count]);
             return;
@@ -107,12 +107,10 @@ impl Translator<'_> {
         let (source, source_offset) = self.place(source);
         let (target, target_offset) = self.place(target);
         for word in 0..words as i32 {
-            let value =
-                self.builder
-                    .ins()
-                    .load(I32, MODEL_MEMORY, source, source_offset + 4 * word);
-            self.builder
+            let value = self
                 .ins()
+                .load(I32, MODEL_MEMORY, source, source_offset + 4 * word);
+            self.ins()
                 .store(MODEL_MEMORY, value, target, target_offset + 4 * word);
         }
     }
@@ -120,7 +118,7 @@ impl Translator<'_> {
     fn equal_words(&mut self, left: Address, right: Address, words: u32) -> Value {
         if words > INLINE_WORDS {
             let (left, right) = (self.pointer(left), self.pointer(right));
-            let count = self.builder.ins().iconst(I64, i64::from(words));
+            let count = self.ins().iconst(I64, i64::from(words));
             let code = runtime::equal_words as *const () as usize;
             return self.call_back(code, Some(I32), &[left, right, count]);
         }
@@ -128,14 +126,14 @@ impl Translator<'_> {
         let (right, right_offset) = self.place(right);
         let mut difference = self.integer(0);
         for word in 0..words as i32 {
-            let ins = self.builder.ins();
+            let ins = self.ins();
             let left = ins.load(I32, MODEL_MEMORY, left, left_offset + 4 * word);
-            let ins = self.builder.ins();
+            let ins = self.ins();
             let right = ins.load(I32, MODEL_MEMORY, right, right_offset + 4 * word);
-            let bits = self.builder.ins().bxor(left, right);
-            difference = self.builder.ins().bor(difference, bits);
+            let bits = self.ins().bxor(left, right);
+            difference = self.ins().bor(difference, bits);
         }
-        let equal = self.builder.ins().icmp_imm_s(IntCC::Equal, difference, 0);
+        let equal = self.ins().icmp_imm_s(IntCC::Equal, difference, 0);
         self.truth(equal)
     }
 
@@ -153,21 +151,21 @@ impl Translator<'_> {
         };
         if let Some(index) = address.index {
             let index = self.get(index);
-            let index = self.builder.ins().uextend(I64, index);
-            let bytes = self.builder.ins().ishl_imm_u(index, 2);
-            base = self.builder.ins().iadd(base, bytes);
+            let index = self.ins().uextend(I64, index);
+            let bytes = self.ins().ishl_imm_u(index, 2);
+            base = self.ins().iadd(base, bytes);
         }
         let bytes = 4 * i64::from(address.offset);
         // The bytes of a range must be countable behind it too.
         if bytes < 1 << 30 {
             (base, bytes as i32)
         } else {
-            (self.builder.ins().iadd_imm_s(base, bytes), 0)
+            (self.ins().iadd_imm_s(base, bytes), 0)
         }
     }
 
     pub(super) fn pointer(&mut self, address: Address) -> Value {
         let (base, offset) = self.place(address);
-        self.builder.ins().iadd_imm_s(base, i64::from(offset))
+        self.ins().iadd_imm_s(base, i64::from(offset))
     }
 }

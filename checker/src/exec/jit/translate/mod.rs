@@ -24,7 +24,7 @@ use cranelift_codegen::ir::{
     SigRef, Signature, Type, Value,
 };
 use cranelift_codegen::isa::{CallConv, TargetFrontendConfig};
-use cranelift_frontend::{FunctionBuilder, Variable};
+use cranelift_frontend::{FuncInstBuilder, FunctionBuilder, Variable};
 
 use crate::ir::{
     CLOCK_LIMIT, ClockOperand, Function, FunctionId, Instruction, Overflow, Register, RegisterType,
@@ -172,7 +172,12 @@ struct Translator<'a> {
     signatures: Vec<(Vec<Type>, Option<Type>, SigRef)>,
 }
 
-impl Translator<'_> {
+impl<'a> Translator<'a> {
+    /// What inserts an instruction at the end of the current block.
+    fn ins(&mut self) -> FuncInstBuilder<'_, 'a> {
+        self.builder.ins()
+    }
+
     /// Takes over the arguments and zeroes the frame.
     fn write_entry(&mut self, arguments: &[Value]) {
         for (&variable, &argument) in self.variables.iter().zip(arguments) {
@@ -180,14 +185,14 @@ impl Translator<'_> {
         }
         let words = self.function.frame_words;
         if words > INLINE_WORDS {
-            let count = self.builder.ins().iconst(I64, i64::from(words));
+            let count = self.ins().iconst(I64, i64::from(words));
             let code = runtime::zero_words as *const () as usize;
             self.call_back(code, None, &[self.frame, count]);
         } else if words > 0 {
-            let zero = self.builder.ins().iconst(I32, 0);
+            let zero = self.ins().iconst(I32, 0);
             for word in 0..words as i32 {
                 let (frame, offset) = (self.frame, 4 * word);
-                self.builder.ins().store(MODEL_MEMORY, zero, frame, offset);
+                self.ins().store(MODEL_MEMORY, zero, frame, offset);
             }
         }
         self.builder.ins().jump(self.blocks[0], &[]);
@@ -252,7 +257,7 @@ impl Translator<'_> {
                 self.check_range(bound, -limit, limit, RunTimeErrorKind::ClockValue, site);
                 let mut bound = self.get(bound);
                 if negate_bound {
-                    bound = self.builder.ins().ineg(bound);
+                    bound = self.ins().ineg(bound);
                 }
                 let (left, right) = (self.clock(left), self.clock(right));
                 let strict = self.integer(strict.into());
@@ -293,7 +298,7 @@ impl Translator<'_> {
             None => self.integer(first),
             Some(index) => {
                 let index = self.get(index);
-                self.builder.ins().iadd_imm_s(index, i64::from(first))
+                self.ins().iadd_imm_s(index, i64::from(first))
             }
         }
     }
@@ -307,13 +312,13 @@ impl Translator<'_> {
         for &argument in arguments {
             values.push(self.get(argument));
         }
-        let call = self.builder.ins().call(callee, &values);
+        let call = self.ins().call(callee, &values);
         let results = self.builder.inst_results(call).to_vec();
         self.propagate_failure(results[0]);
         if let Some(target) = target {
             let value = match results.get(1) {
                 Some(&value) => value,
-                None => self.builder.ins().ireduce(I32, results[0]),
+                None => self.ins().ireduce(I32, results[0]),
             };
             self.set(target, value);
         }
@@ -328,9 +333,7 @@ impl Translator<'_> {
                 let condition = self.get(condition);
                 let then = self.blocks[then.0 as usize];
                 let otherwise = self.blocks[otherwise.0 as usize];
-                self.builder
-                    .ins()
-                    .brif(condition, then, &[], otherwise, &[]);
+                self.ins().brif(condition, then, &[], otherwise, &[]);
             }
             Terminator::Switch(number, ref list, otherwise) => {
                 let number = self.get(number);
@@ -342,25 +345,25 @@ impl Translator<'_> {
                 let otherwise = BlockCall::new(otherwise, [], pool);
                 let table = JumpTableData::new(otherwise, &calls);
                 let table = self.builder.create_jump_table(table);
-                self.builder.ins().br_table(number, table);
+                self.ins().br_table(number, table);
             }
             Terminator::Fail(kind, site) => {
                 let block = self.failure(kind, site);
-                self.builder.ins().jump(block, &[]);
+                self.ins().jump(block, &[]);
             }
             Terminator::Return(result) => {
                 let result = result.map(|register| self.get(register));
                 match (self.function.result, result) {
                     (Some(RegisterType::Integer), Some(value)) => {
-                        let status = self.builder.ins().uextend(I64, value);
-                        self.builder.ins().return_(&[status]);
+                        let status = self.ins().uextend(I64, value);
+                        self.ins().return_(&[status]);
                     }
                     (Some(_), Some(value)) => {
-                        let status = self.builder.ins().iconst(I64, 0);
-                        self.builder.ins().return_(&[status, value]);
+                        let status = self.ins().iconst(I64, 0);
+                        self.ins().return_(&[status, value]);
                     }
                     _ => {
-                        let status = self.builder.ins().iconst(I64, 0);
+                        let status = self.ins().iconst(I64, 0);
                         self.return_status(status);
                     }
                 }
@@ -372,12 +375,12 @@ impl Translator<'_> {
     fn return_status(&mut self, status: Value) {
         let value = match self.function.result {
             None | Some(RegisterType::Integer) => None,
-            Some(RegisterType::Double) => Some(self.builder.ins().f64const(0.0)),
-            Some(RegisterType::Address) => Some(self.builder.ins().iconst(I64, 0)),
+            Some(RegisterType::Double) => Some(self.ins().f64const(0.0)),
+            Some(RegisterType::Address) => Some(self.ins().iconst(I64, 0)),
         };
         let mut values = vec![status];
         values.extend(value);
-        self.builder.ins().return_(&values);
+        self.ins().return_(&values);
     }
 
     /// Calls a function of this program at its address.
@@ -387,11 +390,8 @@ impl Translator<'_> {
             .map(|&value| self.builder.func.dfg.value_type(value))
             .collect();
         let signature = self.call_back_signature(types, result);
-        let callee = self.builder.ins().iconst(I64, code as i64);
-        let call = self
-            .builder
-            .ins()
-            .call_indirect(signature, callee, arguments);
+        let callee = self.ins().iconst(I64, code as i64);
+        let call = self.ins().call_indirect(signature, callee, arguments);
         match result {
             Some(_) => self.builder.inst_results(call)[0],
             None => callee,
@@ -424,6 +424,6 @@ impl Translator<'_> {
     }
 
     fn integer(&mut self, value: i32) -> Value {
-        self.builder.ins().iconst(I32, i64::from(value as u32))
+        self.ins().iconst(I32, i64::from(value as u32))
     }
 }

@@ -47,7 +47,7 @@ impl Translator<'_> {
         for index in 0..MOST_PARAMETERS {
             values.push(match arguments.get(index) {
                 Some(&argument) => self.get(argument),
-                None => self.builder.ins().f64const(0.0),
+                None => self.ins().f64const(0.0),
             });
         }
         let code = match distribution {
@@ -79,7 +79,7 @@ impl Translator<'_> {
         site: SiteId,
     ) -> Value {
         let value = self.call_back(code as usize, Some(F64), values);
-        let is_none = self.builder.ins().fcmp(FloatCC::Unordered, value, value);
+        let is_none = self.ins().fcmp(FloatCC::Unordered, value, value);
         self.fail_if(is_none, RunTimeErrorKind::Parameter(distribution), site);
         value
     }
@@ -90,27 +90,27 @@ impl Translator<'_> {
         let is_finite = match self.double(max) {
             Some(max) if max.is_finite() => None,
             _ => {
-                let size = self.builder.ins().fabs(max);
-                let infinity = self.builder.ins().f64const(f64::INFINITY);
-                Some(self.builder.ins().fcmp(FloatCC::LessThan, size, infinity))
+                let size = self.ins().fabs(max);
+                let infinity = self.ins().f64const(f64::INFINITY);
+                Some(self.ins().fcmp(FloatCC::LessThan, size, infinity))
             }
         };
-        let ins = self.builder.ins();
+        let ins = self.ins();
         let whole = ins.load(F64, MODEL_MEMORY, stream, word(STREAM_NEXT_WHOLE));
         let scale = 1.0 / (1_u64 << f64::MANTISSA_DIGITS) as f64;
         let value = match self.double(max) {
             // One multiplication rounds as two do where one of them is exact.
             Some(max) if max * scale >= f64::MIN_POSITIVE => {
-                let unit = self.builder.ins().f64const(max * scale);
-                self.builder.ins().fmul(whole, unit)
+                let unit = self.ins().f64const(max * scale);
+                self.ins().fmul(whole, unit)
             }
             _ => {
-                let scale = self.builder.ins().f64const(scale);
-                let part = self.builder.ins().fmul(whole, scale);
-                let value = self.builder.ins().fmul(max, part);
+                let scale = self.ins().f64const(scale);
+                let part = self.ins().fmul(whole, scale);
+                let value = self.ins().fmul(max, part);
                 // The sum is the same number, but never the negative 0.
-                let zero = self.builder.ins().f64const(0.0);
-                self.builder.ins().fadd(value, zero)
+                let zero = self.ins().f64const(0.0);
+                self.ins().fadd(value, zero)
             }
         };
         self.take_if(is_finite, stream, position, value, |this| {
@@ -123,47 +123,42 @@ impl Translator<'_> {
     fn exponential(&mut self, stream: Value, rate: Value, site: SiteId) -> Value {
         let position = self.next_number(stream);
         let (mean, is_rate) = match self.double(rate) {
-            Some(rate) if rate > 0.0 && rate.is_finite() => {
-                (self.builder.ins().f64const(1.0 / rate), None)
-            }
+            Some(rate) if rate > 0.0 && rate.is_finite() => (self.ins().f64const(1.0 / rate), None),
             _ => {
                 let (zero, infinity) = (0.0, f64::INFINITY);
-                let [zero, infinity] = [zero, infinity].map(|it| self.builder.ins().f64const(it));
-                let is_positive = self.builder.ins().fcmp(FloatCC::GreaterThan, rate, zero);
-                let is_finite = self.builder.ins().fcmp(FloatCC::LessThan, rate, infinity);
-                let is_rate = self.builder.ins().band(is_positive, is_finite);
-                let one = self.builder.ins().f64const(1.0);
-                (self.builder.ins().fdiv(one, rate), Some(is_rate))
+                let [zero, infinity] = [zero, infinity].map(|it| self.ins().f64const(it));
+                let is_positive = self.ins().fcmp(FloatCC::GreaterThan, rate, zero);
+                let is_finite = self.ins().fcmp(FloatCC::LessThan, rate, infinity);
+                let is_rate = self.ins().band(is_positive, is_finite);
+                let one = self.ins().f64const(1.0);
+                (self.ins().fdiv(one, rate), Some(is_rate))
             }
         };
-        let ins = self.builder.ins();
+        let ins = self.ins();
         let bits = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_NEXT));
         // The low bits choose a layer of the ziggurat, the high ones a place in it.
-        let layer = self.builder.ins().band_imm_s(bits, LAYERS as i64 - 1);
-        let layer = self.builder.ins().ishl_imm_u(layer, 3);
-        let high = self.builder.ins().ushr_imm_u(bits, 12);
-        let one = self.builder.ins().iconst(I64, 1.0_f64.to_bits() as i64);
-        let from_one = self.builder.ins().bor(high, one);
-        let from_one = self
-            .builder
-            .ins()
-            .bitcast(F64, MemFlagsData::new(), from_one);
-        let almost_one = self.builder.ins().f64const(1.0 - f64::EPSILON / 2.0);
-        let part = self.builder.ins().fsub(from_one, almost_one);
+        let layer = self.ins().band_imm_s(bits, LAYERS as i64 - 1);
+        let layer = self.ins().ishl_imm_u(layer, 3);
+        let high = self.ins().ushr_imm_u(bits, 12);
+        let one = self.ins().iconst(I64, 1.0_f64.to_bits() as i64);
+        let from_one = self.ins().bor(high, one);
+        let from_one = self.ins().bitcast(F64, MemFlagsData::new(), from_one);
+        let almost_one = self.ins().f64const(1.0 - f64::EPSILON / 2.0);
+        let part = self.ins().fsub(from_one, almost_one);
         let edges = exponential_edges().as_ptr() as i64;
-        let edges = self.builder.ins().iconst(I64, edges);
-        let edges = self.builder.ins().iadd(edges, layer);
-        let ins = self.builder.ins();
+        let edges = self.ins().iconst(I64, edges);
+        let edges = self.ins().iadd(edges, layer);
+        let ins = self.ins();
         let edge = ins.load(F64, MODEL_MEMORY, edges, 0);
-        let ins = self.builder.ins();
+        let ins = self.ins();
         let next_edge = ins.load(F64, MODEL_MEMORY, edges, 8);
-        let drawn = self.builder.ins().fmul(part, edge);
-        let is_inside = self.builder.ins().fcmp(FloatCC::LessThan, drawn, next_edge);
+        let drawn = self.ins().fmul(part, edge);
+        let is_inside = self.ins().fcmp(FloatCC::LessThan, drawn, next_edge);
         let is_known = match is_rate {
             None => is_inside,
-            Some(is_rate) => self.builder.ins().band(is_rate, is_inside),
+            Some(is_rate) => self.ins().band(is_rate, is_inside),
         };
-        let value = self.builder.ins().fmul(drawn, mean);
+        let value = self.ins().fmul(drawn, mean);
         self.take_if(Some(is_known), stream, position, value, |this| {
             let code = runtime::draw_one::<EXPONENTIAL> as *const ();
             this.draw_elsewhere(Distribution::Exponential, code, &[stream, rate], site)
@@ -172,41 +167,41 @@ impl Translator<'_> {
 
     /// Makes sure that there is a next number of a stream; returns how many were drawn before.
     fn next_number(&mut self, stream: Value) -> Value {
-        let ins = self.builder.ins();
+        let ins = self.ins();
         let position = ins.load(I64, MODEL_MEMORY, stream, word(STREAM_POSITION));
         let place = self.place_in_buffer(position);
         // Whoever takes the first number of the buffer fills it before.
         let (empty, full) = (self.builder.create_block(), self.builder.create_block());
         self.builder.set_cold_block(empty);
-        self.builder.ins().brif(place, full, &[], empty, &[]);
+        self.ins().brif(place, full, &[], empty, &[]);
         self.builder.switch_to_block(empty);
         self.call_back(runtime::fill as *const () as usize, None, &[stream]);
-        self.builder.ins().jump(full, &[]);
+        self.ins().jump(full, &[]);
         self.builder.switch_to_block(full);
         position
     }
 
     fn place_in_buffer(&mut self, position: Value) -> Value {
         let within = (STREAM_BUFFERED - 1) as i64;
-        self.builder.ins().band_imm_s(position, within)
+        self.ins().band_imm_s(position, within)
     }
 
     /// Takes the next number of a stream, and reads the one behind it: whoever draws that one need
     /// not wait for its place.
     fn take(&mut self, stream: Value, position: Value) {
-        let after = self.builder.ins().iadd_imm_s(position, 1);
-        let ins = self.builder.ins();
+        let after = self.ins().iadd_imm_s(position, 1);
+        let ins = self.ins();
         ins.store(MODEL_MEMORY, after, stream, word(STREAM_POSITION));
         let place = self.place_in_buffer(after);
-        let bytes = self.builder.ins().ishl_imm_u(place, 3);
-        let base = self.builder.ins().iadd(stream, bytes);
-        let ins = self.builder.ins();
+        let bytes = self.ins().ishl_imm_u(place, 3);
+        let base = self.ins().iadd(stream, bytes);
+        let ins = self.ins();
         let bits = ins.load(I64, MODEL_MEMORY, base, word(STREAM_BUFFER));
-        let ins = self.builder.ins();
+        let ins = self.ins();
         ins.store(MODEL_MEMORY, bits, stream, word(STREAM_NEXT));
-        let whole = self.builder.ins().ushr_imm_u(bits, i64::from(LOW_BITS));
-        let whole = self.builder.ins().fcvt_from_sint(F64, whole);
-        let ins = self.builder.ins();
+        let whole = self.ins().ushr_imm_u(bits, i64::from(LOW_BITS));
+        let whole = self.ins().fcvt_from_sint(F64, whole);
+        let ins = self.ins();
         ins.store(MODEL_MEMORY, whole, stream, word(STREAM_NEXT_WHOLE));
     }
 
@@ -231,13 +226,13 @@ impl Translator<'_> {
         );
         self.builder.append_block_param(done, F64);
         self.builder.set_cold_block(unknown);
-        self.builder.ins().brif(condition, known, &[], unknown, &[]);
+        self.ins().brif(condition, known, &[], unknown, &[]);
         self.builder.switch_to_block(known);
         self.take(stream, position);
-        self.builder.ins().jump(done, &[value.into()]);
+        self.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(unknown);
         let value = elsewhere(self);
-        self.builder.ins().jump(done, &[value.into()]);
+        self.ins().jump(done, &[value.into()]);
         self.builder.switch_to_block(done);
         self.builder.block_params(done)[0]
     }
