@@ -96,7 +96,7 @@ pub struct ClockAtom {
 
 impl From<FixedConstraint> for ClockAtom {
     fn from(fixed: FixedConstraint) -> ClockAtom {
-        let (left, right) = (fixed.left.into(), fixed.right.into());
+        let (left, right) = (ClockRange::one(fixed.left), ClockRange::one(fixed.right));
         ClockAtom {
             strict: fixed.strict,
             ..ClockAtom::weak(left, right, fixed.bound, fixed.bound)
@@ -132,16 +132,6 @@ impl ClockAtom {
     }
 }
 
-impl From<FixedConstraint> for ClockAtom {
-    fn from(one: FixedConstraint) -> ClockAtom {
-        let (left, right) = (ClockRange::one(one.left), ClockRange::one(one.right));
-        ClockAtom {
-            strict: one.strict,
-            ..ClockAtom::weak(left, right, one.bound, one.bound)
-        }
-    }
-}
-
 /// Consecutive clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ClockRange {
@@ -158,6 +148,11 @@ impl ClockRange {
     /// One clock.
     pub const fn one(first: ClockId) -> ClockRange {
         ClockRange { first, count: 1 }
+    }
+
+    /// Whether there is another one than the reference clock.
+    pub fn has_clock(self) -> bool {
+        self.first.0 != 0 || self.count > 1
     }
 }
 

@@ -8,6 +8,7 @@ use super::constants::Constants;
 use super::external::ExternalLibrary;
 use super::ids::{ChannelId, ClockId, EdgeId, FunctionId, LocationId, ProcessId, SiteId};
 use super::labels::{Guard, Update};
+use super::moves::Part;
 use crate::diagnostics::Span;
 
 /// A network of timed automata, instantiated and flattened.
@@ -50,6 +51,16 @@ pub struct Network {
 }
 
 impl Network {
+    /// The edges of all processes.
+    pub fn edges(&self) -> impl Iterator<Item = &Edge> {
+        self.processes.iter().flat_map(|process| &process.edges)
+    }
+
+    /// The locations of all processes.
+    pub fn locations(&self) -> impl Iterator<Item = &Location> {
+        self.processes.iter().flat_map(|process| &process.locations)
+    }
+
     /// The edge of a part of a move.
     pub fn edge(&self, part: Part) -> &Edge {
         &self.processes[part.process as usize].edges[part.edge as usize]
@@ -159,20 +170,6 @@ pub struct Location {
     pub edges: Vec<EdgeId>,
     /// Where it is declared.
     pub span: Span,
-}
-
-/// The part of one process in a move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Part {
-    /// Index of the process.
-    pub process: u32,
-    /// Index of the edge in its process.
-    pub edge: u32,
-    /// Index of the branch of the edge.
-    pub branch: u32,
-    /// Which combination of `select` values: the mixed-radix number over the bindings, the last
-    /// binding fastest.
-    pub select: u32,
 }
 
 /// An edge; with a branch point, the entry together with its legs, or with one of them.

@@ -12,8 +12,8 @@ use super::operators::to_double;
 use super::typed::{ClockEffect, ClockSet, Effects, Expr, Kind, LocalId, conjuncts};
 use super::types::{Class, Memory, Type};
 use crate::ir::{
-    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, FixedConstraint,
-    FunctionId, Guard, Relation, Update,
+    self, AssignedValue, ChannelId, ClockAssignment, ClockAtom, ClockId, ClockRange,
+    FixedConstraint, FunctionId, Guard, Relation, Update,
 };
 use crate::syntax::ast;
 

@@ -2,7 +2,6 @@
 
 use crate::exec::RunTimeError;
 use crate::ir::Network;
-pub use crate::ir::Part;
 
 pub use crate::ir::Part;
 

@@ -2,7 +2,7 @@
 
 use crate::analysis::Abstraction;
 use crate::analysis::clock_differences::greatest_constant;
-use crate::ir::{ClockAtom, ClockId, Network, Predicate};
+use crate::ir::{ClockAtom, ClockId, ClockRange, Network, Predicate};
 use crate::network::{Failure, Symbolic};
 use crate::search::limits::Counters;
 use crate::search::optimum::best_first;

@@ -27,7 +27,7 @@ use crate::game::solver::Solver;
 use crate::game::strategy::{Strategy, attractor};
 use crate::game::{Extent, Solution};
 use crate::game::{Nodes, Player};
-use crate::ir::{ClockAtom, ClockId, Control, TimeBounds};
+use crate::ir::{ClockAtom, ClockId, ClockRange, Control, TimeBounds};
 use crate::network::{Failure, Stepper};
 use crate::search::limits::{Counters, StopReason, Watch};
 use crate::search::optimum::extremum::{Extreme, Extremes};
