@@ -10,14 +10,15 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.plot.picture import COLOURS, depth_axis, outline_of
+from ntagen.plot.colours import REGIONS
+from ntagen.plot.picture import depth_axis, outline_of
 from ntagen.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _REACHED: Final = "#2a9d4a"
-_HIT: Final = "#c8283c"
+_HIT: Final = REGIONS["critical"]
 _PAPER: Final = "#6b7280"
 _LINE: Final = "#1f5fbf"
 _BAND: Final = "#9db9e6"
@@ -121,9 +122,9 @@ def felt(document: Mapping[str, Any], row: str, scene: Scene) -> Figure:
         for kind in ("detection", "target", "critical"):
             for region in scene.regions:
                 if region.kind == kind:
-                    body = {"facecolor": COLOURS[kind], "alpha": 0.25}
+                    body = {"facecolor": REGIONS[kind], "alpha": 0.25}
                     style = _SHELL if kind == "detection" else body
-                    style = {**style, "edgecolor": COLOURS[kind]}
+                    style = {**style, "edgecolor": REGIONS[kind]}
                     axes.add_patch(outline_of(region, (across, depth), style))
         x, y = [p[across] for p in places], [p[depth] for p in places]
         axes.plot(x, y, "x", color=_FELT, markersize=5, label=f"felt ({len(places)})", zorder=4)

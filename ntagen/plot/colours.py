@@ -1,4 +1,4 @@
-"""The colours of paths, the same in all pictures."""
+"""The colours of regions and paths, the same in all pictures."""
 
 from __future__ import annotations
 
@@ -9,3 +9,14 @@ OTHER: Final = "#8a94a6"
 TRUE: Final = "#0b2545"
 EXPECTED: Final = "#ffc93c"
 MEASURED: Final = "#7a3e9d"
+
+REGIONS: Final = {
+    "target": "#2a9d4a",
+    "critical": "#c8283c",
+    "detection": "#e8890c",
+    "unexplored": "#5b6472",
+    "safe": "#3fa7a0",
+}
+"""The colours of the kinds of regions."""
+OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
+"""The kinds that are drawn as outlines, and their dashes."""

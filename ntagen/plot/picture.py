@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen.plot.arrange import cells, fit_planes, fit_space
-from ntagen.plot.colours import EXPECTED, MEASURED, NEEDLE, OTHER, TRUE
+from ntagen.plot.colours import EXPECTED, MEASURED, NEEDLE, OTHER, OUTLINES, REGIONS, TRUE
 from ntagen.plot.names import write_names
 from ntagen.plot.seeming import Seeming, note_of, seeming
 from ntagen.scene import Region, Scene, Vector
@@ -28,15 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.patches import Patch
 
 _AXES: Final = "xyz"
-COLOURS: Final = {
-    "target": "#2a9d4a",
-    "critical": "#c8283c",
-    "detection": "#e8890c",
-    "unexplored": "#5b6472",
-    "safe": "#3fa7a0",
-}
-OUTLINES: Final = {"detection": (0, (4, 2)), "safe": (0, (1, 2))}
-"""The kinds that are drawn as outlines, and their dashes."""
 _LEGEND_COLUMNS: Final = 6
 _MANY_CURVES: Final = 400
 _SHADOW_POINTS: Final = 160
@@ -142,7 +133,7 @@ def draw(picture: Picture) -> Figure:
     start, end = picture.scene.needle.tip.position_mm, picture.scene.targets[-1].center_mm
     path = picture.best or (start, end)
     for axes, axis, outlines in zip(flat, across, drawn, strict=True):
-        write_names(axes, outlines, (axis, depth), path, COLOURS)
+        write_names(axes, outlines, (axis, depth), path, REGIONS)
     return figure
 
 
@@ -275,7 +266,7 @@ def _ghosts(region: Region) -> list[Region]:
 
 def _ghost_style(region: Region) -> dict[str, Any]:
     """A thin outline without a face."""
-    colour = (COLOURS[region.kind], 0.6)
+    colour = (REGIONS[region.kind], 0.6)
     label = f"{region.kind}, end of its way"
     return {
         **{"edgecolor": colour, "facecolor": "none", "linewidth": 0.7},
@@ -348,7 +339,7 @@ def _back_to_front(regions: Sequence[Region]) -> list[Region]:
 
 def face_of(region: Region, picture: Picture) -> dict[str, Any]:
     """The style of a region's disc."""
-    colour = COLOURS[region.kind]
+    colour = REGIONS[region.kind]
     label: str = region.kind
     style: dict[str, Any] = {"edgecolor": colour, "linewidth": 1.2, "zorder": 2}
     if region.kind in OUTLINES:
@@ -476,7 +467,7 @@ def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: A
         points, triangles = skin(region.shape)
         if len(triangles):
             mesh = [points[:, i] for i in order]
-            face = COLOURS[region.kind]
+            face = REGIONS[region.kind]
             alpha = 0.08 if region.kind in OUTLINES else 0.25
             axes.plot_trisurf(
                 *mesh[:2], mesh[2], triangles=triangles, color=face, alpha=alpha, linewidth=0
@@ -485,7 +476,7 @@ def _draw_solid(axes: Any, region: Region, order: list[int]) -> None:  # noqa: A
     grid = directions()
     points = outline_mm(region.shape, grid.reshape(-1, 3)).reshape(grid.shape)
     surface = [points[..., i] for i in order]
-    colour = COLOURS[region.kind]
+    colour = REGIONS[region.kind]
     if region.kind in OUTLINES:
         axes.plot_wireframe(*surface, color=colour, linewidth=0.35, alpha=0.45, linestyle="--")
     else:

@@ -17,8 +17,8 @@ from typing import Any, Final
 
 from ntagen.files import write_files
 from ntagen.needle.vectors import cross
-from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, TRUE
-from ntagen.plot.picture import COLOURS, GAP_MM, OUTLINES, Curve, Picture, bounds_mm, depth_axis
+from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, OUTLINES, REGIONS, TRUE
+from ntagen.plot.picture import GAP_MM, Curve, Picture, bounds_mm, depth_axis
 from ntagen.scene import Region, Vector
 from ntagen.shapes import triangles, vector_of
 
@@ -120,7 +120,7 @@ def _region(region: Region, picture: Picture) -> dict[str, Any]:
     return {
         "name": region.name,
         "note": note,
-        "colour": COLOURS[region.kind],
+        "colour": REGIONS[region.kind],
         "alpha": 0.07 if region.kind in OUTLINES else 0.2,
         "from": picture.appears_s.get(region.name),
         "points": [_point(vector_of(point)) for point in points],

@@ -1,5 +1,6 @@
 //! The zone graph: delay, successors, predicates and deadlocks of symbolic states.
 
+pub(super) mod allowed_moves;
 pub(super) mod clock_effect;
 pub(super) mod constant_effect;
 pub(super) mod deadlock;
