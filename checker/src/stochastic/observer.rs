@@ -12,6 +12,19 @@ use crate::ir::{Asked, Path};
 /// The changes of a condition that are followed within one delay.
 const MOST_CHANGES: usize = 1_000_000;
 
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// The extreme value that was asked for; or 1 if the run has what a path says, and else 0.
+    pub value: f64,
+    /// When that was decided, in units of the model.
+    pub time: f64,
+    /// How many moves it took.
+    pub moves: u64,
+    /// What bounds the run, when that was decided: its time, the value of a clock, or its moves.
+    pub at: f64,
+}
+
 /// Looks at the states of a run.
 pub(super) enum Observer<'q> {
     /// No formula with operators over time.

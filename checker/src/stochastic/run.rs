@@ -9,7 +9,7 @@ use super::behaviour::Behaviour;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
 use super::failure::Failure;
 use super::machine::Machine;
-use super::observer::{Observer, watched};
+use super::observer::{Observer, Outcome, watched};
 use super::program::Program;
 use super::race::Race;
 use super::race_code::{RaceCode, Stages, Watched};
@@ -17,19 +17,6 @@ use super::run_id::RunId;
 use crate::cancellation;
 use crate::exec::Executor;
 use crate::ir::{Asked, Network, Path, RunBound, RunLimit, Simulation};
-
-/// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
-    /// The extreme value that was asked for; or 1 if the run has what a path says, and else 0.
-    pub value: f64,
-    /// When that was decided, in units of the model.
-    pub time: f64,
-    /// How many moves it took.
-    pub moves: u64,
-    /// What bounds the run, when that was decided: its time, the value of a clock, or its moves.
-    pub at: f64,
-}
 
 /// The values of expressions during a run.
 #[derive(Clone, Debug, PartialEq)]

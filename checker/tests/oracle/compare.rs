@@ -233,8 +233,8 @@ pub(crate) fn check_witnesses(
     Ok(())
 }
 
-/// The options for a query whose answer comes with a certificate, by one number of threads after the
-/// other.
+/// The options for a query whose answer comes with a certificate, by one number of threads after
+/// the other.
 pub(crate) fn certifying(text: &str, query: &str) -> Options {
     Options {
         certificate: true,

@@ -2,8 +2,8 @@
 //! exploration of regions.
 //!
 //! The explicit side knows the definitions only (`checker::verify::concrete`, or for some tests the
-//! tree that the network was generated as): it shares nothing with the engine's moves, zones, search
-//! and games. Formulas are evaluated on the tree they were
+//! tree that the network was generated as): it shares nothing with the engine's moves, zones,
+//! search and games. Formulas are evaluated on the tree they were
 //! generated as, not on compiled queries.
 //!
 //! `NTAGEN_CASES` says how many networks each test tries, `NTAGEN_SEED` from which seed.

@@ -14,8 +14,8 @@ use crate::ir::{
 };
 use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
+use crate::stochastic::observer::Outcome;
 use crate::stochastic::program::{Program, Spot};
-use crate::stochastic::run::Outcome;
 use crate::stochastic::run_id::RunId;
 
 /// A race of more instructions is not written as code.

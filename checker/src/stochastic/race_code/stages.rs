@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::runs::{RaceCode, WrittenRace};
 use super::watching::Watched;
 use crate::exec::Executor;
+use crate::stochastic::observer::Outcome;
 use crate::stochastic::program::Program;
-use crate::stochastic::run::Outcome;
 use crate::stochastic::run_id::RunId;
 
 /// The moves before it is looked at whether there is code for a race.
