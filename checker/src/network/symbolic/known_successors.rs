@@ -92,7 +92,13 @@ impl<'a> Symbolic<'a> {
         if let Some(outcome) = found {
             return Ok(self.memo.result(outcome, zone));
         }
-        let outcome = self.new_outcome((known.zone, effect), words, source, may_delay, zone)?;
+        let empty = ZoneOutcome {
+            zone: known.zone,
+            effect,
+            entered: NOTHING,
+            kept: NOTHING,
+        };
+        let outcome = self.completed(empty, words, source, may_delay, zone)?;
         if self.is_known(known) {
             self.memo.insert(outcome);
         }
@@ -152,21 +158,15 @@ impl<'a> Symbolic<'a> {
             && dbm::constrain_all(zone, dimension, &self.invariant))
     }
 
-    /// What the current effect makes of a zone, with the wait after it.
-    fn new_outcome(
+    /// The outcome of the current effect on a zone, with the wait after it.
+    fn completed(
         &mut self,
-        (source_id, effect): (ZoneId, u32),
+        mut outcome: ZoneOutcome,
         words: &[i32],
         source: &[Bound],
         may_delay: bool,
         zone: &mut [Bound],
     ) -> Result<ZoneOutcome, Failure> {
-        let mut outcome = ZoneOutcome {
-            zone: source_id,
-            effect,
-            entered: NOTHING,
-            kept: NOTHING,
-        };
         if self.apply_effect(source, zone)? {
             self.delay_by_invariant(words, may_delay, zone)?;
             // A single state may have any number of successors.
