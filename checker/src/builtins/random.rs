@@ -56,13 +56,14 @@ pub(crate) const LOW_BITS: u32 = u64::BITS - f64::MANTISSA_DIGITS;
 /// The random numbers of a run, over the words that hold their state. Words that are all 0 are the
 /// start of run 0 with seed 0.
 #[derive(Debug)]
-pub struct Stream<'a>(&'a mut [i32]);
+pub struct Stream<'a>(&'a mut [i32; STREAM_WORDS]);
 
 impl<'a> Stream<'a> {
     /// The stream that these [`STREAM_WORDS`] words hold.
     #[inline]
     pub fn of(words: &'a mut [i32]) -> Stream<'a> {
-        Stream(&mut words[..STREAM_WORDS])
+        let words = words.first_chunk_mut();
+        Stream(words.expect("a state has all words of its stream"))
     }
 
     /// Makes the first [`STREAM_WORDS`] words the start of a run, and returns its stream.

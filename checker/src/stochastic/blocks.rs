@@ -118,6 +118,27 @@ fn read_byte(from: &mut &[u8]) -> Option<u8> {
     Some(*byte)
 }
 
+/// A number in bytes of 7 bits, the lowest first (LEB128).
+fn write_number(mut number: u64, to: &mut Vec<u8>) {
+    while number >= 0x80 {
+        to.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    to.push(number as u8);
+}
+
+fn read_number(from: &mut &[u8]) -> Option<u64> {
+    let mut number = 0_u64;
+    for shift in (0..u64::BITS).step_by(7) {
+        let byte = read_byte(from)?;
+        number |= u64::from(byte & 0x7f).checked_shl(shift)?;
+        if byte & 0x80 == 0 {
+            return Some(number);
+        }
+    }
+    None
+}
+
 /// Writes results, each with how often it comes.
 struct Writer<T> {
     bytes: Vec<u8>,
@@ -137,7 +158,7 @@ impl<T: Transferred> Writer<T> {
 
     fn finish_last(&mut self) {
         if let Some((result, count)) = self.last.take() {
-            self.bytes.extend(count.to_le_bytes());
+            write_number(count, &mut self.bytes);
             result.write(&mut self.bytes);
         }
     }
@@ -145,7 +166,7 @@ impl<T: Transferred> Writer<T> {
     /// Marks that the next run failed.
     fn fail(&mut self) {
         self.finish_last();
-        self.bytes.extend(0_u64.to_le_bytes());
+        write_number(0, &mut self.bytes);
     }
 }
 
@@ -278,26 +299,17 @@ pub(super) fn from_anywhere<T: Transferred + Shows + Send>(
 
 /// Takes a result from the front, and how often it comes. If there is none, nothing is left.
 fn read<T: Transferred>(from: &mut &[u8]) -> Option<(T, u64)> {
-    let result = read_counted(from);
+    let count = read_number(from).filter(|count| *count > 0);
+    let result = count.and_then(|count| Some((T::read(from)?, count)));
     if result.is_none() {
         *from = &[];
     }
     result
 }
 
-fn read_counted<T: Transferred>(from: &mut &[u8]) -> Option<(T, u64)> {
-    let (count, rest) = from.split_first_chunk()?;
-    *from = rest;
-    let count = u64::from_le_bytes(*count);
-    (count > 0)
-        .then(|| T::read(from))
-        .flatten()
-        .map(|result| (result, count))
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Shown, Transferred, Writer, read};
+    use super::{Shown, Transferred, Writer, read, read_number, write_number};
 
     fn written<T: Transferred>(results: &[T]) -> Vec<u8> {
         let mut writer = Writer {
@@ -338,10 +350,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_is_refused() {
-        let whole = written(&[Shown::Value(7.0)]);
-        for length in 0..whole.len() {
-            assert!(all::<Shown>(&whole[..length]).is_empty(), "cut at {length}");
+    fn numbers_of_any_size_come_back_and_others_are_refused() {
+        for number in [0, 1, 127, 128, 300, u64::from(u32::MAX), u64::MAX] {
+            let mut bytes = Vec::new();
+            write_number(number, &mut bytes);
+            assert_eq!(read_number(&mut &bytes[..]), Some(number));
+            bytes.pop();
+            assert_eq!(read_number(&mut &bytes[..]), None, "{number} is cut");
         }
+        assert_eq!(read_number(&mut &[0xff_u8; 11][..]), None);
     }
 }
