@@ -59,7 +59,7 @@ test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && $(BIN)/python -m pytest --numprocesses=auto --dist=worksteal
 
 .PHONY: quick
-quick: $(INSTALLED) ## Run the tests that take at most a few seconds each, Rust and Python side by side
+quick: $(INSTALLED) ## Run the tests of single modules that take at most two seconds each, Rust and Python side by side
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-rust quick-python
 
 .PHONY: quick-rust
@@ -68,7 +68,7 @@ quick-rust: $(RUST)
 
 .PHONY: quick-python
 quick-python: $(INSTALLED)
-	$(BIN)/python -m pytest -m 'not slow' --hypothesis-profile=quick --numprocesses=auto --dist=worksteal
+	$(BIN)/python -m pytest tests/unit tests/test_*.py -m 'not slow' --hypothesis-profile=quick --numprocesses=auto --dist=worksteal
 
 .PHONY: lint
 lint: $(INSTALLED) ## Check formats, lints and types

@@ -28,6 +28,7 @@ def made(tmp_path: Path, folder: str, script: str) -> Path:
     return copy
 
 
+@pytest.mark.slow
 def test_the_script_makes_the_segmentation(tmp_path: Path) -> None:
     """Compressed bytes may differ between versions of zlib; what is in them may not."""
     new = made(tmp_path, "segmentation", "make_segmentation.py") / "biopsy.seg.nrrd"

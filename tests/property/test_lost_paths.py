@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -41,6 +42,7 @@ def wins(scene: Scene, radius_mm: float, *, only_plans: bool) -> bool:
     return answer.verdict == "satisfied"
 
 
+@pytest.mark.slow
 @settings(max_examples=examples(40), deadline=None)
 @given(answered())
 def test_the_least_target_that_is_reached_stays(scene: Scene) -> None:

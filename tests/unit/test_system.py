@@ -62,6 +62,7 @@ def test_texts_are_written_with_the_characters_that_a_pipe_has() -> None:
     assert r"\u2264" in found.stdout
 
 
+@pytest.mark.slow
 def test_tasks_are_formatted_drawn_and_driven(tmp_path: Path) -> None:
     task = tmp_path / "task.nsl"
     text = (ROOT / "examples" / "paper.nsl").read_text()

@@ -35,6 +35,7 @@ def model(tmp_path: Path) -> Model:
     return load_file(path)
 
 
+@pytest.mark.slow
 def test_a_rare_event_has_an_interval(model: Model) -> None:
     answer = model.check(RUIN, levels="n", effort=200, repetitions=30, seed=1)
     estimate = answer.estimate

@@ -42,6 +42,7 @@ def test_the_emulated_device_is_found_by_its_terminal(capsys: pytest.CaptureFixt
     assert out.endswith("nothing was moved\n")
 
 
+@pytest.mark.slow
 def test_a_device_moves_only_when_that_is_agreed(capsys: pytest.CaptureFixture[str]) -> None:
     emulator = Emulator(GRBL_11H)
     emulator.power_on()

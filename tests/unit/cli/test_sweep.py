@@ -14,6 +14,7 @@ QUICK = ["sweep", str(SCENARIOS / "no_cr.nsl"), "--needle", "virtual", "--runs",
 NOISE = ["--over", "noise", "--values", "0.1,0.5mm"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 def test_a_sweep_is_driven_and_drawn_and_goes_on(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

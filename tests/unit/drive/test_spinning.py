@@ -208,6 +208,7 @@ def driven(name: str, journal: Journals, seed: int = 1, settings: Settings = SLO
     return simulate(DEEP, synthesiser_for(settings), settings, journal, make=needle.make, seed=seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["virtual", "phantom", "grbl+sim"])
 def test_a_deep_target_is_reached_and_decided_again(name: str, tmp_path: Path) -> None:
     path, diary = tmp_path / "run.mcap", Diary()

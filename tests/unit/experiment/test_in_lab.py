@@ -136,6 +136,7 @@ def test_the_clock_of_the_driver_runs_at_the_rate_that_is_said(
     assert shown == pytest.approx([0.0, 10.0, 11.0, 14.0, 15.0])
 
 
+@pytest.mark.slow
 def test_a_run_opens_a_lab_reaches_the_target_and_leaves_nothing_open(tmp_path: Path) -> None:
     text = '[[row]]\nid = "near"\nscenario = "near.nsl"\nneedle = "lab"\nspeed = 10\nseeds = 1\n'
     file = written(tmp_path, text)

@@ -169,6 +169,7 @@ def test_units_of_force_become_newtons() -> None:
 # Properties of the stream.
 
 
+@pytest.mark.slow
 @given(st.lists(packets(), max_size=5), st.data())
 def test_every_way_to_cut_a_stream_gives_the_same_messages(
     sent: list[Packet], data: st.DataObject
@@ -186,6 +187,7 @@ def test_single_bytes_give_the_same_messages() -> None:
     assert read(stream, range(len(stream)))[0] == sent
 
 
+@pytest.mark.slow
 @given(packets(), packets(), st.data())
 def test_a_message_with_a_wrong_checksum_is_skipped_whole(
     broken: Packet, good: Packet, data: st.DataObject

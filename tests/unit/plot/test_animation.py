@@ -26,6 +26,8 @@ from ntagen.plot.run import picture_of_plans
 from ntagen.plot.viewer import data_of, page_of
 from tests.steering import PAPER
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[3] / "examples"
 RIBS = EXAMPLES / "ribs" / "ribs.nsl"
 PAPER_FILE = EXAMPLES / "paper.nsl"

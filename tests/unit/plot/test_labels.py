@@ -126,6 +126,7 @@ def test_a_name_stands_at_its_region_and_not_on_the_path() -> None:
             assert away <= reach[0] + box.width + 4
 
 
+@pytest.mark.slow
 def test_of_many_regions_the_nearest_are_named() -> None:
     crowd = [
         sphere(f"C{i}_{j}", "critical", (4.0 * i, -3.0 * j - 5.0, 6.0), 1.0)

@@ -197,6 +197,7 @@ def test_each_such_task_has_the_questions_about_its_strategy() -> None:
     assert [line for line in lines if line in names] == names
 
 
+@pytest.mark.slow
 def test_under_the_strategy_the_true_tip_does_its_plan() -> None:
     """There is one plan, so the model of this plan must say the same."""
     text = BALLS.replace("tissue stochastic", "motion { roll by 180 deg at most 0 times }").replace(

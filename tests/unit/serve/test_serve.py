@@ -171,6 +171,7 @@ def test_a_model_is_checked(server: Server) -> None:
     assert "When you are in" in report["strategy"]
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn(server: Server) -> None:
     number = dropped(server, "game.xta", GAME)
     for wish, says in (
@@ -361,6 +362,7 @@ def test_a_search_has_limits() -> None:
     assert (report["exit"], report["answers"][0]["stop"]) == (3, "time")
 
 
+@pytest.mark.slow
 def test_a_worker_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jobs, "_LATE_S", -18.0)
     monkeypatch.setattr(jobs, "_LATE", -1.0)

@@ -36,6 +36,7 @@ def module() -> Any:
 MYSTAGE = module()
 
 
+@pytest.mark.slow
 def test_the_example_keeps_the_protocol() -> None:
     with MYSTAGE.open_stage("simulated", SPEEDS) as stage:
         require(device_contract(stage, SPEEDS, length_mm=0.6))
@@ -249,6 +250,7 @@ TRACKERS: dict[str, tuple[Callable[[], Sensor], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRACKERS)
 def test_each_mistake_of_a_tracker_is_found(name: str) -> None:
     make, says = TRACKERS[name]

@@ -155,6 +155,7 @@ def test_no_single_exchange_of_a_roll_is_better(seed: int) -> None:
 # The start.
 
 
+@pytest.mark.slow
 def test_the_model_finds_a_better_start_than_the_fit_of_the_first_part() -> None:
     """What the paper assumes of the earlier work: its start was the reason for less deviation."""
     free, model, fit = [], [], []
