@@ -59,7 +59,7 @@ test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && $(BIN)/python -m pytest --numprocesses=auto --dist=worksteal
 
 .PHONY: quick
-quick: $(INSTALLED) ## Run the tests of single modules that take at most two seconds each, Rust and Python side by side
+quick: $(INSTALLED) ## Run the tests of single modules that take at most a second or so each, Rust and Python side by side
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-rust quick-python
 
 .PHONY: quick-rust

@@ -64,6 +64,7 @@ def test_queries_are_tests_and_a_failure_shows_the_trace(tmp_path: Path) -> None
     assert (code, "1 passed" in out) == (0, True)
 
 
+@pytest.mark.slow
 def test_only_models_that_are_asked_for_are_collected(tmp_path: Path) -> None:
     for folder in ("models", "reports"):
         (tmp_path / folder).mkdir()
@@ -80,6 +81,7 @@ def test_only_models_that_are_asked_for_are_collected(tmp_path: Path) -> None:
     assert "this XML file is not a UPPAAL model: its root is `<testsuites>`" in out
 
 
+@pytest.mark.slow
 def test_a_query_under_a_strategy_can_be_tested_alone(tmp_path: Path) -> None:
     (tmp_path / "game.xta").write_text(GAME)
     (tmp_path / "game.q").write_text(

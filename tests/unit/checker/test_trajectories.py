@@ -54,6 +54,7 @@ def test_infinite_values_stay_infinite() -> None:
     assert one.at([1.0, 2.0, 2.5])["v"].tolist() == [np.inf, 1.0, 1.5]
 
 
+@pytest.mark.slow
 def test_the_share_of_runs_over_time_is_the_probability(model: Model) -> None:
     answer = model.check("simulate[<=6; 4000]{Q.B, n}")
     found = answer.frequency_over_time(times=[0, 1, 2.5, 3, 3.5, 5], quantiles=(0.1, 0.9))

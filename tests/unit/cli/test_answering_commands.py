@@ -44,6 +44,7 @@ def check_refused(capsys: pytest.CaptureFixture[str], says: str, *arguments: str
     assert "Traceback" not in err
 
 
+@pytest.mark.slow
 def test_drive_follows_a_strategy_and_says_what_held(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

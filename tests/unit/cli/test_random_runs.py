@@ -121,6 +121,7 @@ def test_verifyta_prints_the_histogram(
     assert lines[1] == "Values in [9,9] mean=9 steps=1: 10"
 
 
+@pytest.mark.slow
 def test_ctrl_c_gives_the_result_so_far(path: str, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["check", path, "--query", REACHED.replace("4]", "3]"), "--query", "E<> Q.B", *ENDLESS]
     with interrupted_after(0.4):
@@ -227,6 +228,7 @@ def test_json_says_how_often_it_holds_at_each_moment(
     assert "over_time" not in json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
 @pytest.mark.parametrize("query", [REACHED, "E[<=1; 40](max: n)", "simulate[<=3; 20]{n, Q.B}"])
 def test_plot_draws_random_runs(path: str, tmp_path: Path, ending: str, query: str) -> None:

@@ -59,6 +59,7 @@ def drive(name: str, make: Maker | None = None) -> tuple[Result, Diary]:
     return result, diary
 
 
+@pytest.mark.slow
 def test_the_same_decisions_are_made_behind_the_controller() -> None:
     plain, plain_diary = drive("phantom")
     result, diary = drive("grbl+sim")

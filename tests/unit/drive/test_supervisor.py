@@ -180,6 +180,7 @@ def test_a_violation_ends_the_push_at_once_and_the_driver_plans_from_there(
     assert made.ended.outcome == State.TARGET_REACHED.value
 
 
+@pytest.mark.slow
 def test_a_violation_that_stays_makes_the_driver_pull_back() -> None:
     stepped, live = bench()
     live.after_mm, live.is_gone_behind = 12.1, True

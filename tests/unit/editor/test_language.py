@@ -112,6 +112,7 @@ def test_names_are_listed() -> None:
     assert PAPER[one.start : one.end] == "target    T1"
 
 
+@pytest.mark.slow
 def test_any_text_on_the_way_has_answers() -> None:
     text = PAPER + '}} { drive { \N{ROCKET} query " /* '
     for end in range(0, len(text), 7):

@@ -70,6 +70,7 @@ def test_the_table_has_rates_and_spreads(whole: tuple[Path, Mapping[str, Any]]) 
     assert len(lines) == 3
 
 
+@pytest.mark.slow
 def test_sections_drawn_beside_the_runs_are_those_of_the_whole_table(tmp_path: Path) -> None:
     experiment = read_experiment(written(tmp_path))
     made = carry_out(experiment, tmp_path / "x", Backwards)
@@ -122,6 +123,7 @@ def test_an_experiment_goes_on_without_repeating_or_losing_runs(
     assert timeless(document) == timeless(whole[1])
 
 
+@pytest.mark.slow
 def test_torn_lines_and_lost_logs_are_made_again(
     whole: tuple[Path, Mapping[str, Any]], tmp_path: Path
 ) -> None:
@@ -148,6 +150,7 @@ def test_more_runs_can_be_added(tmp_path: Path) -> None:
     assert document["rows"][0]["runs"] == 3
 
 
+@pytest.mark.slow
 def test_a_finished_experiment_needs_nobody(tmp_path: Path) -> None:
     made(tmp_path)
 
@@ -166,6 +169,7 @@ def test_what_ended_before_its_first_run_leaves_no_claim(tmp_path: Path) -> None
     assert len(made(tmp_path)["runs"]) == 5
 
 
+@pytest.mark.slow
 def test_a_folder_with_an_experiment_is_refused(tmp_path: Path) -> None:
     made(tmp_path)
     with pytest.raises(InputError, match=r"holds an experiment already\nhint: .*--resume"):
@@ -214,6 +218,7 @@ def test_two_experiments_in_one_folder_are_refused(tmp_path: Path) -> None:
         made(tmp_path, resume=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_loses_nothing(
     whole: tuple[Path, Mapping[str, Any]], tmp_path: Path
 ) -> None:

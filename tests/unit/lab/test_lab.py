@@ -76,6 +76,7 @@ def test_a_driver_that_is_started_again_finds_the_axes_where_they_stand() -> Non
     assert 15.0 < truth.clearance_mm < 23.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["virtual", "phantom"])
 def test_the_tip_is_seen_in_the_middle_of_a_motion(name: str) -> None:
     seen: list[Measurement] = []
@@ -182,6 +183,7 @@ def test_the_axes_of_a_task_are_those_of_the_lab() -> None:
         Lab(PAPER, place("virtual", PAPER, 1, 2.0), axes=Axes(roll=Axis("B")))
 
 
+@pytest.mark.slow
 def test_the_command_says_how_to_drive_and_then_the_truth() -> None:
     words = [sys.executable, "-m", "ntagen", "device", "simulate", str(EXAMPLE), "--json"]
     with subprocess.Popen([*words, "--speed", "20"], stdout=subprocess.PIPE, text=True) as process:
@@ -201,6 +203,7 @@ def test_the_command_says_how_to_drive_and_then_the_truth() -> None:
     assert distance(tuple(truth["tip_mm"]), ENTRY_MM) == pytest.approx(3.0, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_lab_closes_when_nothing_has_moved_for_some_time(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

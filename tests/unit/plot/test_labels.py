@@ -86,6 +86,7 @@ def names(figure: Figure) -> list[set[str]]:
     return [{text.get_text() for text in axes.texts if isinstance(text, Text)} for axes in planes]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", [PAPER, scene()], ids=["paper", "target"])
 def test_texts_of_a_picture_stand_apart(where: Scene) -> None:
     check_apart(draw(Picture(where)))

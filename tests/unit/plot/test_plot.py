@@ -68,6 +68,7 @@ def test_the_caption_says_what_the_best_plan_is() -> None:
     assert picture_of_plans(PAPER, none, 5).caption == "no plan found"
 
 
+@pytest.mark.slow
 def test_a_run_shows_truth_measurements_and_what_was_learned(tmp_path: Path) -> None:
     shown = labels(run_picture(tmp_path))
     assert {"true path", "measured", "last plan", "critical (learned)"} <= shown

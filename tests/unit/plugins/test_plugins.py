@@ -347,6 +347,7 @@ def test_a_halted_motion_without_a_part_is_a_fault() -> None:
         device.push(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [None, OSError("stopped")])
 def test_a_device_that_does_not_call_its_watch_is_stopped(error: Exception | None) -> None:
     class Deaf(Inner):

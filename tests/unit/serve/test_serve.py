@@ -192,6 +192,7 @@ def test_pictures_are_drawn(server: Server) -> None:
         assert "script-src" not in headers["Content-Security-Policy"]
 
 
+@pytest.mark.slow
 def test_an_environment_is_checked_and_drawn(server: Server) -> None:
     number = dropped(server, "paper.nsl", PAPER)
     report = ended(server, started(server, number, action="check"))
@@ -248,6 +249,7 @@ def test_a_browser_that_goes_away_leaves_no_words(
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_what_is_no_model_is_said(server: Server) -> None:
     for name, data, says in (
         ("a.xml", b"hello", "this text is not a UPPAAL model"),

@@ -114,6 +114,7 @@ def check_bound(name: str, is_inner: bool, count: int) -> None:
     assert over.min() < -0.2 * one.field.error_mm, "the stated error is far too great"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_inner", [False, True])
 @pytest.mark.parametrize("name", NAMES)
 def test_distances_are_safe_and_within_their_error(name: str, is_inner: bool) -> None:
@@ -127,6 +128,7 @@ def test_many_distances_are_safe_and_within_their_error(name: str, is_inner: boo
     check_bound(name, is_inner, 20_000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_samples_are_right_to_their_doubt(name: str) -> None:
     one = case(name)
@@ -138,6 +140,7 @@ def test_samples_are_right_to_their_doubt(name: str) -> None:
     assert np.abs(samples - one.true_mm(world)).max() <= one.field.sample_doubt_mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_distances_far_away_are_sharp(name: str) -> None:
     """At three steps from a surface, the bound loses a third of a millimetre, not a diagonal."""
@@ -159,6 +162,7 @@ def test_distances_beyond_the_grid_are_safe(name: str) -> None:
     assert (one.field.distance_mm(points) <= one.true_mm(points) + 1e-6).all()
 
 
+@pytest.mark.slow
 def test_a_grid_that_the_needle_does_not_reach_is_safe() -> None:
     """The needle is so short that the grid has a part of the ring only."""
     space = replace(SPACE, length_mm=26.0)
@@ -193,6 +197,7 @@ def test_placed_fields_move_with_their_points(name: str) -> None:
     assert (there[inside] <= high).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_volumes_are_those_of_the_solid(name: str) -> None:
     """The share of random points that the oracle has inside."""
