@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use checker::exec::{Executor, Jit};
 use checker::ir::{Asked, Network, Statistical};
-use checker::stochastic::{Precision, RunId, Runner, estimate};
+use checker::stochastic::{Behaviour, Precision, RunId, RunWatch, Runner, Runs, Shown, estimate};
 
 use statistical::{DEVIATIONS, Measured, load};
 use support::Scratch;
@@ -203,6 +203,17 @@ fn measure(case: &Case, program: &Path, runs: u64) -> Result<(), Box<dyn Error>>
     Ok(())
 }
 
+/// Lets all runs be made.
+struct Unwatched;
+
+impl RunWatch for Unwatched {
+    fn see(&mut self, _: Shown) {}
+
+    fn ends(&mut self, _: u64) -> bool {
+        false
+    }
+}
+
 fn run(
     network: &Network,
     executor: &dyn Executor,
@@ -215,7 +226,11 @@ fn run(
         ..Precision::default()
     };
     let begin = Instant::now();
-    let estimate = estimate(network, executor, query, &precision, |_| false);
+    let runs = Runs {
+        behaviour: Behaviour::new(network, executor),
+        source: None,
+    };
+    let estimate = estimate(runs, query, &precision, &mut Unwatched);
     Measured {
         seconds: begin.elapsed().as_secs_f64(),
         satisfied: estimate

@@ -38,20 +38,8 @@ pub struct Runs<'a> {
     pub source: Option<&'a RunSource>,
 }
 
-impl<'a> From<Behaviour<'a>> for Runs<'a> {
-    fn from(behaviour: Behaviour<'a>) -> Runs<'a> {
-        Runs {
-            behaviour,
-            source: None,
-        }
-    }
-}
-
 /// The result of a run that can be written as bytes.
 pub(super) trait Transferred: Copy {
-    /// Whether two results are the same to the last bit.
-    fn is(self, other: Self) -> bool;
-
     fn write(self, to: &mut Vec<u8>);
 
     /// Takes a result from the front; `None` if there is none.
@@ -63,14 +51,6 @@ const SATISFIED: u8 = 1;
 const VALUE: u8 = 2;
 
 impl Transferred for Shown {
-    fn is(self, other: Shown) -> bool {
-        let parts = |shown| match shown {
-            Shown::Decided { satisfied, at } => (u8::from(satisfied), at.to_bits()),
-            Shown::Value(value) => (VALUE, value.to_bits()),
-        };
-        parts(self) == parts(other)
-    }
-
     fn write(self, to: &mut Vec<u8>) {
         let (kind, number) = match self {
             Shown::Decided { satisfied, at } => (u8::from(satisfied), at),
@@ -98,10 +78,6 @@ impl Transferred for Shown {
 
 /// Whether the two runs of a pair have what was asked.
 impl Transferred for (bool, bool) {
-    fn is(self, other: (bool, bool)) -> bool {
-        self == other
-    }
-
     fn write(self, to: &mut Vec<u8>) {
         to.push(u8::from(self.0) | u8::from(self.1) << 1);
     }
@@ -140,26 +116,29 @@ fn read_number(from: &mut &[u8]) -> Option<u64> {
 }
 
 /// Writes results, each with how often it comes.
-struct Writer<T> {
+#[derive(Default)]
+struct Writer {
     bytes: Vec<u8>,
-    last: Option<(T, u64)>,
+    /// The bytes of the last result, and how often it has come so far.
+    last: (Vec<u8>, u64),
 }
 
-impl<T: Transferred> Writer<T> {
-    fn push(&mut self, result: T) {
-        match &mut self.last {
-            Some((last, count)) if last.is(result) => *count += 1,
-            _ => {
-                self.finish_last();
-                self.last = Some((result, 1));
-            }
+impl Writer {
+    fn push(&mut self, result: impl Transferred) {
+        let mut written = Vec::new();
+        result.write(&mut written);
+        if written != self.last.0 {
+            self.finish_last();
+            self.last.0 = written;
         }
+        self.last.1 += 1;
     }
 
     fn finish_last(&mut self) {
-        if let Some((result, count)) = self.last.take() {
+        let (result, count) = std::mem::take(&mut self.last);
+        if count > 0 {
             write_number(count, &mut self.bytes);
-            result.write(&mut self.bytes);
+            self.bytes.extend(result);
         }
     }
 
@@ -204,10 +183,7 @@ fn written<T: Transferred>(
     numbers: Range<u64>,
     mut run: impl FnMut(u64) -> Result<T, Failure>,
 ) -> (Vec<u8>, Option<Failure>) {
-    let mut writer = Writer {
-        bytes: Vec::new(),
-        last: None,
-    };
+    let mut writer = Writer::default();
     for number in numbers {
         match run(number) {
             Ok(result) => writer.push(result),
@@ -312,10 +288,7 @@ mod tests {
     use super::{Shown, Transferred, Writer, read, read_number, write_number};
 
     fn written<T: Transferred>(results: &[T]) -> Vec<u8> {
-        let mut writer = Writer {
-            bytes: Vec::new(),
-            last: None,
-        };
+        let mut writer = Writer::default();
         for result in results {
             writer.push(*result);
         }
@@ -344,7 +317,11 @@ mod tests {
         shown.extend([Shown::Value(7.0); 1000]);
         let found = all::<Shown>(&written(&shown));
         assert_eq!(found.len(), shown.len());
-        assert!(found.iter().zip(&shown).all(|(one, other)| one.is(*other)));
+        let bits = |one: &Shown| match *one {
+            Shown::Decided { satisfied, at } => (Some(satisfied), at.to_bits()),
+            Shown::Value(value) => (None, value.to_bits()),
+        };
+        assert!(found.iter().map(bits).eq(shown.iter().map(bits)));
         let pairs: Vec<(bool, bool)> = (0..64).map(|i| (i % 3 == 0, i % 16 < 8)).collect();
         assert_eq!(all::<(bool, bool)>(&written(&pairs)), pairs);
     }

@@ -2,18 +2,16 @@
 //!
 //! Results come in the order of run numbers, so what is said does not depend on threads.
 
-use super::behaviour::Behaviour;
 use super::blocks::{Runs, from_anywhere, shown};
 use super::failure::Failure;
 use super::precision::{Estimate, MeanMethod, Precision};
 use super::run_id::RunId;
-use super::run_watch::{Ends, RunWatch, Shown};
+use super::run_watch::{RunWatch, Shown};
 use super::statistics::{
     BoundedMean, Decision, Distribution, Expectation, FixedWidth, Interval, Method,
     ProbabilitySequence, SequentialTest, clopper_pearson,
 };
-use crate::exec::Executor;
-use crate::ir::{Network, Statistical};
+use crate::ir::Statistical;
 
 /// The results of runs, for one query.
 #[derive(Clone, Debug)]
@@ -246,27 +244,12 @@ impl Collector {
     }
 }
 
-/// Answers a statistical query; `ends` is asked now and then, with the number of runs so far.
-///
-/// # Errors
-/// A run failed: the one with the least number.
-pub fn estimate(
-    network: &Network,
-    executor: &dyn Executor,
-    query: &Statistical,
-    precision: &Precision,
-    ends: impl FnMut(u64) -> bool,
-) -> Result<Estimate, Failure> {
-    let behaviour = Behaviour::new(network, executor);
-    estimate_watched(behaviour, query, precision, &mut Ends(ends))
-}
-
 /// Answers a statistical query whose runs are watched.
 ///
 /// # Errors
 /// A run failed: the one with the least number.
-pub fn estimate_watched<'a>(
-    runs: impl Into<Runs<'a>>,
+pub fn estimate(
+    runs: Runs<'_>,
     query: &Statistical,
     precision: &Precision,
     ends: &mut dyn RunWatch,
@@ -282,7 +265,7 @@ pub fn estimate_watched<'a>(
         }
     };
     let is_complete = from_anywhere(
-        runs.into(),
+        runs,
         precision.threads,
         most,
         |runner, run| {

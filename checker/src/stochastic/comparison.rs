@@ -20,8 +20,8 @@ const MOST_PAIRS: u64 = 1_000_000;
 ///
 /// # Panics
 /// The query is no comparison.
-pub fn compare<'a>(
-    runs: impl Into<Runs<'a>>,
+pub fn compare(
+    runs: Runs<'_>,
     query: &Statistical,
     precision: &Precision,
     mut ends: impl FnMut(u64) -> bool,
@@ -43,7 +43,7 @@ pub fn compare<'a>(
     let said = left.0.runs.max(right.0.runs);
     let most = precision.runs.or(said).unwrap_or(MOST_PAIRS);
     from_anywhere(
-        runs.into(),
+        runs,
         precision.threads,
         Some(most),
         |runner, pair| {

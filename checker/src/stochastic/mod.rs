@@ -41,7 +41,7 @@ mod values_of_runs;
 
 pub use behaviour::Behaviour;
 pub use blocks::{RunSource, Runs, block};
-pub use collector::{estimate, estimate_watched};
+pub use collector::estimate;
 pub use comparison::compare;
 pub use constants::{MOVES_WITHOUT_RISE, ZENO_MOVES, ZENO_TIME};
 pub use estimate::{Simulated, simulate};

@@ -58,13 +58,3 @@ impl<F: FnMut(u64) -> bool> RunWatch for Ends<F> {
         self.0(runs)
     }
 }
-
-impl<W: RunWatch + ?Sized> RunWatch for &mut W {
-    fn see(&mut self, shown: Shown) {
-        (**self).see(shown);
-    }
-
-    fn ends(&mut self, runs: u64) -> bool {
-        (**self).ends(runs)
-    }
-}

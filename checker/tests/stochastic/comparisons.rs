@@ -1,7 +1,7 @@
 //! `Pr[…](…) >= Pr[…](…)`, against probabilities with closed forms.
 
 use checker::stochastic::statistics::{Decision, clopper_pearson};
-use checker::stochastic::{Behaviour, Estimate, Precision, compare};
+use checker::stochastic::{Behaviour, Estimate, Precision, Runs, compare};
 
 use super::{executors, load};
 
@@ -14,13 +14,11 @@ const MODEL: &str = "
 fn compared(query: &str, precision: &Precision) -> Estimate {
     let (network, query) = load(MODEL, query).expect("the query is right");
     let [_, jit] = executors(&network);
-    compare(
-        Behaviour::new(&network, &*jit),
-        &query.kind,
-        precision,
-        |_| false,
-    )
-    .expect("no run fails")
+    let runs = Runs {
+        behaviour: Behaviour::new(&network, &*jit),
+        source: None,
+    };
+    compare(runs, &query.kind, precision, |_| false).expect("no run fails")
 }
 
 #[test]

@@ -4,7 +4,8 @@ use checker::exec::Executor;
 use checker::ir::{Network, Statistical};
 use checker::stochastic::statistics::Method;
 use checker::stochastic::{
-    Behaviour, Estimate, Failure, MeanMethod, Precision, estimate, estimate_jointly,
+    Behaviour, Estimate, Failure, MeanMethod, Precision, RunWatch, Runs, Shown, estimate,
+    estimate_jointly,
 };
 
 use super::{executors, together};
@@ -29,12 +30,27 @@ const FLIPS: &str = "
 
 const REPETITIONS: u64 = 1000;
 
+/// Lets all runs be made.
+struct Unwatched;
+
+impl RunWatch for Unwatched {
+    fn see(&mut self, _: Shown) {}
+
+    fn ends(&mut self, _: u64) -> bool {
+        false
+    }
+}
+
 fn asked(
     (network, executor): (&Network, &dyn Executor),
     query: &Statistical,
     precision: &Precision,
 ) -> Result<Estimate, Failure> {
-    estimate(network, executor, query, precision, |_| false)
+    let runs = Runs {
+        behaviour: Behaviour::new(network, executor),
+        source: None,
+    };
+    estimate(runs, query, precision, &mut Unwatched)
 }
 
 /// How many of the repetitions have an interval that misses the mean of n, which is 5/4.

@@ -17,7 +17,7 @@ use crate::search::limits::{Counters, StopReason};
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
     Behaviour, Failure, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block, compare,
-    estimate_rare, estimate_watched, simulate,
+    estimate, estimate_rare, simulate,
 };
 
 /// What is said if the first run takes too long.
@@ -128,7 +128,7 @@ fn shown_by_runs(
             answer.estimate = Some(compare(runs_anywhere, asked, &precision, ends)?);
         }
         _ => {
-            let estimate = estimate_watched(runs_anywhere, asked, &precision, &mut watched)?;
+            let estimate = estimate(runs_anywhere, asked, &precision, &mut watched)?;
             answer.estimate = Some(estimate);
             answer.values_of_runs = watched.values(asked);
         }

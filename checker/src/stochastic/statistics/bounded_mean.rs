@@ -87,11 +87,6 @@ impl BoundedMean {
         self.squares += after * after;
     }
 
-    /// How many values there are.
-    pub fn count(&self) -> u64 {
-        self.count
-    }
-
     /// Their mean; the lower bound without values.
     pub fn mean(&self) -> f64 {
         self.unscaled(self.sum / self.count.max(1) as f64)

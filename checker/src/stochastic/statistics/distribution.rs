@@ -53,11 +53,6 @@ impl Distribution {
         self.sum += value;
     }
 
-    /// How many values there are.
-    pub fn count(&self) -> u64 {
-        self.count
-    }
-
     /// Their mean; 0 without values.
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64

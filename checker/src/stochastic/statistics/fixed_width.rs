@@ -7,7 +7,7 @@
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::binomial::{Interval, at_least, at_most, clopper_pearson};
+use super::binomial::{at_least, at_most};
 
 /// An estimate in the making.
 #[derive(Clone, Debug)]
@@ -70,26 +70,11 @@ impl FixedWidth {
         (low <= 0.0 || at_least(successes, runs, low) <= risk)
             && (high >= 1.0 || at_most(successes, runs, high) <= risk)
     }
-
-    /// How many runs there were.
-    pub fn runs(&self) -> u64 {
-        self.runs
-    }
-
-    /// How many of them are satisfied.
-    pub fn satisfied(&self) -> u64 {
-        self.satisfied
-    }
-
-    /// The Clopper-Pearson interval.
-    pub fn interval(&self) -> Interval {
-        clopper_pearson(self.satisfied, self.runs, self.alpha)
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::binomial::Interval;
+    use super::super::binomial::{Interval, clopper_pearson};
     use super::FixedWidth;
 
     fn state(alpha: f64, epsilon: f64, runs: u64, satisfied: u64) -> FixedWidth {
@@ -136,7 +121,9 @@ mod tests {
                         return UNREACHED;
                     }
                     let state = state(alpha, epsilon, runs, satisfied);
-                    state.is_narrow().then(|| state.interval())
+                    state
+                        .is_narrow()
+                        .then(|| clopper_pearson(state.satisfied, state.runs, alpha))
                 })
                 .collect();
             let is_last = row.iter().all(Option::is_some);
@@ -205,7 +192,7 @@ mod tests {
         for alpha in [0.2, 0.05, 0.001] {
             for runs in [2_000, 2_500, 10_000, 100_000, 3_000_000] {
                 for satisfied in [1_000, 1_001, runs / 4, runs / 2, runs - 1_000] {
-                    let interval = super::clopper_pearson(satisfied, runs, alpha);
+                    let interval = clopper_pearson(satisfied, runs, alpha);
                     let share = satisfied as f64 / runs as f64;
                     let half = (share - interval.lower).max(interval.upper - share);
                     let narrow = state(alpha, half * (1.0 + 1e-9), runs, satisfied);
