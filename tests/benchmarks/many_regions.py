@@ -20,7 +20,7 @@ from pathlib import Path
 from ntagen import checker, nsl
 from ntagen.render import render
 
-READ_S, ENGINE_S = 0.1, 0.15
+READ_S, ENGINE_S = 0.5, 0.15
 QUERY = "control: A<> Checker.Final_TR_Reached"
 LEAST_FROM_WAY_MM = 14.0
 FORMS = {
