@@ -3,7 +3,7 @@
     python tests/benchmarks/many_regions.py [--count 1000] [--repeats 5]
 
 For each shape, a task with so many critical regions beside the way is read, rendered and solved.
-Printed is the median processor time of each phase, and its ratio to a yardstick: 0.1 s for reading
+Printed is the median processor time of each phase, and its ratio to a yardstick: 0.5 s for reading
 (the language's front end), 0.15 s for the engine (loading the model and finding a winning plan). A
 ratio of at most 1 is wanted.
 """
