@@ -120,25 +120,28 @@ fn read_number(from: &mut &[u8]) -> Option<u64> {
 struct Writer {
     bytes: Vec<u8>,
     /// The bytes of the last result, and how often it has come so far.
-    last: (Vec<u8>, u64),
+    last: Vec<u8>,
+    count: u64,
+    /// Those of the next one, in memory that is used again.
+    next: Vec<u8>,
 }
 
 impl Writer {
     fn push(&mut self, result: impl Transferred) {
-        let mut written = Vec::new();
-        result.write(&mut written);
-        if written != self.last.0 {
+        self.next.clear();
+        result.write(&mut self.next);
+        if self.next != self.last {
             self.finish_last();
-            self.last.0 = written;
+            std::mem::swap(&mut self.last, &mut self.next);
         }
-        self.last.1 += 1;
+        self.count += 1;
     }
 
     fn finish_last(&mut self) {
-        let (result, count) = std::mem::take(&mut self.last);
-        if count > 0 {
-            write_number(count, &mut self.bytes);
-            self.bytes.extend(result);
+        if self.count > 0 {
+            write_number(self.count, &mut self.bytes);
+            self.bytes.extend(&self.last);
+            self.count = 0;
         }
     }
 
