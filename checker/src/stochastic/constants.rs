@@ -18,3 +18,6 @@ pub(super) const MOVES_OF_A_PLAN: u32 = 4096;
 
 /// What a move takes: see [`crate::cancellation::work`].
 pub(super) const UNITS_FOR_MOVE: usize = 256;
+
+/// The changes of what is asked of a run that are followed within one delay.
+pub(super) const MOST_CHANGES: usize = 1_000_000;

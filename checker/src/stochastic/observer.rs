@@ -1,6 +1,7 @@
 //! What is seen of a run, for one thing that is asked of it.
 
 use super::condition::Condition;
+use super::constants::MOST_CHANGES;
 use super::extreme::Extreme;
 use super::failure::Failure;
 use super::machine::{Machine, Mask};
@@ -8,9 +9,6 @@ use super::mitl::Watch;
 use super::program::Program;
 use super::race::Race;
 use crate::ir::{Asked, Path};
-
-/// The changes of a condition that are followed within one delay.
-const MOST_CHANGES: usize = 1_000_000;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,7 +46,7 @@ def task_facts(task: Task) -> dict[str, object]:
 
 
 def task_lines(task: Task, most: int) -> Iterator[str]:
-    """Regions, precision and devices of a task for people; at most so many regions."""
+    """Regions, precision and devices of a task for people; `most` limits the list of regions."""
     kinds = [region.kind for region in task.scene.regions]
     counts = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
     yield f"\nregions: {', '.join(counts)}"

@@ -4,11 +4,9 @@ use super::monitor::Monitor;
 use super::signal::{Cut, Moment};
 use crate::ir::Formula;
 use crate::stochastic::condition::Condition;
+use crate::stochastic::constants::MOST_CHANGES;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::race::Race;
-
-/// The changes of conditions that are followed within one delay.
-const MOST_CHANGES: usize = 1_000_000;
 
 /// Decides a formula along one run.
 pub(in crate::stochastic) struct Watch<'a> {
