@@ -1,0 +1,1 @@
+"""Games with known best values, for learning and optimisation queries."""
