@@ -131,7 +131,9 @@ EDGE = re.compile(
 def with_guards(text: str, guards: Mapping[int, list[str]]) -> str:
     """The model, in which a controllable edge stands once for each of its guards, and else not at
     all: clocks may not be in alternatives."""
-    points = {name for line in re.findall(r"branchpoint ([^;]*);", text) for name in line.split(", ")}
+    points = {
+        name for line in re.findall(r"branchpoint ([^;]*);", text) for name in line.split(", ")
+    }
     numbers = itertools.count()
 
     def guarded(found: re.Match[str]) -> str:
@@ -352,7 +354,10 @@ CASES = (
         waiting,
         Method.CLOCKS,
         "E[<=60; {runs}](max: Person.There ? 0.0 : time)",
-        changes={"Walking { assign": "Walking { guard false; assign", "Waiting { time <= 20 }": "Waiting"},
+        changes={
+            "Walking { assign": "Walking { guard false; assign",
+            "Waiting { time <= 20 }": "Waiting",
+        },
     ),
     Case(
         "servers",
