@@ -1,6 +1,6 @@
-"""Learning queries whose best values are known: models, queries, values, and how sure to be of them.
+"""Learning queries whose best values are known: models, queries and values.
 
-`CASES` are the games of which the value was known before there was a learner; `HELD_BACK` are others
+`CASES` are the games whose values were known before there was a learner; `HELD_BACK` are others
 of the same kinds, which nobody tunes a learner on. A model is the file of its name beside this one;
 its first lines say what the game is. `closed` leaves the controller of a model no choice, so that
 queries about random runs can confirm the value.
@@ -37,8 +37,10 @@ class Method(Enum):
 
 @dataclass(frozen=True)
 class Peer:
-    """The same question to Storm: a property of `prism/MODEL.prism`, whose value is `more` too
-    great, since rewards must not be negative."""
+    """The same question to Storm, about `prism/MODEL.prism`.
+
+    Its value is `more` too great, since rewards must not be negative.
+    """
 
     question: str
     more: int = 0
@@ -129,11 +131,11 @@ EDGE = re.compile(
 
 
 def with_guards(text: str, guards: Mapping[int, list[str]]) -> str:
-    """The model, in which a controllable edge stands once for each of its guards, and else not at
-    all: clocks may not be in alternatives."""
-    points = {
-        name for line in re.findall(r"branchpoint ([^;]*);", text) for name in line.split(", ")
-    }
+    """The model, in which a controllable edge stands once for each of its guards.
+
+    Clocks may not be in alternatives, so that one guard does not do. An edge without one is shut.
+    """
+    points = ", ".join(re.findall(r"branchpoint ([^;]*);", text)).split(", ")
     numbers = itertools.count()
 
     def guarded(found: re.Match[str]) -> str:
@@ -187,8 +189,10 @@ def wearing() -> Fraction:
 
 
 def waiting() -> Fraction:
-    """Whoever walks at s rides with s/20, after s/2 on average, and else walks; the value rises up
-    to s = 7 and falls from then on, so the least is at an end."""
+    """Whoever walks at s rides with s/20, after s/2 on average, and else walks.
+
+    The value rises up to s = 7 and falls from then on, so the least is at an end.
+    """
 
     def value(s: int) -> Fraction:
         rides = Fraction(s, 20)

@@ -33,8 +33,11 @@ class Leg:
 
 @dataclass(frozen=True)
 class Action:
-    """What may be chosen. `edge` is the number of the controllable edge in the model's text, and
-    none where the environment moves; `where` says which of its `select` values is meant."""
+    """What may be chosen.
+
+    `edge` is the number of the controllable edge in the model's text, and none where the
+    environment moves; `where` says which of its `select` values is meant.
+    """
 
     legs: tuple[Leg, ...]
     edge: int | None = None
@@ -43,8 +46,11 @@ class Action:
 
 @dataclass(frozen=True)
 class Game:
-    """A finite game; a state without actions is an end. `conditions` say in the model's terms what
-    each number of a state is, and are empty where the location says it."""
+    """A finite game; a state without actions is an end.
+
+    `conditions` say in the model's terms what each number of a state is, and are empty where the
+    location says it.
+    """
 
     start: State
     conditions: tuple[str, ...]

@@ -22,8 +22,10 @@ class StormAnswer:
 
 
 def value_of(model: Path, question: str, *, is_exact: bool) -> StormAnswer:
-    """The value of the initial state: in fractions, or a double from a method that bounds its
-    error."""
+    """The value of the initial state.
+
+    It is a fraction, or else a double from a method that bounds its error.
+    """
     import stormpy
 
     start = time.perf_counter()
