@@ -1,0 +1,1 @@
+"""Cases that others published, written afresh, with their numbers."""
