@@ -13,6 +13,7 @@ last column is the difference of both values, relatively. Processes start outsid
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
 import math
 import subprocess
@@ -226,8 +227,10 @@ def ours(instance: Instance, folder: Path) -> OurAnswer | str:
         return (run.stderr.splitlines() or [run.stdout])[0]
 
 
-def theirs(instance: Instance, folder: Path) -> StormAnswer:
-    """Storm's answer."""
+def theirs(instance: Instance, folder: Path) -> StormAnswer | None:
+    """Storm's answer, where Storm is installed."""
+    if importlib.util.find_spec("stormpy") is None:
+        return None
     path = folder / "game.prism"
     path.write_text(instance.prism, encoding="utf-8")
     return value_of(path, instance.question, is_exact=False)
@@ -238,23 +241,30 @@ def compare(instance: Instance, *, is_peer_only: bool) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         peer = theirs(instance, folder)
-        peer_s = peer.build_s + peer.solve_s
-        print(
-            f"  Storm   {peer.value:.9g}, {peer.states:,} states: "
-            f"{peer.build_s:.3f} s to build, {peer.solve_s:.3f} s to compute"
-        )
+        if peer is None:
+            print("  Storm   is not installed")
+        else:
+            print(
+                f"  Storm   {peer.value:.9g}, {peer.states:,} states: "
+                f"{peer.build_s:.3f} s to build, {peer.solve_s:.3f} s to compute"
+            )
         if is_peer_only:
             return
         answer = ours(instance, folder)
         if isinstance(answer, str):
             print(f"  ntagen  {answer}")
             return
-        ours_s = answer.load_s + answer.answer_s
-        away = abs(answer.value - float(peer.value)) / max(abs(float(peer.value)), 1e-300)
-        print(
-            f"  ntagen  {answer.value:.9g}: {answer.load_s:.3f} s to load, {answer.answer_s:.3f} s "
-            f"to answer; {peer_s / ours_s:.1f} times as fast, values differ by {away:.1e}"
-        )
+        times = f"{answer.load_s:.3f} s to load, {answer.answer_s:.3f} s to answer"
+        print(f"  ntagen  {answer.value:.9g}: {times}{ratio(answer, peer)}")
+
+
+def ratio(answer: OurAnswer, peer: StormAnswer | None) -> str:
+    """How both answers compare."""
+    if peer is None:
+        return ""
+    faster = (peer.build_s + peer.solve_s) / (answer.load_s + answer.answer_s)
+    away = abs(answer.value / float(peer.value) - 1)
+    return f"; {faster:.1f} times as fast as Storm, values differ by {away:.1e}"
 
 
 def main() -> None:

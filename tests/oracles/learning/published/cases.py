@@ -59,7 +59,7 @@ SAFE_WORK = "strategy Safe = control: A<> Worker.Work && time <= 60"
 SAFE_DRIVE = "strategy Safe = control: A[] distance > 5"
 TRAVEL = "strategy Travel = control: A<> Ben.Done && time <= 60"
 LEARNED = (
-    Published("commute", "E[<=200; 20000](max: travel)", 33.0, 1.0, (SAFE_WORK,)),
+    Published("commute", "E[<=200; 20000](max: travel)", 33.0, 2.0, (SAFE_WORK,)),
     Published(
         "commute",
         "E[<=200; 20000](max: travel)",
@@ -71,7 +71,7 @@ LEARNED = (
         "commute",
         "E[<=200; 20000](max: travel)",
         22.4,
-        1.0,
+        2.0,
         (SAFE_WORK, "strategy FastSafe = minE(travel)[<=200]: <> Worker.Work under Safe"),
     ),
     Published(
