@@ -165,7 +165,7 @@ def planned_needle() -> Fraction:
 
     def value(plan: tuple[int, ...]) -> Fraction:
         rolls, at = sum(map(abs, plan)), sum(plan)
-        return 3 * rolls + sum(
+        return Fraction(3 * rolls) + sum(
             math.prod(chances[step] for step in steps) * 10 * abs(at + sum(steps))
             for steps in itertools.product(chances, repeat=3)
         )
