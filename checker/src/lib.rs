@@ -28,6 +28,8 @@ pub mod game;
 
 pub mod stochastic;
 
+pub mod learning;
+
 pub mod verify;
 
 pub mod engine;

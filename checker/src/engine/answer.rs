@@ -7,7 +7,8 @@ use super::limits::{LimitWatch, stop_text};
 use crate::game::partial_observation::Machine;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::plan_list::PlanList;
-use crate::ir::SiteId;
+use crate::ir::{Observation, SiteId};
+use crate::learning::{Comparison, Mean};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
@@ -115,6 +116,31 @@ pub struct Values {
     pub items: Vec<Extremes>,
 }
 
+/// How the best strategy was found.
+#[derive(Clone, Debug)]
+pub struct Optimised {
+    /// How many runs learning took.
+    pub runs: u64,
+    /// How many iterations.
+    pub iterations: u64,
+    /// How many of them since all was forgotten the last time.
+    pub iterations_in_last_reset: u64,
+    /// How often all was forgotten.
+    pub resets: u64,
+    /// The value by the runs that chose this strategy among others; it is too good by a little.
+    pub judged: Mean,
+    /// What runs are worth in which all is chosen uniformly.
+    pub uniform: Option<Estimate>,
+    /// How the strategy compares with that.
+    pub comparison: Option<Comparison>,
+    /// Whether learning came to its end.
+    pub is_complete: bool,
+    /// What the strategy sees.
+    pub observation: Arc<Observation>,
+    /// How many leaves its trees have.
+    pub leaves: u64,
+}
+
 /// The answer to a query.
 #[derive(Clone, Debug)]
 pub struct Answer {
@@ -124,6 +150,8 @@ pub struct Answer {
     pub value: Option<Values>,
     /// What a statistical query found out.
     pub estimate: Option<Estimate>,
+    /// How the best strategy was found, if it was asked for.
+    pub optimised: Option<Optimised>,
     /// The runs that `simulate` shows.
     pub simulated: Option<Arc<Simulated>>,
     /// How the values of the runs of a statistical query are distributed.
@@ -156,6 +184,7 @@ impl Answer {
             verdict,
             value: None,
             estimate: None,
+            optimised: None,
             simulated: None,
             values_of_runs: None,
             block: None,

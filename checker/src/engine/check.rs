@@ -14,9 +14,13 @@ use crate::diagnostics::Span;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
 use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
+use crate::learning::LearnedStrategy;
 use crate::network::Failure;
 use crate::semantics::Reading;
 use crate::syntax::ast::QueryText;
+
+/// The strategy that the controller stays within, and the learned one that it follows.
+type FollowedStrategies = (Option<Arc<Under>>, Option<Arc<LearnedStrategy>>);
 
 impl LoadedModel {
     /// Answers a query.
@@ -51,13 +55,14 @@ impl LoadedModel {
         let level = self.level(&query, options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let under = self.followed(&query, options)?;
+        let (under, learned) = self.followed(&query, options)?;
         let prepared = PreparedQuery {
             query,
             options: options.left_since(start),
             guide,
             level,
             under,
+            learned,
         };
         self.refuse_unsupported(&prepared)?;
         let mut answer = match self.prepare_in_time(reading, span, &prepared.options)? {
@@ -74,14 +79,19 @@ impl LoadedModel {
         &mut self,
         query: &Query,
         options: &Options,
-    ) -> Result<Option<Arc<Under>>, Rejection> {
+    ) -> Result<FollowedStrategies, Rejection> {
         let Some(name) = &query.under else {
-            return Ok(None);
+            return Ok((None, None));
         };
+        if let Some(named) = self.strategy(name)
+            && let Some(learned) = &named.learned
+        {
+            return Ok((named.within.clone(), Some(Arc::clone(learned))));
+        }
         let strategy = self.permitted_by(name, query.span, options)?.strategy;
         let query = self.strategy(name).map(|one| one.query.clone());
         let query = query.unwrap_or_default();
-        Ok(Some(Arc::new(Under { query, strategy })))
+        Ok((Some(Arc::new(Under { query, strategy })), None))
     }
 
     /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer
@@ -109,6 +119,7 @@ impl LoadedModel {
         let query = &prepared.query;
         let mut answer = match &query.kind {
             QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
+            QueryKind::Optimum(asked) => self.answer_optimum(prepared, asked)?,
             _ => self.answer_symbolically(prepared)?,
         };
         if let Some(name) = &query.under {
@@ -126,7 +137,7 @@ impl LoadedModel {
             (QueryKind::SaveStrategy { file, strategy }, None) => {
                 self.save_strategy(file, strategy, query.span, options)?
             }
-            (QueryKind::LoadStrategy { file }, None) => {
+            (QueryKind::LoadStrategy { file, .. }, None) => {
                 let name = query.strategy.as_deref().unwrap_or_default();
                 self.load_strategy(file, name, query.span, options)?
             }

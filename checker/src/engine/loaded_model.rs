@@ -15,6 +15,7 @@ use crate::exec::{Executor, Libraries};
 use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{FunctionId, Measure, Network, Overflow, Query};
+use crate::learning::LearnedStrategy;
 use crate::semantics::{self, FIRST_POOL, Reading};
 use crate::syntax::{
     self,
@@ -312,7 +313,12 @@ impl LoadedModel {
     pub(super) fn reading_of(&self, span: Span) -> Reading {
         let (parsed, _) = syntax::parse_query(span, &self.sources);
         match parsed.map(|query| query.kind) {
-            Some(QueryKind::Statistical(_)) => Reading::Stochastic,
+            Some(QueryKind::Statistical(_) | QueryKind::Optimum(_)) => Reading::Stochastic,
+            Some(QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. })
+                if self.symbolic_refusal.is_some() =>
+            {
+                Reading::Stochastic
+            }
             _ => Reading::Symbolic,
         }
     }
@@ -397,6 +403,10 @@ pub struct NamedStrategy {
     pub(crate) definition: Option<Arc<PreparedQuery>>,
     /// What a query under it follows, once one was asked.
     pub(crate) permitted: Option<Permitted>,
+    /// The strategy, if it was learned.
+    pub learned: Option<Arc<LearnedStrategy>>,
+    /// The strategy that a learned one refines.
+    pub(crate) within: Option<Arc<Under>>,
 }
 
 /// A compiled query with all that it is answered by.
@@ -410,6 +420,8 @@ pub(crate) struct PreparedQuery {
     pub(crate) level: Option<FunctionId>,
     /// What the query is asked under.
     pub(crate) under: Option<Arc<Under>>,
+    /// The learned strategy that it is asked under.
+    pub(crate) learned: Option<Arc<LearnedStrategy>>,
 }
 
 /// What a query under a strategy follows.
@@ -429,6 +441,8 @@ impl NamedStrategy {
             strategy,
             definition: None,
             permitted: None,
+            learned: None,
+            within: None,
         }
     }
 }

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
+use crate::learning::Learning;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
 use crate::stochastic::statistics::Interval;
 use crate::stochastic::{Precision, RunSource, UnderChoice};
@@ -182,6 +183,8 @@ pub struct Options {
     pub tuning: Tuning,
     /// What statistical queries promise; [`Options::threads`] counts for them too.
     pub precision: Precision,
+    /// How strategies are learned; the seed and the threads are those of all runs.
+    pub learning: Learning,
     /// When the controller moves in random runs where a strategy lets it choose.
     pub under_choice: UnderChoice,
     /// Sees what the runs of a statistical query say while they are made.

@@ -2,7 +2,7 @@
 
 use crate::diagnostics::SourceMap;
 use crate::syntax;
-use crate::syntax::ast::{Extremum, Name, Query, QueryKind, Statistical};
+use crate::syntax::ast::{Extremum, Measured, Name, Optimum, Query, QueryKind, Statistical};
 
 /// What a query asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -71,6 +71,17 @@ pub fn query_form(text: &str) -> Option<QueryForm> {
         QueryKind::Control(_) => "control",
         QueryKind::SaveStrategy { .. } => "saveStrategy",
         QueryKind::LoadStrategy { .. } => "loadStrategy",
+        QueryKind::Optimum(Optimum {
+            measured,
+            is_greatest,
+            ..
+        }) => match (measured, is_greatest) {
+            (Measured::Expected(_), false) => "minE",
+            (Measured::Expected(_), true) => "maxE",
+            (Measured::Probability, false) => "minPr",
+            (Measured::Probability, true) => "maxPr",
+        },
+        QueryKind::Shield(_) => "acontrol",
         QueryKind::Statistical(Statistical::Expectation { .. }) => "E",
         QueryKind::Statistical(Statistical::Simulation { .. }) => "simulate",
         QueryKind::Statistical(_) => "Pr",

@@ -34,7 +34,16 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         self.refuse_contradiction(query, &options.precision)?;
         let control = match &query.kind {
-            QueryKind::Statistical(_) => return Ok(()),
+            QueryKind::Statistical(_) | QueryKind::Optimum(_) => return Ok(()),
+            QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => return Ok(()),
+            _ if prepared.learned.is_some() => {
+                return Err(self.refusal(
+                    codes::UNSUPPORTED_QUERY,
+                    query.span,
+                    "symbolic queries under a learned strategy are not supported",
+                    "ask Pr, E or simulate under it",
+                ));
+            }
             QueryKind::Control(control) => Some(control),
             _ => None,
         };

@@ -2,6 +2,7 @@
 
 use super::ids::{ClockId, FunctionId, LocationId, ProcessId};
 use super::labels::{ClockAtom, ClockRange};
+use super::learning::Optimum;
 use super::statistical::Statistical;
 use crate::diagnostics::Span;
 
@@ -57,9 +58,22 @@ pub enum QueryKind {
     LoadStrategy {
         /// The file.
         file: String,
+        /// What the strategy sees, as texts, if the query says it.
+        features: Option<FeatureTexts>,
     },
+    /// `minE`, `maxE`, `minPr`, `maxPr`: for the best strategy.
+    Optimum(Box<Optimum>),
     /// `Pr`, `E`, `simulate`: what random runs answer.
     Statistical(Box<Statistical>),
+}
+
+/// What a strategy that is loaded sees.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FeatureTexts {
+    /// What has exact values.
+    pub discrete: Vec<String>,
+    /// What has values in intervals.
+    pub continuous: Vec<String>,
 }
 
 /// A game for a controller.

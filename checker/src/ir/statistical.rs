@@ -3,6 +3,7 @@
 use super::formulas::Formula;
 use super::ids::FunctionId;
 use super::labels::Guard;
+use super::learning::Optimum;
 
 /// The kinds of statistical queries.
 #[derive(Clone, Debug)]
@@ -108,6 +109,8 @@ pub enum Asked<'q> {
     Path(&'q Path),
     /// The least value that a function leaves, or the greatest if this is true.
     Extreme(FunctionId, bool),
+    /// What a best strategy is best for, at the end of the run.
+    End(&'q Optimum),
 }
 
 impl Statistical {

@@ -171,6 +171,8 @@ codes! {
     DYNAMIC_MISUSED = "E0297" "dynamic-misused";
     /// A dynamic template, which symbolic queries do not know.
     DYNAMIC_SYMBOLIC = "E0298" "dynamic-symbolic";
+    /// Something that a strategy cannot see.
+    FEATURE_EXPECTED = "E0299" "feature-expected";
     /// A branch point that has no leg, or one that does not end in a location.
     BRANCH_POINT_OPEN = "E0287" "branch-point-open";
     /// An edge to a branch point and a leg of it that both synchronise.
@@ -204,6 +206,10 @@ codes! {
     STATISTICAL_ONLY = "W0217" "statistical-only";
     /// `a <= b <= c`, which compares a truth value.
     COMPARISON_CHAINED = "W0218" "comparison-chained";
+    /// A feature of which exact values are compared, and which is a double or a clock.
+    FEATURE_EXACT = "W0219" "feature-exact";
+    /// A best strategy of a controller without edges.
+    NOTHING_TO_CHOOSE = "W0220" "nothing-to-choose";
     /// A function that UPPAAL calls after all that a query sees.
     HOOK_WITHOUT_EFFECT = "W0211" "hook-without-effect";
 }

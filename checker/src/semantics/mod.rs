@@ -76,6 +76,7 @@ mod externals;
 mod lower;
 
 mod labels;
+mod learning;
 
 mod assigned;
 
@@ -222,6 +223,16 @@ impl Model {
         sources: &SourceMap,
     ) -> (Option<ir::FunctionId>, Vec<Diagnostic>) {
         self.compile(sources, |checker| Some(checker.number(expr)?.0))
+    }
+
+    /// Checks and lowers what a strategy sees, in the stochastic reading.
+    pub(crate) fn compile_feature(
+        &mut self,
+        expr: &ast::Expr,
+        sources: &SourceMap,
+        is_discrete: bool,
+    ) -> (Option<ir::Feature>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| checker.feature(expr, is_discrete))
     }
 
     /// Adds what a query brings to the network.

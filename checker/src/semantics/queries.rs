@@ -20,12 +20,15 @@ use crate::syntax::ast;
 impl Checker<'_> {
     /// Checks and lowers a query.
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
-        if matches!(query.kind, ast::QueryKind::Statistical(_)) && self.reading == Reading::Symbolic
-        {
+        let is_of_runs = matches!(
+            query.kind,
+            ast::QueryKind::Statistical(_) | ast::QueryKind::Optimum(_)
+        );
+        if is_of_runs && self.reading == Reading::Symbolic {
             return self.refused(
                 codes::QUERY_UNSUPPORTED,
                 query.formula,
-                "a statistical query has an estimate only, and none is wanted here",
+                "a query about random runs has an estimate only, and none is wanted here",
                 "ask it on its own, with `check`",
             );
         }
@@ -37,8 +40,18 @@ impl Checker<'_> {
                 "supported are E<>, A[], E[], A<>, -->, sup, inf, bounds, control:, Pr[<=10](<> p), E[<=10; 1000](max: e) and simulate[<=10; 3]{e}",
             );
         }
-        if let Some(under) = &query.under {
-            self.known_strategy(under, strategies);
+        for name in query.under.iter().chain(&query.imitate) {
+            self.known_strategy(name, strategies);
+        }
+        if let Some(name) = &query.imitate
+            && !matches!(query.kind, ast::QueryKind::Optimum(_))
+        {
+            self.error(
+                codes::QUERY_UNSUPPORTED,
+                name.span,
+                "only a strategy that is learned can imitate another one",
+                "write `under` for what the controller follows",
+            );
         }
         let kind = self.query_kind(query, strategies)?;
         let name = |name: &Option<ast::Name>| name.as_ref().map(|name| name.text.clone());
@@ -104,14 +117,12 @@ impl Checker<'_> {
             ast::QueryKind::Control(control) => self.control(control, query.span),
             ast::QueryKind::SaveStrategy { file, strategy } => {
                 self.known_strategy(strategy, strategies);
-                self.refuse_strict_invariants(query.span);
                 Some(QueryKind::SaveStrategy {
                     file: file.clone(),
                     strategy: strategy.text.clone(),
                 })
             }
-            ast::QueryKind::LoadStrategy { file } => {
-                self.refuse_strict_invariants(query.span);
+            ast::QueryKind::LoadStrategy { file, features } => {
                 if query.strategy.is_none() {
                     self.error(
                         codes::STRATEGY_WITHOUT_NAME,
@@ -120,12 +131,25 @@ impl Checker<'_> {
                         "write strategy S = loadStrategy(…)",
                     );
                 }
-                Some(QueryKind::LoadStrategy { file: file.clone() })
+                Some(QueryKind::LoadStrategy {
+                    file: file.clone(),
+                    features: features.as_ref().map(|one| self.feature_texts(one)),
+                })
             }
             ast::QueryKind::Statistical(asked) => {
                 let asked = self.statistical(asked, query.span)?;
                 Some(QueryKind::Statistical(Box::new(asked)))
             }
+            ast::QueryKind::Optimum(asked) => {
+                let optimum = self.optimum(asked, query.imitate.as_ref(), query.span)?;
+                Some(QueryKind::Optimum(Box::new(optimum)))
+            }
+            ast::QueryKind::Shield(_) => self.refused(
+                codes::QUERY_UNSUPPORTED,
+                query.formula,
+                "acontrol (approximate control) queries are not supported",
+                "use `control: A[] p` where no double and no rate of a clock decides",
+            ),
             ast::QueryKind::Unsupported(_) => None,
         }
     }

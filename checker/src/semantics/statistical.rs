@@ -18,14 +18,7 @@ impl Checker<'_> {
         asked: &ast::Statistical,
         span: Span,
     ) -> Option<Statistical> {
-        if self.world.network.features.priorities {
-            return self.refused(
-                codes::QUERY_UNSUPPORTED,
-                span,
-                "statistical queries are not supported on models with priorities",
-                "remove the priorities of channels and processes",
-            );
-        }
+        self.refuse_priorities(span)?;
         Some(match asked {
             ast::Statistical::Probability(estimated) => {
                 let (bound, path) = self.estimated(estimated)?;
@@ -76,6 +69,19 @@ impl Checker<'_> {
                 filter,
             } => Statistical::Simulation(self.simulation(bound, items, filter.as_ref())?),
         })
+    }
+
+    /// Refuses random runs of models with priorities.
+    pub(super) fn refuse_priorities(&mut self, span: Span) -> Option<()> {
+        if self.world.network.features.priorities {
+            return self.refused(
+                codes::QUERY_UNSUPPORTED,
+                span,
+                "statistical queries are not supported on models with priorities",
+                "remove the priorities of channels and processes",
+            );
+        }
+        Some(())
     }
 
     /// Checks and lowers the number that `E` measures: a function that leaves it as a double, and
@@ -180,7 +186,7 @@ impl Checker<'_> {
         Some((bound?, path))
     }
 
-    fn run_bound(&mut self, bound: &ast::RunBound) -> Option<RunBound> {
+    pub(super) fn run_bound(&mut self, bound: &ast::RunBound) -> Option<RunBound> {
         let limit = match &bound.limit {
             ast::RunLimit::Time => RunLimit::Time,
             ast::RunLimit::Moves => RunLimit::Moves,

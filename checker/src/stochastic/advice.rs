@@ -184,6 +184,12 @@ impl<'a> Advice<'a> {
         self.restriction.choice == UnderChoice::Race && self.said(0.0, false, |_| false).waits
     }
 
+    /// Whether it allows the controller to wait now.
+    pub(super) fn waits(&self) -> bool {
+        let said = self.said(0.0, false, |_| false);
+        !said.decides || said.waits
+    }
+
     /// Lets the controller make moves that are allowed, but not demanded. Returns whether that
     /// makes a difference.
     pub(super) fn hurry(&mut self) -> bool {

@@ -1,5 +1,6 @@
 //! What random runs are runs of.
 
+use super::control::Guidance;
 use super::restriction::Restriction;
 use crate::exec::Executor;
 use crate::ir::Network;
@@ -13,6 +14,8 @@ pub struct Behaviour<'a> {
     pub executor: &'a dyn Executor,
     /// The strategy that the controller follows, if runs are asked for under one.
     pub restriction: Option<&'a Restriction>,
+    /// Who decides for the controller, if somebody does, within what the strategy allows.
+    pub guidance: Option<&'a dyn Guidance>,
     /// The step with which Euler's method solves equations of clocks; adaptive steps without it.
     pub fixed_step: Option<f64>,
 }
@@ -24,6 +27,7 @@ impl<'a> Behaviour<'a> {
             network,
             executor,
             restriction: None,
+            guidance: None,
             fixed_step: None,
         }
     }

@@ -213,7 +213,7 @@ pub(super) fn shown(
             satisfied: outcome.value != 0.0,
             at: outcome.at,
         },
-        Asked::Extreme(..) => Shown::Value(outcome.value),
+        Asked::Extreme(..) | Asked::End(_) => Shown::Value(outcome.value),
     })
 }
 

@@ -22,7 +22,7 @@ use std::time::{Duration, Instant};
 use super::behaviour::Behaviour;
 use super::failure::Failure;
 use super::run::Runner;
-use super::run_watch::{RunWatch, Shows};
+use super::run_watch::{Ends, RunWatch, Shows};
 use crate::cancellation::{self, Cut};
 
 /// How long a chunk of runs should take.
@@ -82,10 +82,50 @@ pub(super) fn in_order<T: Send + Shows>(
     behaviour: Behaviour<'_>,
     threads: usize,
     run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
-    mut consume: impl FnMut(T) -> bool,
+    consume: impl FnMut(T) -> bool,
     watch: &mut dyn RunWatch,
 ) -> Result<bool, Failure> {
     let mut runners = Runner::several(behaviour, threads);
+    in_order_by(&mut runners, 0, false, run, consume, watch)
+}
+
+/// A result that nobody watches.
+struct Kept<T>(T);
+
+impl<T> Shows for Kept<T> {}
+
+/// Makes the runs with these numbers, by these runners, one thread each, and consumes their results
+/// in this order. `ends`, asked now and then with the number of results so far, may end them.
+/// Returns whether all runs were made. What ends work from inside ends them, too, and goes no
+/// further.
+pub fn runs_by<T: Send>(
+    runners: &mut [Runner<'_>],
+    runs: Range<u64>,
+    run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
+    mut consume: impl FnMut(T),
+    ends: impl FnMut(u64) -> bool,
+) -> Result<bool, Failure> {
+    let mut left = runs.end.saturating_sub(runs.start);
+    if left == 0 {
+        return Ok(true);
+    }
+    let take = |Kept(result)| {
+        consume(result);
+        left -= 1;
+        left == 0
+    };
+    let kept = |runner: &mut Runner<'_>, number| Ok(Kept(run(runner, number)?));
+    in_order_by(runners, runs.start, true, kept, take, &mut Ends(ends))
+}
+
+fn in_order_by<T: Send + Shows>(
+    runners: &mut [Runner<'_>],
+    first: u64,
+    stands_alone: bool,
+    run: impl Fn(&mut Runner<'_>, u64) -> Result<T, Failure> + Sync,
+    mut consume: impl FnMut(T) -> bool,
+    watch: &mut dyn RunWatch,
+) -> Result<bool, Failure> {
     let most_open = AHEAD * runners.len();
     let (own, others) = runners.split_first_mut().expect("there is a thread");
     let look = cancellation::current();
@@ -102,7 +142,7 @@ pub(super) fn in_order<T: Send + Shows>(
             });
         }
         let mut open = VecDeque::new();
-        let (mut next, mut share, mut consumed) = (0, 1, 0);
+        let (mut next, mut share, mut consumed) = (first, 1, 0);
         loop {
             while open.len() < most_open {
                 let (made, results) = mpsc::channel();
@@ -123,7 +163,9 @@ pub(super) fn in_order<T: Send + Shows>(
             let results = match made {
                 Ok(results) => results,
                 // What was consumed before stands; without it there is no result.
-                Err(cause) if cause.is::<Cut>() && consumed > 0 => return Ok(false),
+                Err(cause) if cause.is::<Cut>() && (consumed > 0 || stands_alone) => {
+                    return Ok(false);
+                }
                 Err(cause) => panic::resume_unwind(cause),
             };
             for result in results {

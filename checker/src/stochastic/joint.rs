@@ -138,7 +138,7 @@ impl Runner<'_> {
             Seen::Decided(satisfied) => Some(f64::from(satisfied)),
             Seen::Open(_) if failure.is_some() => None,
             Seen::Open(mut observer) => {
-                let result = observer.finish(&mut self.race.machine);
+                let result = observer.finish(&mut self.race);
                 result.map_err(|found| failure = Some(found)).ok()
             }
         });

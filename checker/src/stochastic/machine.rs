@@ -4,6 +4,7 @@
 //! else reads them.
 
 use super::condition::Condition;
+use super::control::StateView;
 use super::failure::Failure;
 use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::exec::{Context, Executor};
@@ -91,6 +92,15 @@ impl<'a> Machine<'a> {
     /// The words of the state.
     pub(super) fn words(&self) -> &[i32] {
         &self.words
+    }
+
+    /// The state as whoever decides sees it.
+    pub(super) fn view_of_state(&mut self) -> StateView<'_> {
+        StateView {
+            words: &mut self.words,
+            executor: self.executor,
+            network: self.network,
+        }
     }
 
     /// Goes back to a state.

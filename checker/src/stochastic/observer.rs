@@ -4,11 +4,11 @@ use super::condition::Condition;
 use super::constants::MOST_CHANGES;
 use super::extreme::Extreme;
 use super::failure::Failure;
-use super::machine::{Machine, Mask};
+use super::machine::Mask;
 use super::mitl::Watch;
 use super::program::Program;
 use super::race::Race;
-use crate::ir::{Asked, Path};
+use crate::ir::{Aim, Asked, Optimum, Path};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +33,7 @@ pub(super) enum Observer<'q> {
         /// Whether the value may change as time passes.
         is_timed: bool,
     },
+    End(&'q Optimum),
 }
 
 impl<'q> Observer<'q> {
@@ -44,6 +45,7 @@ impl<'q> Observer<'q> {
                 extreme: Extreme::new(value, maximum),
                 is_timed: program.is_timed(value),
             },
+            Asked::End(optimum) => Observer::End(optimum),
         }
     }
 
@@ -64,21 +66,48 @@ impl<'q> Observer<'q> {
                 }
                 Ok(None)
             }
+            Observer::End(optimum) => match &optimum.goal {
+                Some(goal) => watched(race, goal, delay),
+                None => Ok(None),
+            },
+        }
+    }
+
+    /// The result of a run that was decided so much later than its state says.
+    pub(super) fn decided(
+        &self,
+        race: &mut Race<'_>,
+        satisfied: bool,
+        ahead: f64,
+    ) -> Result<f64, Failure> {
+        match self {
+            Observer::End(optimum) => aim_of(race, optimum.aim, satisfied, ahead),
+            _ => Ok(f64::from(satisfied)),
         }
     }
 
     /// The result of a run that ends at its bound before anything is decided: its value, or 1 if it
     /// has what is asked and else 0.
-    pub(super) fn finish(&mut self, machine: &mut Machine<'_>) -> Result<f64, Failure> {
+    pub(super) fn finish(&mut self, race: &mut Race<'_>) -> Result<f64, Failure> {
         Ok(match self {
             Observer::Path(path) => f64::from(matches!(path, Path::Always(_))),
             Observer::Formula(watch) => f64::from(watch.finish()),
             Observer::Extreme { extreme, .. } => {
-                extreme.look(machine)?;
+                extreme.look(&mut race.machine)?;
                 extreme.value()
             }
+            Observer::End(optimum) => aim_of(race, optimum.aim, false, 0.0)?,
         })
     }
+}
+
+/// What a run is worth that ends so much later than its state says.
+fn aim_of(race: &mut Race<'_>, aim: Aim, satisfied: bool, ahead: f64) -> Result<f64, Failure> {
+    Ok(match aim {
+        Aim::Probability => f64::from(satisfied),
+        Aim::Time => race.time + ahead,
+        Aim::Expected(value) => race.look_ahead(ahead, |machine| machine.real(value, &[]))?,
+    })
 }
 
 /// Whether a path is decided by the state or within the delay behind it, and after which time.

@@ -434,6 +434,15 @@ impl<'a> Program<'a> {
         &self.instances[number as usize]
     }
 
+    /// The outputs of the controller that are first of their entries, with their numbers.
+    pub(super) fn outputs_of_controller(&self) -> impl Iterator<Item = (u32, &Instance<'a>)> {
+        let all = (0..).zip(&self.instances);
+        all.filter(|(number, one)| {
+            let is_output = one.edge.sync.is_none_or(|sync| sync.send);
+            one.edge.controllable && is_output && one.entry == *number
+        })
+    }
+
     /// The parts of a condition.
     pub(super) fn comparisons(&self, place: u32) -> &Comparisons {
         &self.comparisons[place as usize]

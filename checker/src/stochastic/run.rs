@@ -2,21 +2,24 @@
 //!
 //! What is asked is watched at all moments: after every move, and all through every delay.
 
+use std::any::Any;
 use std::iter;
 use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
+use super::control::{Chooser, ControllerMove};
 use super::failure::Failure;
 use super::machine::Machine;
 use super::observer::{Observer, Outcome, watched};
 use super::program::Program;
-use super::race::Race;
+use super::race::{Race, entry};
 use super::race_code::{RaceCode, Stages, Watched};
+use super::restriction::Entry;
 use super::run_id::RunId;
 use crate::cancellation;
 use crate::exec::Executor;
-use crate::ir::{Asked, Network, Path, RunBound, RunLimit, Simulation};
+use crate::ir::{Asked, Network, Part, Path, RunBound, RunLimit, Simulation};
 
 /// The values of expressions during a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +96,7 @@ impl<'a> Runner<'a> {
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
-        let is_free = behaviour.restriction.is_none();
+        let is_free = behaviour.restriction.is_none() && behaviour.guidance.is_none();
         let stages = is_free.then(|| Stages::new(behaviour.executor));
         Runner::with(Arc::new(program), behaviour, stages)
     }
@@ -133,8 +136,35 @@ impl<'a> Runner<'a> {
         stages.run(&self.program, self.executor, watched, id, bound.value)
     }
 
+    /// Who decides for the controller, if it is one of this type.
+    pub fn chooser<C: Chooser>(&mut self) -> Option<&mut C> {
+        let chooser: &mut dyn Any = &mut *self.race.control.as_mut()?.chooser;
+        chooser.downcast_mut()
+    }
+
+    /// The moves that the controller may make, by their numbers, ascending.
+    pub fn moves_of_controller(&self) -> Vec<ControllerMove> {
+        let network = self.program.network;
+        let instances = self.program.outputs_of_controller();
+        let moves = instances.map(|(number, instance)| {
+            let Entry {
+                process,
+                edge,
+                select,
+            } = entry(network, instance);
+            let part = Part {
+                process,
+                edge,
+                branch: 0,
+                select,
+            };
+            ControllerMove { number, part }
+        });
+        moves.collect()
+    }
+
     /// One for each thread, at least one: what does not change from run to run is shared.
-    pub(super) fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
+    pub fn several(behaviour: Behaviour<'a>, threads: usize) -> Vec<Runner<'a>> {
         let first = Runner::of(behaviour);
         let others = (1..threads).map(|_| {
             let stages = first.stages.as_ref();
@@ -162,8 +192,10 @@ impl<'a> Runner<'a> {
             Ok(decided.is_some())
         })?;
         let (value, ahead) = match decided {
-            Some((satisfied, ahead)) => (f64::from(satisfied), ahead),
-            None => (observer.finish(&mut self.race.machine)?, 0.0),
+            Some((satisfied, ahead)) => {
+                (observer.decided(&mut self.race, satisfied, ahead)?, ahead)
+            }
+            None => (observer.finish(&mut self.race)?, 0.0),
         };
         if let Some(stages) = &mut self.stages {
             stages.count(self.race.moves);

@@ -615,6 +615,8 @@ pub struct Query {
     pub formula: Span,
     /// `under name`
     pub under: Option<Name>,
+    /// `imitate name`
+    pub imitate: Option<Name>,
     /// The whole query.
     pub span: Span,
 }
@@ -650,16 +652,78 @@ pub enum QueryKind {
         /// The strategy.
         strategy: Name,
     },
-    /// `loadStrategy("file")`, only after `strategy S =`.
+    /// `loadStrategy {discrete} -> {continuous} ("file")`, only after `strategy S =`.
     LoadStrategy {
         /// The file.
         file: String,
+        /// What the strategy sees.
+        features: Option<Features>,
     },
+    /// `minE`, `maxE`, `minPr`, `maxPr`
+    Optimum(Optimum),
+    /// `acontrol: A[] p { … }`
+    Shield(Shield),
     /// `Pr[…](…)` or `E[…](…)`
     Statistical(Statistical),
     /// A query that was recognised and is not supported; the name says which kind (statistical,
     /// learning, cost, …).
     Unsupported(Name),
+}
+
+/// A query for the best strategy.
+#[derive(Clone, Debug)]
+pub struct Optimum {
+    /// Whether the greatest value is the best.
+    pub is_greatest: bool,
+    /// What has a value.
+    pub measured: Measured,
+    /// How long a run is.
+    pub bound: RunBound,
+    /// What the strategy sees; everything if it is not said.
+    pub features: Option<Features>,
+    /// What ends a run before its bound.
+    pub goal: Option<Expr>,
+}
+
+/// What a best strategy is best for.
+#[derive(Clone, Debug)]
+pub enum Measured {
+    /// The expected value of an expression at the end of a run; of the time that it takes where
+    /// there is none.
+    Expected(Option<Expr>),
+    /// The probability that the goal is reached.
+    Probability,
+}
+
+/// What a strategy sees: `{discrete} -> {continuous}`.
+#[derive(Clone, Debug)]
+pub struct Features {
+    /// Of these the exact values.
+    pub discrete: Vec<Expr>,
+    /// Of these in which intervals they lie.
+    pub continuous: Vec<Expr>,
+}
+
+/// A query for a shield.
+#[derive(Clone, Debug)]
+pub struct Shield {
+    /// What must hold for ever.
+    pub invariant: Expr,
+    /// What the shield sees.
+    pub axes: Vec<ShieldAxis>,
+}
+
+/// `P.location`, `i[0,5]`, or `x[-13,13]:1300`.
+#[derive(Clone, Debug)]
+pub struct ShieldAxis {
+    /// The location, the integer, the double or the clock.
+    pub place: Expr,
+    /// The least and the greatest value; none for a location.
+    pub bounds: Option<Box<[Expr; 2]>>,
+    /// How many cells there are; one for each value of an integer.
+    pub cells: Option<Expr>,
+    /// The whole.
+    pub span: Span,
 }
 
 /// A statistical query.

@@ -57,6 +57,11 @@ codes! {
     NOT_A_STRATEGY = "E0143" "not-a-strategy";
     /// A query text without a query.
     EMPTY_QUERY = "E0144" "empty-query";
+    /// `minPr` or `maxPr` with an expression.
+    OPTIMUM_EXPRESSION = "E0145" "optimum-expression";
+    /// A query for the best strategy with another path quantifier than `<>`, or without a goal that
+    /// it needs.
+    OPTIMUM_GOAL = "E0146" "optimum-goal";
     /// Two locations of a template with one `id`.
     DUPLICATE_ID = "W0101" "duplicate-id";
     /// A location that no query can name, because its name is a word of the query language.
@@ -69,6 +74,10 @@ codes! {
     INTERFACE_IGNORED = "W0107" "interface-ignored";
     /// Bytes that are not UTF-8 in a file that names no other encoding; they are read as Latin-1.
     NOT_UTF8 = "W0106" "not-utf8";
+    /// `minE` or `maxE` without an expression.
+    OPTIMUM_WITHOUT_PRICE = "W0108" "optimum-without-price";
+    /// `minE` or `maxE` without a goal.
+    OPTIMUM_WITHOUT_GOAL = "W0109" "optimum-without-goal";
     /// An expected verdict that is written in no known way.
     UNKNOWN_EXPECTATION = "W0105" "unknown-expectation";
 }

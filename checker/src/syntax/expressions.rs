@@ -275,12 +275,21 @@ impl Parser<'_> {
     }
 
     fn postfix(&mut self) -> Expr {
+        self.operand_of(true)
+    }
+
+    /// A variable or a location without an index: `x`, `P.x` or `P(1).location`.
+    pub(super) fn plain_place(&mut self) -> Expr {
+        self.operand_of(false)
+    }
+
+    fn operand_of(&mut self, is_indexed: bool) -> Expr {
         let start = self.here();
         let mut expr = self.primary();
         loop {
             let height = self.height;
             let kind = match self.kind() {
-                TokenKind::LeftBracket => {
+                TokenKind::LeftBracket if is_indexed => {
                     self.bump();
                     let index = self.expression();
                     self.closing(TokenKind::RightBracket, "after the index");

@@ -36,6 +36,8 @@ mod statements;
 
 mod formulas;
 
+mod learning;
+
 mod statistical;
 
 mod processes;

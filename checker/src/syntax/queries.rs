@@ -88,7 +88,8 @@ impl Parser<'_> {
                 ),
             );
         }
-        let under = self.under();
+        let under = self.strategy_behind("under");
+        let imitate = self.strategy_behind("imitate");
         if matches!(kind, QueryKind::Unsupported(_)) {
             while !self.at_end() {
                 self.bump();
@@ -100,6 +101,7 @@ impl Parser<'_> {
             kind,
             formula,
             under,
+            imitate,
             span: self.since(span),
         }
     }
@@ -116,9 +118,9 @@ impl Parser<'_> {
         Some(name)
     }
 
-    /// `under S`
-    fn under(&mut self) -> Option<Name> {
-        self.eat_word("under")
+    /// `under S` or `imitate S`
+    fn strategy_behind(&mut self, word: &str) -> Option<Name> {
+        self.eat_word(word)
             .then(|| self.name("the name of a strategy"))
     }
 
@@ -161,8 +163,8 @@ impl Parser<'_> {
             "bounds" if is_prefix => self.extremum(Extremum::Bounds),
             "saveStrategy" => self.save_strategy(),
             "loadStrategy" => self.load_strategy(),
-            "acontrol" if is_prefix => self.unsupported_query("acontrol (approximate control)"),
-            "minE" | "maxE" | "minPr" | "maxPr" => self.unsupported_query("learning"),
+            "acontrol" if is_prefix => self.shield(),
+            "minE" | "maxE" | "minPr" | "maxPr" => self.optimum(),
             "Pr" | "simulate" => self.statistical(),
             "Pmax" => self.unsupported_query("statistical model checking"),
             "refinement" | "consistency" | "specification" | "implementation" | "determinism"
@@ -506,32 +508,23 @@ impl Parser<'_> {
         QueryKind::SaveStrategy { file, strategy }
     }
 
-    /// `loadStrategy {discrete} -> {continuous} ("file")`; the features only matter to learning.
+    /// `loadStrategy {discrete} -> {continuous} ("file")`
     fn load_strategy(&mut self) -> QueryKind {
         self.bump();
-        if self.at(TokenKind::LeftBrace) {
-            self.features();
-            self.expect(TokenKind::Arrow, "between the features");
-            self.features();
-        }
+        let features = self.features();
         self.expect(TokenKind::LeftParenthesis, "before the name of the file");
         let file = self.file_name();
         self.closing(TokenKind::RightParenthesis, "after the name of the file");
-        QueryKind::LoadStrategy { file }
-    }
-
-    fn features(&mut self) {
-        self.expect(TokenKind::LeftBrace, "before the features");
-        if !self.at(TokenKind::RightBrace) {
-            self.expression_list();
-        }
-        self.closing(TokenKind::RightBrace, "after the features");
+        QueryKind::LoadStrategy { file, features }
     }
 }
 
 fn yields_strategy(kind: &QueryKind) -> bool {
     match kind {
-        QueryKind::Control(_) | QueryKind::LoadStrategy { .. } => true,
+        QueryKind::Control(_)
+        | QueryKind::LoadStrategy { .. }
+        | QueryKind::Optimum(_)
+        | QueryKind::Shield(_) => true,
         QueryKind::Unsupported(name) => !matches!(name.text.as_str(), "statistical model checking"),
         _ => false,
     }

@@ -197,7 +197,7 @@ impl Parser<'_> {
     }
 
     /// `[<=10]`, `[x<=10]` or `[#<=10]`, each with a number of runs behind `;` or not.
-    fn run_bound(&mut self) -> RunBound {
+    pub(super) fn run_bound(&mut self) -> RunBound {
         self.expect(TokenKind::LeftBracket, "before the bound of the runs");
         let (limit, value) = if self.eat(TokenKind::Hash) {
             self.expect(TokenKind::LessEqual, "before the number of moves");

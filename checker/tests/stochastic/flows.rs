@@ -258,6 +258,7 @@ fn a_fixed_step_is_eulers() {
     };
     let [_, jit] = executors(&network);
     let mut runner = Runner::of(Behaviour {
+        guidance: None,
         fixed_step: Some(0.25),
         ..Behaviour::new(&network, &*jit)
     });

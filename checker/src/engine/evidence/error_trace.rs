@@ -203,6 +203,7 @@ fn predicates(kind: &QueryKind) -> Vec<&Predicate> {
         QueryKind::Control(control) => control.objective.predicates().collect(),
         QueryKind::SaveStrategy { .. }
         | QueryKind::LoadStrategy { .. }
+        | QueryKind::Optimum(_)
         | QueryKind::Statistical(_) => Vec::new(),
     }
 }

@@ -180,6 +180,7 @@ fn estimates_of(
     });
     let asked: Vec<(&Statistical, Precision)> = asked.collect();
     let behaviour = Behaviour {
+        guidance: None,
         fixed_step: asked[0].1.discretisation,
         ..behaviour
     };

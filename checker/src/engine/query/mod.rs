@@ -11,6 +11,7 @@ pub mod joint;
 mod libraries;
 pub(super) mod liveness;
 pub(super) mod optimal_trace;
+mod optimum;
 pub mod partial_observation;
 pub(super) mod plans;
 pub(crate) mod problem;

@@ -16,8 +16,8 @@ use crate::ir::{RunTimeErrorKind, Statistical};
 use crate::search::limits::{Counters, StopReason};
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Behaviour, Failure, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block, compare,
-    estimate, estimate_rare, simulate,
+    Behaviour, Failure, Guidance, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block,
+    compare, estimate, estimate_rare, simulate,
 };
 
 /// What is said if the first run takes too long.
@@ -33,7 +33,14 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         let start = Instant::now();
         let restriction = self.restriction(prepared)?;
-        let behaviour = self.behaviour(restriction.as_ref(), options);
+        let followed = prepared
+            .learned
+            .as_ref()
+            .map(|one| self.followed_in_runs(one));
+        let behaviour = Behaviour {
+            guidance: followed.as_ref().map(|one| one as &dyn Guidance),
+            ..self.behaviour(restriction.as_ref(), options)
+        };
         let may_have_more_room = self.pool < GREATEST_POOL;
         let mut watch = LimitWatch::new(options.limits.left_since(start));
         let result = watch.bound(|watch| {
@@ -77,6 +84,7 @@ impl LoadedModel {
             network: compiled.network(),
             executor: compiled.executor(),
             restriction,
+            guidance: None,
             fixed_step: options.precision.discretisation,
         }
     }

@@ -12,7 +12,7 @@ use crate::stochastic::statistics::{Expectation, Interval, clopper_pearson};
 use crate::stochastic::{RunWatch, Samples, Shown, ValuesOfRuns};
 
 /// How often the estimate so far is shown.
-const SHOW_EVERY: Duration = Duration::from_millis(100);
+pub(super) const SHOW_EVERY: Duration = Duration::from_millis(100);
 
 /// Watches the runs of a query.
 pub(super) struct WatchedRuns<'w> {

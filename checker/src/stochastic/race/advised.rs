@@ -24,7 +24,7 @@ use crate::stochastic::restriction::Entry;
 
 /// Where a move is to be made as soon as possible, and there is no first moment, it is made this
 /// part, or this long, after the beginning.
-const SOON: f64 = 5.0 * TOLERANCE;
+pub(super) const SOON: f64 = 5.0 * TOLERANCE;
 
 impl Race<'_> {
     /// Lets the strategy look at the state before anybody plans.
@@ -114,7 +114,8 @@ impl Race<'_> {
     /// Whether the process of the movers waits instead, where the strategy leaves it both and time
     /// can pass.
     pub(super) fn waits_instead(&mut self, program: &Program<'_>) -> Result<bool, Failure> {
-        let may_wait = self.has_decisions()
+        let may_wait = self.control.is_none()
+            && self.has_decisions()
             && self.advice.as_ref().is_some_and(Advice::may_wait)
             && self.committed == 0
             && self.bounds.iter().all(|&bound| bound > TOLERANCE);
@@ -169,7 +170,7 @@ impl Race<'_> {
     }
 
     /// When the strategy demands a move that this instance can make; infinity if it cannot.
-    fn demanded(
+    pub(super) fn demanded(
         &mut self,
         program: &Program<'_>,
         instance: &Instance<'_>,
@@ -262,7 +263,7 @@ impl Race<'_> {
 
 /// The edge of an instance with the number of its values; of a leg that is an edge, the first leg
 /// of its entry, as [`crate::network::entry_of`] names it.
-fn entry(network: &Network, instance: &Instance<'_>) -> Entry {
+pub(in crate::stochastic) fn entry(network: &Network, instance: &Instance<'_>) -> Entry {
     let edge = instance.edge;
     let bindings = edge
         .leg

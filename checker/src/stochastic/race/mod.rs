@@ -25,10 +25,13 @@
 //! Source: A. David et al., "Uppaal SMC tutorial", STTT 17 (2015), sections 2 and 3.
 
 mod advised;
+mod choosing;
 mod direct;
 mod outputs;
 mod planning;
 mod transition;
+
+pub(super) use advised::entry;
 
 use std::cell::Cell;
 
@@ -38,6 +41,7 @@ use super::advice::Advice;
 use super::behaviour::Behaviour;
 use super::condition::Condition;
 use super::constants::{MOVES_OF_A_PLAN, TOLERANCE, ZENO_MOVES, ZENO_TIME};
+use super::control::Control;
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
@@ -107,6 +111,8 @@ pub(in crate::stochastic) struct Race<'a> {
     has_moved: bool,
     /// What the strategy says, if the run is under one.
     advice: Option<Advice<'a>>,
+    /// Who decides for the controller, if somebody does.
+    pub(in crate::stochastic) control: Option<Control>,
     /// The first time at which an urgent channel stops time for a move that the strategy forbids,
     /// and who could make it.
     standstill: Option<(f64, usize)>,
@@ -120,6 +126,7 @@ impl<'a> Race<'a> {
             network,
             executor,
             restriction,
+            guidance,
             fixed_step,
         } = behaviour;
         let processes = network.processes.len();
@@ -148,6 +155,7 @@ impl<'a> Race<'a> {
             until_renewal: MOVES_OF_A_PLAN,
             has_moved: false,
             advice: restriction.map(Advice::new),
+            control: guidance.map(Control::new),
             standstill: None,
             longest_stay: f64::INFINITY,
         }
@@ -162,6 +170,9 @@ impl<'a> Race<'a> {
         self.machine.start(seed, run);
         self.time = 0.0;
         self.moves = 0;
+        if let Some(control) = &mut self.control {
+            control.chooser.begin(RunId { seed, run });
+        }
         self.resume(program)
     }
 
@@ -171,6 +182,9 @@ impl<'a> Race<'a> {
         self.until_renewal = MOVES_OF_A_PLAN;
         self.committed = 0;
         self.has_moved = false;
+        if let Some(control) = &mut self.control {
+            control.renew();
+        }
         self.stale.clear();
         self.is_stepped.fill(false);
         self.motion.start();
@@ -249,6 +263,7 @@ impl<'a> Race<'a> {
     ) -> Result<Next, Failure> {
         self.rest = rest;
         self.take_advice(program)?;
+        self.look_for_decisions(program)?;
         if self.committed > 0 {
             self.put_plans_off(program)?;
             return self.next_committed(program);
@@ -365,6 +380,9 @@ impl<'a> Race<'a> {
                 self.machine.advance(delay);
             }
             self.time += delay;
+            if let Some(control) = &mut self.control {
+                control.hold = (control.hold - delay).max(0.0);
+            }
             for attempt in &mut self.attempts {
                 *attempt -= delay;
             }
@@ -398,7 +416,16 @@ impl<'a> Race<'a> {
         let choices = std::mem::take(&mut self.choices);
         let chosen = self.one_of(program, &choices);
         self.choices = choices;
-        let chosen = chosen?;
+        let mut chosen = chosen?;
+        if self.is_decided(program.instance(chosen)) {
+            match self.decide(program, process)? {
+                Some(decided) => chosen = decided,
+                None => {
+                    self.make_stale(process as u32);
+                    return self.count_move(process, false);
+                }
+            }
+        }
         self.movers.clear();
         self.movers.push((chosen, 0));
         let sender = program.instance(chosen);
@@ -420,6 +447,9 @@ impl<'a> Race<'a> {
             return self.count_move(process, false);
         }
         self.carry_out(program)?;
+        if let Some(control) = &mut self.control {
+            control.renew();
+        }
         self.has_moved = true;
         self.until_renewal -= 1;
         self.count_move(process, true)

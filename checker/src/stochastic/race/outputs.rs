@@ -25,7 +25,9 @@ impl Race<'_> {
         let mut urgent = f64::INFINITY;
         let view = View::Drawn(self.longest_stay);
         for instance in program.range(spot.outputs) {
-            if self.is_advised(instance) {
+            if self.is_decided(instance) {
+                urgent = urgent.min(self.decided_windows(program, instance, bound)?);
+            } else if self.is_advised(instance) {
                 urgent = urgent.min(self.advised_windows(program, instance, bound)?);
             } else if instance.may_be_urgent && self.is_urgent(instance)? {
                 // It is taken as soon as it can be, so no time is drawn for it.
@@ -121,6 +123,9 @@ impl Race<'_> {
         ahead: f64,
         view: View,
     ) -> Result<Mask, Failure> {
+        if self.passes(instance) {
+            return Ok(Mask::constant(false));
+        }
         let guard = self.mask_of(program, instance.guard, &instance.values, ahead)?;
         if (guard.now || guard.behind) && view != View::Model && self.is_advised(instance) {
             return Ok(guard.and(self.partners(program, instance, ahead, view)?));
@@ -222,7 +227,9 @@ impl Race<'_> {
         let is_advised = spot.is_controllable && self.advice.is_some();
         for number in spot.outputs.numbers() {
             let instance = program.instance(number);
-            let is_enabled = if instance.is_binary || is_advised {
+            let is_enabled = if self.passes(instance) {
+                false
+            } else if instance.is_binary || is_advised {
                 self.output(program, instance, 0.0, View::Allowed)?.now
             } else {
                 self.holds(program, instance.guard, &instance.values)?

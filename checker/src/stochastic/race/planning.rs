@@ -75,9 +75,9 @@ impl Race<'_> {
     }
 
     /// Whether the rules know when the outputs of a process are enabled: each has one window, which
-    /// neither a receiver nor a strategy nor the motion of clocks changes.
+    /// neither a receiver nor a strategy nor whoever decides nor the motion of clocks changes.
     pub(super) fn is_known(&mut self, program: &Program<'_>, spot: &Spot) -> bool {
-        if spot.is_controllable && self.has_decisions() {
+        if spot.is_controllable && (self.has_decisions() || self.control.is_some()) {
             return false;
         }
         let mut outputs = program.range(spot.outputs).iter();

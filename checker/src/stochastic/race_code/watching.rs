@@ -30,7 +30,7 @@ impl Watched {
             Asked::Path(Path::Until(keep, goal)) => {
                 Watched::Until(Condition::of(keep), Condition::of(goal))
             }
-            Asked::Path(Path::Formula(_)) => return None,
+            Asked::Path(Path::Formula(_)) | Asked::End(_) => return None,
         })
     }
 

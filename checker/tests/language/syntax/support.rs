@@ -176,7 +176,9 @@ fn kind_shape(kind: &QueryKind) -> String {
         }
         QueryKind::Control(control) => control_shape(control),
         QueryKind::SaveStrategy { file, strategy } => format!("save {file:?} {}", strategy.text),
-        QueryKind::LoadStrategy { file } => format!("load {file:?}"),
+        QueryKind::LoadStrategy { file, .. } => format!("load {file:?}"),
+        QueryKind::Optimum(_) => "optimum".to_owned(),
+        QueryKind::Shield(_) => "shield".to_owned(),
         QueryKind::Statistical(query) => statistical_shape(query),
         QueryKind::Unsupported(name) => format!("unsupported: {}", name.text),
     }

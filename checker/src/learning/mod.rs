@@ -1,0 +1,23 @@
+//! The best strategy: learned from random runs.
+//!
+//! What the controller sees of a state is an *observation*: exact values, and values in intervals.
+//! A learned strategy says what each action costs from there on, cell by cell of a partition.
+
+mod episode;
+mod experience;
+mod explorer;
+mod judging;
+mod learner;
+mod observation;
+mod options;
+mod partition;
+mod refinement;
+mod strategy;
+mod whole_state;
+
+pub use judging::{Comparison, compared, judge};
+pub use learner::{Learned, Mean, Progress, learn};
+pub use options::{Learning, Method};
+pub use partition::Partition;
+pub use strategy::{Appraisal, Branch, Followed, LearnedStrategy, Regressor, values, worth};
+pub use whole_state::whole_state;

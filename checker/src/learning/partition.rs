@@ -1,0 +1,201 @@
+//! The partition of what is seen: for each combination of exact values a binary tree of cuts
+//! `feature <= bound`, whose leaves are the *cells*. In a cell each action has a value.
+//!
+//! Invariants:
+//! * Values are costs: less is better. Who maximises counts with the opposite sign.
+//! * An action that was never taken in a cell has no value there.
+//!
+//! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract).
+
+use std::hash::{BuildHasher as _, Hash as _, Hasher as _};
+
+use hashbrown::HashTable;
+use rustc_hash::FxBuildHasher;
+
+/// The number of the action to wait. All others are numbers of entries of moves.
+pub const WAIT: u32 = u32::MAX;
+
+/// A node of a tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Node {
+    /// The cell with this number.
+    Cell(u32),
+    /// Two parts.
+    Cut {
+        /// The feature that is compared.
+        feature: u32,
+        /// The number it is compared with.
+        bound: f64,
+        /// The node for values up to the bound.
+        low: u32,
+        /// The node for the others.
+        high: u32,
+    },
+}
+
+/// What is known of an action in a cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Known {
+    /// The action.
+    pub action: u32,
+    /// How often it was taken.
+    pub visits: f64,
+    /// The mean cost from there on.
+    pub value: f64,
+    /// The standard error of that.
+    pub error: f64,
+}
+
+/// A cell.
+#[derive(Clone, Debug, Default)]
+pub struct Cell {
+    /// The combination of exact values it belongs to.
+    pub observation: u32,
+    /// The actions that were taken.
+    pub known: Vec<Known>,
+}
+
+impl Cell {
+    /// What is known of an action.
+    pub fn of(&self, action: u32) -> Option<&Known> {
+        self.known.iter().find(|one| one.action == action)
+    }
+}
+
+/// A partition.
+#[derive(Clone, Debug, Default)]
+pub struct Partition {
+    table: HashTable<u32>,
+    /// The words of the observations, one after the other.
+    keys: Vec<i32>,
+    width: usize,
+    /// By observation: its tree; the first node is the root.
+    trees: Vec<Vec<Node>>,
+    /// All cells.
+    pub cells: Vec<Cell>,
+}
+
+impl Partition {
+    /// An empty one, for so many words of exact values.
+    pub fn new(width: usize) -> Partition {
+        Partition {
+            width,
+            ..Partition::default()
+        }
+    }
+
+    /// The number of the combination of these exact values, if it was seen before.
+    pub fn observation(&self, key: &[i32]) -> Option<u32> {
+        let is_it = |&one: &u32| self.key(one) == key;
+        self.table.find(hash(key), is_it).copied()
+    }
+
+    /// The number of the combination of these exact values, which is new or not.
+    pub fn intern(&mut self, key: &[i32]) -> u32 {
+        if let Some(known) = self.observation(key) {
+            return known;
+        }
+        let number = self.trees.len() as u32;
+        let (keys, width) = (&self.keys, self.width);
+        let hash_of = |&one: &u32| hash(&keys[one as usize * width..][..width]);
+        self.table.insert_unique(hash(key), number, hash_of);
+        self.keys.extend_from_slice(key);
+        self.trees.push(vec![Node::Cell(self.cells.len() as u32)]);
+        self.cells.push(Cell {
+            observation: number,
+            known: Vec::new(),
+        });
+        number
+    }
+
+    /// How many combinations of exact values there are.
+    pub fn observations(&self) -> usize {
+        self.trees.len()
+    }
+
+    /// The exact values of an observation, as words.
+    pub fn key(&self, observation: u32) -> &[i32] {
+        &self.keys[observation as usize * self.width..][..self.width]
+    }
+
+    /// The tree of an observation.
+    pub fn tree(&self, observation: u32) -> &[Node] {
+        &self.trees[observation as usize]
+    }
+
+    /// The cell of a point.
+    pub fn cell(&self, observation: u32, point: &[f64]) -> u32 {
+        let tree = &self.trees[observation as usize];
+        let mut node = tree[0];
+        loop {
+            match node {
+                Node::Cell(cell) => return cell,
+                Node::Cut {
+                    feature,
+                    bound,
+                    low,
+                    high,
+                } => {
+                    let is_low = point[feature as usize] <= bound;
+                    node = tree[if is_low { low } else { high } as usize];
+                }
+            }
+        }
+    }
+
+    /// In how long a point that moves with these rates is in another cell; infinity if never.
+    pub fn exit(&self, observation: u32, point: &[f64], rates: &[f64]) -> f64 {
+        let tree = &self.trees[observation as usize];
+        let (mut node, mut exit) = (tree[0], f64::INFINITY);
+        while let Node::Cut {
+            feature,
+            bound,
+            low,
+            high,
+        } = node
+        {
+            let (value, rate) = (point[feature as usize], rates[feature as usize]);
+            let is_low = value <= bound;
+            if rate != 0.0 && (rate > 0.0) == is_low {
+                exit = exit.min(beyond(bound, value, rate));
+            }
+            node = tree[if is_low { low } else { high } as usize];
+        }
+        exit
+    }
+
+    /// Cuts a cell in two. Both parts know what the whole knew.
+    pub fn cut(&mut self, cell: u32, feature: u32, bound: f64) -> u32 {
+        let known = self.cells[cell as usize].clone();
+        let other = self.cells.len() as u32;
+        let tree = &mut self.trees[known.observation as usize];
+        let place = tree.iter().position(|&node| node == Node::Cell(cell));
+        let place = place.expect("the cell is a leaf of its tree");
+        let low = tree.len() as u32;
+        tree.extend([Node::Cell(cell), Node::Cell(other)]);
+        tree[place] = Node::Cut {
+            feature,
+            bound,
+            low,
+            high: low + 1,
+        };
+        self.cells.push(known);
+        other
+    }
+}
+
+/// Where a bound is crossed counts as crossed so much later, relative to the numbers at hand: a
+/// decision must not depend on how a number was rounded.
+const BEYOND: f64 = 1e-11;
+
+/// In how long a value that changes at a rate is surely beyond a bound.
+pub fn beyond(bound: f64, value: f64, rate: f64) -> f64 {
+    let slack = BEYOND * bound.abs().max(value.abs()).max(1.0);
+    ((bound - value) / rate).max(0.0) + slack / rate.abs()
+}
+
+fn hash(key: &[i32]) -> u64 {
+    let mut hasher = FxBuildHasher.build_hasher();
+    i32::hash_slice(key, &mut hasher);
+    hasher.finish()
+}

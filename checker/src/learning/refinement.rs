@@ -1,0 +1,200 @@
+//! Where the partition is cut further: where an action costs more on one side than on the other.
+//!
+//! For each cell and each feature, all cuts between two samples are looked at. The best one has the
+//! greatest sum, over actions, of the squares of Welch's t. It is made if that cannot be chance,
+//! and if the difference matters: if it is more than a small part of what runs differ by.
+//!
+//! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract: cuts by tests of
+//! both sides); B. L. Welch, Biometrika 34 (1947), for the test.
+
+use super::experience::Process;
+use super::partition::Partition;
+
+/// When a cell is cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rule {
+    /// The least sum of squares of t.
+    pub(super) score: f64,
+    /// The least difference of costs.
+    pub(super) difference: f64,
+    /// The least number of samples of an action on each side.
+    pub(super) samples: usize,
+    /// The most cells.
+    pub(super) cells: usize,
+}
+
+/// So many samples of a cell are looked at.
+const LOOKED_AT: usize = 4096;
+
+/// A sample of a cell.
+#[derive(Clone, Copy)]
+struct Point {
+    /// Which of the actions of the cell.
+    action: u32,
+    cost: f64,
+    point: u32,
+}
+
+/// A cut, and how much it tells apart.
+#[derive(Clone, Copy, Debug)]
+struct Cut {
+    feature: u32,
+    bound: f64,
+    score: f64,
+}
+
+/// Cuts all cells of a partition by what was sampled in them. Returns how many cuts it made.
+pub(super) fn refine(
+    partition: &mut Partition,
+    process: &Process,
+    dimension: usize,
+    rule: Rule,
+    discount: f64,
+) -> usize {
+    let before = partition.cells.len();
+    if dimension == 0 {
+        return 0;
+    }
+    let mut by_cell: Vec<Vec<u32>> = vec![Vec::new(); before];
+    for slot in 0..process.slots() {
+        by_cell[process.cell(slot) as usize].push(slot);
+    }
+    for (cell, slots) in by_cell.iter().enumerate() {
+        let all: usize = slots.iter().map(|&slot| process.of(slot).len()).sum();
+        let stride = all.div_ceil(LOOKED_AT).max(1);
+        let mut points = Vec::with_capacity(all / stride + slots.len());
+        for (action, &slot) in slots.iter().enumerate() {
+            let samples = process.of(slot).iter().step_by(stride);
+            points.extend(samples.map(|sample| Point {
+                action: action as u32,
+                cost: process.cost(sample, discount),
+                point: sample.point,
+            }));
+        }
+        let refiner = Refiner {
+            process,
+            dimension,
+            rule,
+            actions: slots.len(),
+        };
+        refiner.cut(partition, cell as u32, points);
+    }
+    partition.cells.len() - before
+}
+
+struct Refiner<'p> {
+    process: &'p Process,
+    dimension: usize,
+    rule: Rule,
+    actions: usize,
+}
+
+/// The number, the sum and the sum of squares of costs.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, cost: f64) {
+        self.count += 1.0;
+        self.sum += cost;
+        self.squares += cost * cost;
+    }
+
+    fn without(self, other: Sums) -> Sums {
+        Sums {
+            count: self.count - other.count,
+            sum: self.sum - other.sum,
+            squares: self.squares - other.squares,
+        }
+    }
+
+    fn mean(self) -> f64 {
+        self.sum / self.count
+    }
+
+    /// The variance of the mean.
+    fn error(self) -> f64 {
+        let deviation = (self.squares - self.sum * self.mean()).max(0.0);
+        deviation / (self.count - 1.0) / self.count
+    }
+}
+
+impl Refiner<'_> {
+    fn at(&self, point: &Point, feature: usize) -> f64 {
+        self.process.points[point.point as usize + feature]
+    }
+
+    /// Cuts a cell, and the parts of it, as long as that tells anything apart.
+    fn cut(&self, partition: &mut Partition, cell: u32, points: Vec<Point>) {
+        if points.len() < 2 * self.rule.samples || partition.cells.len() >= self.rule.cells {
+            return;
+        }
+        let mut points = points;
+        let cuts = (0..self.dimension).filter_map(|feature| self.best(&mut points, feature));
+        let Some(cut) = cuts.max_by(|one, other| one.score.total_cmp(&other.score)) else {
+            return;
+        };
+        let other = partition.cut(cell, cut.feature, cut.bound);
+        let (low, high) = points
+            .into_iter()
+            .partition(|one| self.at(one, cut.feature as usize) <= cut.bound);
+        self.cut(partition, cell, low);
+        self.cut(partition, other, high);
+    }
+
+    /// The best cut of a feature, if there is one that counts.
+    fn best(&self, points: &mut [Point], feature: usize) -> Option<Cut> {
+        points.sort_by(|one, other| {
+            let values = (self.at(one, feature), self.at(other, feature));
+            values.0.total_cmp(&values.1)
+        });
+        let mut all = vec![Sums::default(); self.actions];
+        for point in points.iter() {
+            all[point.action as usize].add(point.cost);
+        }
+        let mut low = vec![Sums::default(); self.actions];
+        // What the actions say of a cut; only one of them changes from point to point.
+        let mut scores = vec![0.0; self.actions];
+        let mut total = 0.0;
+        let mut best: Option<Cut> = None;
+        for pair in points.windows(2) {
+            let action = pair[0].action as usize;
+            low[action].add(pair[0].cost);
+            let score = self.score(low[action], all[action].without(low[action]));
+            total += score - scores[action];
+            scores[action] = score;
+            let (value, next) = (self.at(&pair[0], feature), self.at(&pair[1], feature));
+            if value == next || total < self.rule.score {
+                continue;
+            }
+            if best.is_none_or(|best| total > best.score) {
+                best = Some(Cut {
+                    feature: feature as u32,
+                    bound: f64::midpoint(value, next),
+                    score: total,
+                });
+            }
+        }
+        best
+    }
+
+    /// The square of t, if the difference counts.
+    fn score(&self, low: Sums, high: Sums) -> f64 {
+        let least = self.rule.samples as f64;
+        if low.count < least || high.count < least {
+            return 0.0;
+        }
+        let difference = (low.mean() - high.mean()).abs();
+        if difference < self.rule.difference {
+            return 0.0;
+        }
+        let error = low.error() + high.error();
+        // Where costs are no chance at all, the difference alone counts.
+        let least = self.rule.difference * self.rule.difference / 1e4;
+        difference * difference / error.max(least)
+    }
+}
