@@ -94,6 +94,19 @@ impl LiveVariables {
         })
     }
 
+    /// Whether a word is dead in a state.
+    pub fn is_dead(&self, words: &[i32], word: u32) -> bool {
+        let Ok(place) = self.words.binary_search_by_key(&word, |one| one.0) else {
+            return false;
+        };
+        let width = self.words.len().div_ceil(64);
+        let is_live = |reader: &WordReader| {
+            let location = words[reader.process as usize] as usize;
+            reader.live[location * width + place / 64] & 1 << (place % 64) != 0
+        };
+        !self.readers.iter().any(is_live)
+    }
+
     /// Sets what is dead in a state to its initial value.
     pub fn forget(&self, words: &mut [i32]) {
         let chunks = self.words.chunks(64);
@@ -241,7 +254,9 @@ impl LiveSearch<'_> {
             .iter()
             .map(|location| {
                 let rates = location.rates.iter().map(|&(_, function)| Some(function));
-                self.reads(rates.chain([location.invariant.function]))
+                let chances = &location.chances;
+                let chances = [chances.exponential_rate, chances.rates];
+                self.reads(rates.chain(chances).chain([location.invariant.function]))
             })
             .collect();
         // For each edge and branch: the source, the target, and what is certainly written by it.
@@ -252,6 +267,7 @@ impl LiveSearch<'_> {
             live[source].unite(&self.reads([edge.guard.function, index]));
             let (before, after) = self.partners(edge);
             for (branch, leg) in edge.branches.iter().enumerate() {
+                live[source].unite(&self.reads([leg.weight]));
                 let Exposure {
                     mut reads,
                     mut writes,

@@ -6,6 +6,7 @@ pub mod clock_bounds;
 pub mod clock_differences;
 pub(crate) mod dependence;
 pub(crate) mod function_reads;
+pub mod influence;
 pub(crate) mod joint_resets;
 pub mod live_variables;
 pub(crate) mod location_splitting;
@@ -15,4 +16,5 @@ pub(crate) mod visibility;
 pub(crate) mod zero_time_cycles;
 
 pub use clock_bounds::{Abstraction, ClockBounds};
+pub use influence::Influence;
 pub use live_variables::LiveVariables;

@@ -49,6 +49,12 @@ impl Observation {
         });
         words.sum()
     }
+
+    /// Whether a clock is seen in intervals.
+    pub fn has_clocks(&self) -> bool {
+        let mut features = self.continuous.iter();
+        features.any(|one| matches!(one.seen, Seen::Clock(_)))
+    }
 }
 
 /// A number that a strategy sees.

@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use super::episode::Episode;
-use super::partition::{Cell, Known, Partition, WAIT};
+use super::partition::{Cell, DRAW, Known, Partition, WAIT};
 
 /// The stand after which nothing costs any more.
 pub(super) const END: u32 = 0;
@@ -72,6 +72,8 @@ pub(super) struct Process {
     /// The samples in the order in which they came.
     trail: Vec<Sample>,
     pub(super) values: Vec<f64>,
+    /// By slot: the standard error of its value.
+    errors: Vec<f64>,
     /// By slot: how often its action was taken, if that is more than there are samples.
     visits: Vec<f64>,
 }
@@ -159,6 +161,9 @@ impl Experience {
         };
         let mut here = Vec::with_capacity(self.dimension);
         for (number, memory) in self.memories.iter().enumerate() {
+            if memory.action == DRAW {
+                continue;
+            }
             here.clear();
             let numbers = &self.points[memory.point as usize..];
             here.extend_from_slice(&numbers[..self.dimension]);
@@ -283,6 +288,7 @@ impl Builder<'_> {
         process.order = order.into_iter().map(|(_, slot)| slot).collect();
         process.waits = process.slots.iter().map(|slot| slot.1 == WAIT).collect();
         process.values = vec![0.0; slots];
+        process.errors = vec![0.0; slots];
         self.process
     }
 }
@@ -290,7 +296,7 @@ impl Builder<'_> {
 /// Sweeps over all values end when no value changes by more than this part of the greatest one,
 const SMALL: f64 = 1e-9;
 /// or after so many.
-const MOST_SWEEPS: usize = 1000;
+const MOST_SWEEPS: usize = 500;
 
 impl Process {
     /// The samples of a slot.
@@ -309,12 +315,12 @@ impl Process {
         self.slots[slot as usize].0
     }
 
-    /// The value of a stand: of the best action there; 0 where nothing is known.
+    /// The value of a stand: of the best action there; 0 where nothing is known. What is known from
+    /// few samples counts as worse by its error, or else luck would be taken for skill.
     pub(super) fn value(&self, stand: u32) -> f64 {
         let slots = self.stands[stand as usize].iter();
-        let least = slots.fold(f64::INFINITY, |least, &slot| {
-            least.min(self.values[slot as usize])
-        });
+        let cautious = slots.map(|&slot| self.values[slot as usize] + self.errors[slot as usize]);
+        let least = cautious.fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 0.0 }
     }
 
@@ -331,14 +337,13 @@ impl Process {
     /// Computes the values of all actions in all cells: the means of what the samples cost.
     ///
     /// Source: value iteration, with the latest decisions first (Gauss and Seidel).
-    pub(super) fn iterate(&mut self, discount: f64) {
+    pub(super) fn iterate(&mut self, discount: f64, spread: f64) {
         for _ in 0..MOST_SWEEPS {
             let (mut change, mut greatest) = (0.0_f64, 0.0_f64);
             for place in 0..self.order.len() {
                 let slot = self.order[place];
-                let samples = self.of(slot);
-                let sum: f64 = samples.iter().map(|one| self.cost(one, discount)).sum();
-                let value = sum / samples.len() as f64;
+                let (value, error) = self.mean(slot, discount, spread);
+                self.errors[slot as usize] = error;
                 change = change.max((value - self.values[slot as usize]).abs());
                 greatest = greatest.max(value.abs());
                 self.values[slot as usize] = value;
@@ -347,6 +352,21 @@ impl Process {
                 return;
             }
         }
+    }
+
+    /// The mean of what the samples of a slot cost, and its standard error: as if one more sample were
+    /// off by as much as all runs differ.
+    fn mean(&self, slot: u32, discount: f64, spread: f64) -> (f64, f64) {
+        let samples = self.of(slot);
+        let count = samples.len() as f64;
+        let sum: f64 = samples.iter().map(|one| self.cost(one, discount)).sum();
+        let mean = sum / count;
+        let squares = samples.iter().map(|one| {
+            let off = self.cost(one, discount) - mean;
+            off * off
+        });
+        let variance = (squares.sum::<f64>() + spread * spread) / count;
+        (mean, (variance / count).sqrt())
     }
 
     /// Moves the values of actions towards what each sample costs, the latest sample first. The n-th
@@ -375,21 +395,16 @@ impl Process {
     }
 
     /// Notes in the cells what is known of the actions.
-    pub(super) fn note(&self, cells: &mut [Cell], discount: f64) {
+    pub(super) fn note(&self, cells: &mut [Cell], discount: f64, spread: f64) {
         let is_whole = self.visits.is_empty();
         for cell in cells.iter_mut().filter(|_| is_whole) {
             cell.known.clear();
         }
         for slot in 0..self.slots() {
-            let samples = self.of(slot);
             let value = self.values[slot as usize];
-            let count = samples.len() as f64;
+            let count = self.of(slot).len() as f64;
             let visits = self.visits.get(slot as usize).copied().unwrap_or(count);
-            let squares = samples.iter().map(|one| {
-                let off = self.cost(one, discount) - value;
-                off * off
-            });
-            let variance = squares.sum::<f64>() / (count - 1.0).max(1.0);
+            let (_, error) = self.mean(slot, discount, spread);
             let (cell, action) = self.slots[slot as usize];
             let known = &mut cells[cell as usize].known;
             known.retain(|one| one.action != action);
@@ -397,7 +412,7 @@ impl Process {
                 action,
                 visits,
                 value,
-                error: (variance / count).sqrt(),
+                error,
             });
         }
         for cell in cells {
@@ -407,9 +422,10 @@ impl Process {
 
     /// Begins with the values that actions had in the cells.
     pub(super) fn begin_with(&mut self, cells: &[Cell]) {
-        for (value, &(cell, action)) in self.values.iter_mut().zip(&self.slots) {
+        for (slot, &(cell, action)) in self.slots.iter().enumerate() {
             if let Some(known) = cells[cell as usize].of(action) {
-                *value = known.value;
+                self.values[slot] = known.value;
+                self.errors[slot] = known.error;
             }
         }
     }

@@ -3,9 +3,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::episode::{Episode, Step};
-use super::observation::{self, Sight};
-use super::partition::{Cell, Partition, WAIT};
-use crate::ir::{Aim, Observation};
+use super::observation::Sight;
+use super::partition::{Cell, DRAW, Partition, WAIT};
+use crate::analysis::LiveVariables;
+use crate::ir::{Aim, Observation, Seen};
 use crate::stochastic::{Chooser, Chosen, Failure, Guidance, Moment, RunId, StateView};
 
 /// How an explorer decides.
@@ -24,6 +25,8 @@ pub struct Explorers {
     observation: Arc<Observation>,
     aim: Aim,
     sign: f64,
+    /// What is seen of variables and clocks that nothing reads before they are set again.
+    live: Option<Arc<LiveVariables>>,
     manner: Mutex<Manner>,
 }
 
@@ -35,7 +38,16 @@ impl Explorers {
             observation,
             aim,
             sign,
+            live: None,
             manner: Mutex::new(manner),
+        }
+    }
+
+    /// The same, but what is dead by this analysis is not seen.
+    pub(super) fn without_dead(self, live: Option<LiveVariables>) -> Explorers {
+        Explorers {
+            live: live.map(Arc::new),
+            ..self
         }
     }
 }
@@ -47,6 +59,8 @@ impl Guidance for Explorers {
             observation: Arc::clone(&self.observation),
             aim: self.aim,
             sign: self.sign,
+            live: self.live.clone(),
+            words: Vec::new(),
             manner: Some(manner.clone()),
             sight: Sight::default(),
             episode: Episode::default(),
@@ -63,6 +77,9 @@ pub struct Explorer {
     observation: Arc<Observation>,
     aim: Aim,
     sign: f64,
+    live: Option<Arc<LiveVariables>>,
+    /// The state without what is dead.
+    words: Vec<i32>,
     manner: Option<Manner>,
     sight: Sight,
     episode: Episode,
@@ -152,22 +169,52 @@ impl Chooser for Explorer {
         self.plan = None;
     }
 
-    fn sees_time(&mut self, state: &mut StateView<'_>) -> Result<bool, Failure> {
+    fn renew(&mut self) {
         self.draws = false;
         self.plan = None;
-        Ok(observation::sees_time(&self.observation, state))
+    }
+
+    fn sees_time(&self) -> bool {
+        self.observation.has_clocks()
     }
 
     fn choose(&mut self, state: &mut StateView<'_>, moment: Moment<'_>) -> Result<Chosen, Failure> {
-        self.sight.look(&self.observation, state)?;
-        let is_moving = self.sight.look_at_rates(&self.observation, state);
+        let is_moving = match &self.live {
+            None => {
+                self.sight.look(&self.observation, state)?;
+                self.sight.look_at_rates(&self.observation, state)
+            }
+            Some(live) => {
+                self.sight.look_exactly(&self.observation, state)?;
+                self.words.clear();
+                self.words.extend_from_slice(state.words);
+                live.forget(&mut self.words);
+                let mut state = StateView {
+                    words: &mut self.words,
+                    executor: state.executor,
+                    network: state.network,
+                };
+                self.sight.look_at_point(&self.observation, &mut state)?;
+                self.sight.look_at_rates(&self.observation, &state);
+                let Sight { rates, .. } = &mut self.sight;
+                for (feature, rate) in self.observation.continuous.iter().zip(&mut *rates) {
+                    if let Seen::Clock(clock) = feature.seen
+                        && live.is_dead(state.words, clock)
+                    {
+                        *rate = 0.0;
+                    }
+                }
+                rates.iter().any(|&rate| rate != 0.0)
+            }
+        };
         let manner = self.manner.take().expect("it is asked in a run");
         let chosen = self.decided(&manner, state, moment, is_moving);
         if manner.learns {
             let worth = self.worth(state, moment.time)?;
             let (action, waits) = match chosen {
                 Chosen::Move(place) => (moment.moves[place], false),
-                Chosen::Wait(_) | Chosen::Draw => (WAIT, true),
+                Chosen::Wait(_) => (WAIT, true),
+                Chosen::Draw => (DRAW, false),
             };
             self.record(moment, worth, action, waits && is_moving);
         }
@@ -276,7 +323,7 @@ fn best(cell: &Cell, moment: Moment<'_>, mut learner: Option<&mut StateView<'_>>
         let cost = match (cell.of(action), &mut learner) {
             (None, None) => continue,
             (None, Some(_)) => f64::NEG_INFINITY,
-            (Some(known), None) => known.value,
+            (Some(known), None) => known.value + known.error,
             (Some(known), Some(_)) if known.visits < TRIES => f64::NEG_INFINITY,
             (Some(known), Some(state)) => known.value + known.error * normal(state),
         };

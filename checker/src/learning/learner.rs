@@ -18,6 +18,8 @@ use super::explorer::{Explorer, Explorers, Manner};
 use super::options::{Learning, Method};
 use super::partition::Partition;
 use super::refinement::{Rule, refine};
+use super::whole_state::functions;
+use crate::analysis::LiveVariables;
 use crate::ir::{Asked, Observation, Optimum};
 use crate::stochastic::{Behaviour, Failure, RunId, Runner, runs_by};
 
@@ -85,6 +87,8 @@ pub fn learn(
         learns: true,
     };
     let explorers = Explorers::new(Arc::clone(observation), asked.aim, sign, first);
+    let live = asked.features.is_none().then(|| live_in(behaviour, asked));
+    let explorers = explorers.without_dead(live.flatten());
     let behaviour = Behaviour {
         guidance: Some(&explorers),
         ..behaviour
@@ -108,6 +112,11 @@ pub fn learn(
         best: Partition::new(width),
     };
     learner.all(&mut watch)
+}
+
+/// What is dead where, of what the whole state has.
+fn live_in(behaviour: Behaviour<'_>, asked: &Optimum) -> Option<LiveVariables> {
+    LiveVariables::new(behaviour.network, functions(asked), false)
 }
 
 struct Learner<'a> {
@@ -141,6 +150,21 @@ impl Learner<'_> {
                 is_complete = false;
                 break;
             };
+            if std::env::var("TRACE").is_ok() {
+                eprintln!(
+                    "iteration {} runs {} cells {} memories {} mean {:?} V0 {:?}",
+                    self.progress.iterations,
+                    self.progress.runs,
+                    self.partition.cells.len(),
+                    self.experience.len(),
+                    mean,
+                    self.partition.cells.first().map(|c| c
+                        .known
+                        .iter()
+                        .map(|k| (k.action, k.visits as u64, (k.value * 100.0).round() / 100.0))
+                        .collect::<Vec<_>>())
+                );
+            }
             let gain = match self.progress.best {
                 None => f64::INFINITY,
                 Some(best) => self.sign * (best.value - mean.value),
@@ -214,7 +238,7 @@ impl Learner<'_> {
         let mut process = self.experience.process(&self.partition);
         process.begin_with(&self.partition.cells);
         if self.options.method == Method::M {
-            process.iterate(discount);
+            process.iterate(discount, self.spread);
         }
         let rule = Rule {
             score: self.options.score,
@@ -234,10 +258,10 @@ impl Learner<'_> {
             process.begin_with(&self.partition.cells);
         }
         match self.options.method {
-            Method::M => process.iterate(discount),
+            Method::M => process.iterate(discount, self.spread),
             Method::Q => process.follow(&self.partition.cells, discount, self.options.alpha),
         }
-        process.note(&mut self.partition.cells, discount);
+        process.note(&mut self.partition.cells, discount, self.spread);
     }
 
     /// The mean value of runs under the strategy that takes the best action everywhere; none if it

@@ -25,8 +25,17 @@ impl Sight {
         observation: &Observation,
         state: &mut StateView<'_>,
     ) -> Result<(), Failure> {
+        self.look_exactly(observation, state)?;
+        self.look_at_point(observation, state)
+    }
+
+    /// Sees the exact values.
+    pub fn look_exactly(
+        &mut self,
+        observation: &Observation,
+        state: &mut StateView<'_>,
+    ) -> Result<(), Failure> {
         self.key.clear();
-        self.point.clear();
         for feature in &observation.discrete {
             match feature.seen {
                 Seen::Location(process) => self.key.push(state.location(process).0 as i32),
@@ -38,6 +47,16 @@ impl Sight {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Sees the values in intervals.
+    pub fn look_at_point(
+        &mut self,
+        observation: &Observation,
+        state: &mut StateView<'_>,
+    ) -> Result<(), Failure> {
+        self.point.clear();
         for feature in &observation.continuous {
             self.point.push(number(feature, state)?);
         }
@@ -51,12 +70,6 @@ impl Sight {
         self.rates.extend(rates);
         self.rates.iter().any(|&rate| rate != 0.0)
     }
-}
-
-/// Whether some continuous feature changes as time passes from this state on.
-pub fn sees_time(observation: &Observation, state: &StateView<'_>) -> bool {
-    let mut rates = observation.continuous.iter().map(|one| rate(one, state));
-    rates.any(|rate| rate != 0.0)
 }
 
 /// The number that a feature is.

@@ -73,9 +73,9 @@ impl Default for Learning {
             discount: 1.0,
             alpha: 1000.0,
             randomness: 0.2,
-            score: 24.0,
+            score: 10.0,
             difference: 0.02,
-            samples: 16,
+            samples: 24,
             cells: 200_000,
             memory: 3_000_000,
         }

@@ -15,6 +15,10 @@ use rustc_hash::FxBuildHasher;
 /// The number of the action to wait. All others are numbers of entries of moves.
 pub const WAIT: u32 = u32::MAX;
 
+/// What stands for an action where a delay was drawn at random. It is not the controller's choice,
+/// and says nothing of what it costs to wait.
+pub const DRAW: u32 = u32::MAX - 1;
+
 /// A node of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Node {
@@ -51,6 +55,8 @@ pub struct Known {
 pub struct Cell {
     /// The combination of exact values it belongs to.
     pub observation: u32,
+    /// Its node in the tree of that.
+    node: u32,
     /// The actions that were taken.
     pub known: Vec<Known>,
 }
@@ -103,6 +109,7 @@ impl Partition {
         self.trees.push(vec![Node::Cell(self.cells.len() as u32)]);
         self.cells.push(Cell {
             observation: number,
+            node: 0,
             known: Vec::new(),
         });
         number
@@ -166,20 +173,23 @@ impl Partition {
 
     /// Cuts a cell in two. Both parts know what the whole knew.
     pub fn cut(&mut self, cell: u32, feature: u32, bound: f64) -> u32 {
-        let known = self.cells[cell as usize].clone();
         let other = self.cells.len() as u32;
-        let tree = &mut self.trees[known.observation as usize];
-        let place = tree.iter().position(|&node| node == Node::Cell(cell));
-        let place = place.expect("the cell is a leaf of its tree");
+        let whole = &mut self.cells[cell as usize];
+        let tree = &mut self.trees[whole.observation as usize];
         let low = tree.len() as u32;
         tree.extend([Node::Cell(cell), Node::Cell(other)]);
-        tree[place] = Node::Cut {
+        tree[whole.node as usize] = Node::Cut {
             feature,
             bound,
             low,
             high: low + 1,
         };
-        self.cells.push(known);
+        whole.node = low;
+        let part = Cell {
+            node: low + 1,
+            ..whole.clone()
+        };
+        self.cells.push(part);
         other
     }
 }

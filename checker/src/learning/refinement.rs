@@ -130,20 +130,23 @@ impl Refiner<'_> {
 
     /// Cuts a cell, and the parts of it, as long as that tells anything apart.
     fn cut(&self, partition: &mut Partition, cell: u32, points: Vec<Point>) {
-        if points.len() < 2 * self.rule.samples || partition.cells.len() >= self.rule.cells {
-            return;
+        let mut open = vec![(cell, points)];
+        while let Some((cell, mut points)) = open.pop() {
+            let is_small = points.len() < 2 * self.rule.samples;
+            if is_small || partition.cells.len() >= self.rule.cells {
+                continue;
+            }
+            let cuts = (0..self.dimension).filter_map(|feature| self.best(&mut points, feature));
+            let Some(cut) = cuts.max_by(|one, other| one.score.total_cmp(&other.score)) else {
+                continue;
+            };
+            let other = partition.cut(cell, cut.feature, cut.bound);
+            let (low, high) = points
+                .into_iter()
+                .partition(|one| self.at(one, cut.feature as usize) <= cut.bound);
+            open.push((cell, low));
+            open.push((other, high));
         }
-        let mut points = points;
-        let cuts = (0..self.dimension).filter_map(|feature| self.best(&mut points, feature));
-        let Some(cut) = cuts.max_by(|one, other| one.score.total_cmp(&other.score)) else {
-            return;
-        };
-        let other = partition.cut(cell, cut.feature, cut.bound);
-        let (low, high) = points
-            .into_iter()
-            .partition(|one| self.at(one, cut.feature as usize) <= cut.bound);
-        self.cut(partition, cell, low);
-        self.cut(partition, other, high);
     }
 
     /// The best cut of a feature, if there is one that counts.
@@ -160,6 +163,9 @@ impl Refiner<'_> {
         // What the actions say of a cut; only one of them changes from point to point.
         let mut scores = vec![0.0; self.actions];
         let mut total = 0.0;
+        // The best of many cuts is the greatest of as many scores that are chance.
+        let tried = (points.len() * self.dimension) as f64;
+        let least = self.rule.score + 3.0 * self.actions as f64 + 2.0 * tried.ln();
         let mut best: Option<Cut> = None;
         for pair in points.windows(2) {
             let action = pair[0].action as usize;
@@ -168,7 +174,7 @@ impl Refiner<'_> {
             total += score - scores[action];
             scores[action] = score;
             let (value, next) = (self.at(&pair[0], feature), self.at(&pair[1], feature));
-            if value == next || total < self.rule.score {
+            if value == next || total < least {
                 continue;
             }
             if best.is_none_or(|best| total > best.score) {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use super::observation::{self, Sight};
+use super::observation::Sight;
 use super::partition::{Node, Partition, WAIT, beyond};
 use crate::exec::arithmetic::double_of_words;
 use crate::ir::{Observation, Part, Seen};
@@ -150,7 +150,7 @@ fn simplified(partition: &Partition, observation: u32, node: u32) -> Ranked {
             let known = partition.cells[cell as usize].known.iter();
             let rated = known.map(|one| Rated {
                 action: one.action,
-                cost: one.value,
+                cost: one.value + one.error,
                 visits: one.visits,
             });
             Ranked::Cell(rated.collect())
@@ -375,11 +375,8 @@ struct Follower {
 impl Chooser for Follower {
     fn begin(&mut self, _: RunId) {}
 
-    fn sees_time(&mut self, state: &mut StateView<'_>) -> Result<bool, Failure> {
-        Ok(observation::sees_time(
-            &self.inner.strategy.observation,
-            state,
-        ))
+    fn sees_time(&self) -> bool {
+        self.inner.strategy.observation.has_clocks()
     }
 
     fn choose(&mut self, state: &mut StateView<'_>, moment: Moment<'_>) -> Result<Chosen, Failure> {
@@ -404,7 +401,7 @@ impl Chooser for Follower {
         }
         // It waits until another action is the best.
         let (mut waited, mut point) = (0.0, sight.point.clone());
-        while best(&options, &point, strategy.is_greatest) == Some(place) {
+        while best(&options, &point, strategy.is_greatest).is_none_or(|best| best == place) {
             let exits = options
                 .iter()
                 .map(|one| exit(one.tree, &point, &sight.rates));

@@ -2,17 +2,27 @@
 //!
 //! Locations, truth values, scalars, and integers with a range of at most [`MOST_VALUES`] are seen
 //! exactly. All other integers, doubles and clocks are seen in intervals. What never changes is left
-//! out.
+//! out, and what makes no difference to what may still happen and to what that costs
+//! ([`Influence`]).
 
-use crate::ir::{Feature, Network, Observation, ProcessId, Seen, Shape};
+use crate::analysis::Influence;
+use crate::ir::{
+    Aim, Feature, FunctionId, Network, Observation, Optimum, Path, ProcessId, RunLimit, Seen, Shape,
+};
 
 /// An integer that can have more values is seen in intervals.
 const MOST_VALUES: i64 = 33;
 
-/// The observation of the whole state of a network in the stochastic reading.
-pub fn whole_state(network: &Network) -> Observation {
+/// The observation of the whole state of a network in the stochastic reading, for a query.
+pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
+    let number = match asked.aim {
+        Aim::Expected(number) => Some(number),
+        Aim::Time | Aim::Probability => None,
+    };
     let mut finder = Finder {
         network,
+        influence: Influence::new(network, functions(asked), number),
+        bound: asked.bound.limit,
         written: written(network),
         observation: Observation::default(),
     };
@@ -28,6 +38,14 @@ pub fn whole_state(network: &Network) -> Observation {
         finder.add(&variable.name, variable.offset, &variable.shape);
     }
     finder.observation
+}
+
+/// The functions by which a query decides when a run ends.
+pub fn functions(asked: &Optimum) -> Vec<FunctionId> {
+    match &asked.goal {
+        Some(Path::Eventually(goal)) => goal.function.into_iter().collect(),
+        _ => Vec::new(),
+    }
 }
 
 /// By word: whether some edge may change it.
@@ -48,6 +66,8 @@ fn written(network: &Network) -> Vec<bool> {
 
 struct Finder<'n> {
     network: &'n Network,
+    influence: Influence,
+    bound: RunLimit,
     written: Vec<bool>,
     observation: Observation,
 }
@@ -55,7 +75,16 @@ struct Finder<'n> {
 impl Finder<'_> {
     fn add(&mut self, name: &str, offset: u32, shape: &Shape) {
         let text = name.to_owned();
-        if self.network.chances.clocks.binary_search(&offset).is_ok() {
+        let is_one = matches!(
+            shape,
+            Shape::Integer { .. } | Shape::Bool | Shape::Double | Shape::Scalar { .. }
+        );
+        let is_clock = self.network.chances.clocks.binary_search(&offset).is_ok();
+        let is_bound = self.bound == RunLimit::Clock(offset);
+        if (is_one || is_clock) && !is_bound && !self.influence.differs(offset) {
+            return;
+        }
+        if is_clock {
             let seen = Seen::Clock(offset);
             self.observation.continuous.push(Feature { text, seen });
             return;

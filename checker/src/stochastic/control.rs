@@ -2,13 +2,13 @@
 //!
 //! The controller owns all controllable outputs of all processes. It is asked at a *decision*: when
 //! one of them can be taken. There are two ways in which decisions come about:
-//! * Where what it sees changes as time passes, it is asked at once, whenever something has
-//!   happened or one more of its moves is enabled. It moves at once, or it waits; then it is asked
-//!   again after the time that it says, which is when what it sees changes next.
-//! * Elsewhere a delay is drawn for its moves as for all others, and it is asked when that is over.
-//!   If it waits then, it is not asked again before something has happened.
+//! * If it sees clocks, it is asked at once, whenever something has happened or one more of its
+//!   moves is enabled. It moves at once, or it waits; then it is asked again after the time that it
+//!   says, which is when what it sees changes next.
+//! * If it sees none, a delay is drawn for its moves as for all others, and it is asked when that is
+//!   over. If it waits then, it is not asked again before something has happened.
 //!
-//! In both, it must move where time cannot pass and nobody else can move. So a delay of the
+//! In both, it chooses among all moves that are enabled, of whatever process, and it must move where time cannot pass and nobody else can move. So a delay of the
 //! controller depends on what it sees and on nothing else, and what is decided is the same in
 //! random runs, in the closed loop, and in code that is made of a strategy.
 //!
@@ -115,8 +115,11 @@ pub trait Chooser: Any + Send {
     /// A run begins.
     fn begin(&mut self, run: RunId);
 
-    /// Whether what it sees changes as time passes from this state on.
-    fn sees_time(&mut self, state: &mut StateView<'_>) -> Result<bool, Failure>;
+    /// Something has happened in the run.
+    fn renew(&mut self) {}
+
+    /// Whether it sees clocks.
+    fn sees_time(&self) -> bool;
 
     /// Decides.
     fn choose(&mut self, state: &mut StateView<'_>, moment: Moment<'_>) -> Result<Chosen, Failure>;
@@ -133,8 +136,8 @@ pub(super) struct Control {
     pub(super) chooser: Box<dyn Chooser>,
     /// For how long the controller waits.
     pub(super) hold: f64,
-    /// Whether it is asked at once, or delays are drawn; none if that is not known yet.
-    pub(super) sees_time: Option<bool>,
+    /// Whether it is asked at once, or delays are drawn.
+    sees_time: bool,
     /// Whether it has let delays be drawn.
     pub(super) draws: bool,
     /// Whether it lets others move where time cannot pass.
@@ -144,10 +147,11 @@ pub(super) struct Control {
 
 impl Control {
     pub(super) fn new(guidance: &dyn Guidance) -> Control {
+        let chooser = guidance.chooser();
         Control {
-            chooser: guidance.chooser(),
+            sees_time: chooser.sees_time(),
+            chooser,
             hold: 0.0,
-            sees_time: None,
             draws: false,
             passes: false,
             moves: Vec::new(),
@@ -156,14 +160,14 @@ impl Control {
 
     /// Something has happened: it is asked anew.
     pub(super) fn renew(&mut self) {
+        self.chooser.renew();
         self.hold = 0.0;
-        self.sees_time = None;
         self.draws = false;
         self.passes = false;
     }
 
     /// Whether delays are drawn for its moves.
     pub(super) fn is_drawing(&self) -> bool {
-        self.draws || self.sees_time != Some(true)
+        self.draws || !self.sees_time
     }
 }

@@ -91,7 +91,7 @@ fn found(
     let options = &prepared.options;
     let observation = match &asked.features {
         Some(features) => Arc::new(features.clone()),
-        None => Arc::new(whole_state(behaviour.network)),
+        None => Arc::new(whole_state(behaviour.network, asked)),
     };
     let precision = precision_of(behaviour, options);
     let moves = Runner::of(behaviour).moves_of_controller();

@@ -8,14 +8,10 @@ use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 
 impl Race<'_> {
-    /// Finds how the controller is asked from here on, and lets its processes plan anew.
-    pub(super) fn look_for_decisions(&mut self, program: &Program<'_>) -> Result<(), Failure> {
-        let Some(control) = &mut self.control else {
-            return Ok(());
-        };
-        if control.sees_time.is_none() {
-            let mut state = self.machine.view_of_state();
-            control.sees_time = Some(control.chooser.sees_time(&mut state)?);
+    /// Lets the processes of the controller plan anew.
+    pub(super) fn look_for_decisions(&mut self, program: &Program<'_>) {
+        if self.control.is_none() {
+            return;
         }
         for process in 0..self.locations.len() {
             if program
@@ -25,7 +21,6 @@ impl Race<'_> {
                 self.make_stale(process as u32);
             }
         }
-        Ok(())
     }
 
     /// Whether an output is one of the controller's that somebody decides about.
@@ -136,7 +131,7 @@ impl Race<'_> {
     }
 
     /// The moves that the controller can make now, by their entries, and whether the environment
-    /// can move, too: of those processes whose delays are over.
+    /// can move, too: one of its processes whose delay is over.
     fn moves_of_controller(
         &mut self,
         program: &Program<'_>,
@@ -153,13 +148,14 @@ impl Race<'_> {
                 || spot.urgency != Urgency::Normal
                 || self.attempts[process] <= TOLERANCE
                 || self.bounds[process] <= TOLERANCE;
-            if !is_ready || spot.outputs.is_empty() || !self.find_outputs(program, process)? {
+            let is_asked = is_ready || spot.is_controllable;
+            if !is_asked || spot.outputs.is_empty() || !self.find_outputs(program, process)? {
                 continue;
             }
             for &choice in &self.choices {
                 let instance = program.instance(choice);
                 if !instance.edge.controllable {
-                    others = true;
+                    others |= is_ready;
                 } else if !moves.contains(&instance.entry) {
                     moves.push(instance.entry);
                 }

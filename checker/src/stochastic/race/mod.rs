@@ -263,7 +263,7 @@ impl<'a> Race<'a> {
     ) -> Result<Next, Failure> {
         self.rest = rest;
         self.take_advice(program)?;
-        self.look_for_decisions(program)?;
+        self.look_for_decisions(program);
         if self.committed > 0 {
             self.put_plans_off(program)?;
             return self.next_committed(program);
