@@ -34,8 +34,10 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         self.refuse_contradiction(query, &options.precision)?;
         let control = match &query.kind {
-            QueryKind::Statistical(_) | QueryKind::Optimum(_) => return Ok(()),
-            QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => return Ok(()),
+            QueryKind::Statistical(_)
+            | QueryKind::Optimum(_)
+            | QueryKind::SaveStrategy { .. }
+            | QueryKind::LoadStrategy { .. } => return Ok(()),
             _ if prepared.learned.is_some() => {
                 return Err(self.refusal(
                     codes::UNSUPPORTED_QUERY,

@@ -2,32 +2,32 @@
 
 /// A decision.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub(super) struct Step {
     /// What the controller did: a move, or [`super::WAIT`].
-    pub action: u32,
+    pub(super) action: u32,
     /// The number of possible actions.
-    pub choices: u32,
+    pub(super) choices: u32,
     /// The cost between this decision and the next, or the end of the run.
-    pub cost: f64,
+    pub(super) cost: f64,
     /// The time until then.
-    pub time: f64,
+    pub(super) time: f64,
     /// Whether what is seen changed meanwhile with the rates that are kept with it.
-    pub moves: bool,
+    pub(super) moves: bool,
 }
 
 /// The decisions of a run.
 #[derive(Clone, Debug, Default)]
-pub struct Episode {
+pub(super) struct Episode {
     /// In their order.
-    pub steps: Vec<Step>,
+    pub(super) steps: Vec<Step>,
     /// What was seen exactly: the same number of words for each step.
-    pub keys: Vec<i32>,
+    pub(super) keys: Vec<i32>,
     /// What was seen in intervals: for each step its numbers, and their rates if they moved.
-    pub points: Vec<f64>,
+    pub(super) points: Vec<f64>,
     /// The possible actions, step by step.
-    pub choices: Vec<u32>,
+    pub(super) choices: Vec<u32>,
     /// The cost of the whole run.
-    pub cost: f64,
+    pub(super) cost: f64,
     /// How many moves the run had.
-    pub moves: u64,
+    pub(super) moves: u64,
 }

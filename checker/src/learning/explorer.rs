@@ -11,17 +11,17 @@ use crate::stochastic::{Chooser, Chosen, Failure, Guidance, Moment, RunId, State
 
 /// How an explorer decides.
 #[derive(Clone, Debug)]
-pub struct Manner {
+pub(super) struct Manner {
     /// What is known until now.
-    pub partition: Arc<Partition>,
+    pub(super) partition: Arc<Partition>,
     /// How often it decides at random, from 0 to 1.
-    pub randomness: f64,
+    pub(super) randomness: f64,
     /// Whether it tries what is not known well, and keeps what happens.
-    pub learns: bool,
+    pub(super) learns: bool,
 }
 
 /// Makes explorers.
-pub struct Explorers {
+pub(super) struct Explorers {
     observation: Arc<Observation>,
     aim: Aim,
     sign: f64,
@@ -33,7 +33,12 @@ pub struct Explorers {
 impl Explorers {
     /// For a strategy that sees this and is best for that; `sign` is -1 if the greatest value is
     /// the best.
-    pub fn new(observation: Arc<Observation>, aim: Aim, sign: f64, manner: Manner) -> Explorers {
+    pub(super) fn new(
+        observation: Arc<Observation>,
+        aim: Aim,
+        sign: f64,
+        manner: Manner,
+    ) -> Explorers {
         Explorers {
             observation,
             aim,
@@ -73,7 +78,7 @@ impl Guidance for Explorers {
 }
 
 /// Decides for the controller, and keeps what happens.
-pub struct Explorer {
+pub(super) struct Explorer {
     observation: Arc<Observation>,
     aim: Aim,
     sign: f64,
@@ -101,12 +106,12 @@ struct Plan {
 
 impl Explorer {
     /// From now on it decides in this manner; without one it must not be asked.
-    pub fn set(&mut self, manner: Option<Manner>) {
+    pub(super) fn set(&mut self, manner: Option<Manner>) {
         self.manner = manner;
     }
 
     /// The decisions of the run that has ended after this time with this value.
-    pub fn ended(&mut self, value: f64, time: f64, moves: u64) -> Episode {
+    pub(super) fn ended(&mut self, value: f64, time: f64, moves: u64) -> Episode {
         let mut episode = std::mem::take(&mut self.episode);
         let cost = self.sign * value;
         if let Some(last) = episode.steps.last_mut() {

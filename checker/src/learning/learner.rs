@@ -143,28 +143,13 @@ impl Learner<'_> {
                 is_complete = false;
                 break;
             }
-            self.value();
+            self.value(in_reset);
             self.progress.iterations += 1;
             in_reset += 1;
             let Some(mean) = self.judge(watch)? else {
                 is_complete = false;
                 break;
             };
-            if std::env::var("TRACE").is_ok() {
-                eprintln!(
-                    "iteration {} runs {} cells {} memories {} mean {:?} V0 {:?}",
-                    self.progress.iterations,
-                    self.progress.runs,
-                    self.partition.cells.len(),
-                    self.experience.len(),
-                    mean,
-                    self.partition.cells.first().map(|c| c
-                        .known
-                        .iter()
-                        .map(|k| (k.action, k.visits as u64, (k.value * 100.0).round() / 100.0))
-                        .collect::<Vec<_>>())
-                );
-            }
             let gain = match self.progress.best {
                 None => f64::INFINITY,
                 Some(best) => self.sign * (best.value - mean.value),
@@ -233,8 +218,8 @@ impl Learner<'_> {
     }
 
     /// Cuts the partition further, and computes all values.
-    fn value(&mut self) {
-        let discount = self.options.discount;
+    fn value(&mut self, iteration: u64) {
+        let discount = self.options.discount(self.progress.steps_of_run);
         let mut process = self.experience.process(&self.partition);
         process.begin_with(&self.partition.cells);
         if self.options.method == Method::M {
@@ -242,7 +227,7 @@ impl Learner<'_> {
         }
         let rule = Rule {
             score: self.options.score,
-            difference: self.options.difference * self.spread,
+            difference: self.options.difference(iteration) * self.spread,
             samples: self.options.samples,
             cells: self.options.cells,
         };
@@ -259,9 +244,12 @@ impl Learner<'_> {
         }
         match self.options.method {
             Method::M => process.iterate(discount, self.spread),
-            Method::Q => process.follow(&self.partition.cells, discount, self.options.alpha),
+            Method::Q => {
+                let alpha = self.options.alpha;
+                process.follow(&self.partition.cells, discount, alpha, self.spread);
+            }
         }
-        process.note(&mut self.partition.cells, discount, self.spread);
+        process.note(&mut self.partition.cells);
     }
 
     /// The mean value of runs under the strategy that takes the best action everywhere; none if it

@@ -11,6 +11,7 @@ mod learner;
 mod observation;
 mod options;
 mod partition;
+mod process;
 mod refinement;
 mod strategy;
 mod whole_state;

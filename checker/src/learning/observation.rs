@@ -6,13 +6,13 @@ use crate::stochastic::{Failure, StateView};
 
 /// What is seen of a state: the exact values as words, and the values in intervals.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sight {
+pub(super) struct Sight {
     /// Integers take one word, doubles two.
-    pub key: Vec<i32>,
+    pub(super) key: Vec<i32>,
     /// One number for each continuous feature.
-    pub point: Vec<f64>,
+    pub(super) point: Vec<f64>,
     /// How fast each of them changes as time passes, as far as that is known.
-    pub rates: Vec<f64>,
+    pub(super) rates: Vec<f64>,
 }
 
 impl Sight {
@@ -20,7 +20,7 @@ impl Sight {
     ///
     /// # Errors
     /// The code of a feature failed, or left no finite number.
-    pub fn look(
+    pub(super) fn look(
         &mut self,
         observation: &Observation,
         state: &mut StateView<'_>,
@@ -30,7 +30,7 @@ impl Sight {
     }
 
     /// Sees the exact values.
-    pub fn look_exactly(
+    pub(super) fn look_exactly(
         &mut self,
         observation: &Observation,
         state: &mut StateView<'_>,
@@ -51,7 +51,7 @@ impl Sight {
     }
 
     /// Sees the values in intervals.
-    pub fn look_at_point(
+    pub(super) fn look_at_point(
         &mut self,
         observation: &Observation,
         state: &mut StateView<'_>,
@@ -64,7 +64,11 @@ impl Sight {
     }
 
     /// Finds how fast the continuous features change. Returns whether any does.
-    pub fn look_at_rates(&mut self, observation: &Observation, state: &StateView<'_>) -> bool {
+    pub(super) fn look_at_rates(
+        &mut self,
+        observation: &Observation,
+        state: &StateView<'_>,
+    ) -> bool {
         let rates = observation.continuous.iter().map(|one| rate(one, state));
         self.rates.clear();
         self.rates.extend(rates);
@@ -73,7 +77,7 @@ impl Sight {
 }
 
 /// The number that a feature is.
-pub fn number(feature: &Feature, state: &mut StateView<'_>) -> Result<f64, Failure> {
+pub(super) fn number(feature: &Feature, state: &mut StateView<'_>) -> Result<f64, Failure> {
     let value = match feature.seen {
         Seen::Location(process) => f64::from(state.location(process).0),
         Seen::Integer(word) => f64::from(state.integer(word)),

@@ -1,5 +1,7 @@
 //! How a strategy is learned.
 
+use std::ops::Range;
+
 /// How the values of actions are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Method {
@@ -31,16 +33,18 @@ pub struct Learning {
     pub patience: u64,
     /// How often it begins anew.
     pub resets: u64,
-    /// What a cost counts a decision earlier, as a part of itself.
-    pub discount: f64,
+    /// What a cost counts a decision earlier, as a part of itself; `None` is 1, but [`LONG_DISCOUNT`]
+    /// where runs have more than [`LONG`] decisions.
+    pub discount: Option<f64>,
     /// In Q-learning: the n-th sample counts for 1 / min(`alpha`, n + 1).
     pub alpha: f64,
     /// How often decisions are random while learning.
     pub randomness: f64,
     /// When cells are cut: the least sum of squares of t,
     pub score: f64,
-    /// the least difference of costs, as a part of the standard deviation of random runs,
-    pub difference: f64,
+    /// the least difference of costs, as a part of the standard deviation of random runs: in the
+    /// first iteration, and in the last ones,
+    pub difference: Range<f64>,
     /// the least number of samples on each side,
     pub samples: usize,
     /// and the most cells.
@@ -58,6 +62,14 @@ const MOST_STEPS: f64 = 400_000.0;
 /// About so many decisions judge a strategy.
 const JUDGING_STEPS: f64 = 200_000.0;
 
+/// A run of more decisions is long: what is far away then is discounted, or else what a single
+/// decision costs is lost in the noise of all that follow.
+pub(super) const LONG: f64 = 100.0;
+/// The discount of long runs.
+pub(super) const LONG_DISCOUNT: f64 = 0.99;
+/// How much smaller the least difference is in each iteration.
+const FINER: f64 = 0.75;
+
 impl Default for Learning {
     fn default() -> Learning {
         Learning {
@@ -70,11 +82,11 @@ impl Default for Learning {
             judging_runs: None,
             patience: 5,
             resets: 0,
-            discount: 1.0,
+            discount: None,
             alpha: 1000.0,
             randomness: 0.2,
             score: 10.0,
-            difference: 0.02,
+            difference: 0.02..0.002,
             samples: 24,
             cells: 200_000,
             memory: 3_000_000,
@@ -83,6 +95,22 @@ impl Default for Learning {
 }
 
 impl Learning {
+    /// The discount, if a run has so many decisions.
+    pub(super) fn discount(&self, steps_of_run: f64) -> f64 {
+        let fitting = if steps_of_run > LONG {
+            LONG_DISCOUNT
+        } else {
+            1.0
+        };
+        self.discount.unwrap_or(fitting)
+    }
+
+    /// The least difference of costs in this iteration.
+    pub(super) fn difference(&self, iteration: u64) -> f64 {
+        let Range { start, end } = self.difference;
+        (start * FINER.powi(iteration as i32)).max(end)
+    }
+
     /// How many runs this iteration learns from, if a run has so many decisions.
     pub(super) fn runs(&self, iteration: u64, steps_of_run: f64) -> u64 {
         let steps = (FIRST_STEPS * GROWTH.powi(iteration as i32)).min(MOST_STEPS);

@@ -13,11 +13,11 @@ use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
 /// The number of the action to wait. All others are numbers of entries of moves.
-pub const WAIT: u32 = u32::MAX;
+pub(super) const WAIT: u32 = u32::MAX;
 
 /// What stands for an action where a delay was drawn at random. It is not the controller's choice,
 /// and says nothing of what it costs to wait.
-pub const DRAW: u32 = u32::MAX - 1;
+pub(super) const DRAW: u32 = u32::MAX - 1;
 
 /// A node of a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -199,7 +199,7 @@ impl Partition {
 const BEYOND: f64 = 1e-11;
 
 /// In how long a value that changes at a rate is surely beyond a bound.
-pub fn beyond(bound: f64, value: f64, rate: f64) -> f64 {
+pub(super) fn beyond(bound: f64, value: f64, rate: f64) -> f64 {
     let slack = BEYOND * bound.abs().max(value.abs()).max(1.0);
     ((bound - value) / rate).max(0.0) + slack / rate.abs()
 }

@@ -7,8 +7,8 @@
 //! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract: cuts by tests of
 //! both sides); B. L. Welch, Biometrika 34 (1947), for the test.
 
-use super::experience::Process;
 use super::partition::Partition;
+use super::process::Process;
 
 /// When a cell is cut.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,8 @@ struct Point {
     /// Which of the actions of the cell.
     action: u32,
     cost: f64,
-    point: u32,
+    /// Where its numbers begin.
+    place: u32,
 }
 
 /// A cut, and how much it tells apart.
@@ -68,7 +69,7 @@ pub(super) fn refine(
             points.extend(samples.map(|sample| Point {
                 action: action as u32,
                 cost: process.cost(sample, discount),
-                point: sample.point,
+                place: sample.point,
             }));
         }
         let refiner = Refiner {
@@ -125,7 +126,7 @@ impl Sums {
 
 impl Refiner<'_> {
     fn at(&self, point: &Point, feature: usize) -> f64 {
-        self.process.points[point.point as usize + feature]
+        self.process.points[point.place as usize + feature]
     }
 
     /// Cuts a cell, and the parts of it, as long as that tells anything apart.
@@ -174,7 +175,7 @@ impl Refiner<'_> {
             total += score - scores[action];
             scores[action] = score;
             let (value, next) = (self.at(&pair[0], feature), self.at(&pair[1], feature));
-            if value == next || total < least {
+            if value >= next || total < least {
                 continue;
             }
             if best.is_none_or(|best| total > best.score) {

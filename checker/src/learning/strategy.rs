@@ -267,7 +267,7 @@ fn grow(tree: &Ranked, action: u32, sign: f64, unknown: f64, nodes: &mut Vec<Bra
             let low = grow(&parts[0], action, sign, unknown, nodes);
             let high = grow(&parts[1], action, sign, unknown, nodes);
             nodes[place] = match (nodes[low as usize], nodes[high as usize]) {
-                (Branch::Worth(one), Branch::Worth(other)) if one == other => {
+                (Branch::Worth(one), Branch::Worth(other)) if one.to_bits() == other.to_bits() => {
                     nodes.truncate(place + 1);
                     Branch::Worth(one)
                 }

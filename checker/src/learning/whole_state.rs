@@ -23,6 +23,7 @@ pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
         network,
         influence: Influence::new(network, functions(asked), number),
         bound: asked.bound.limit,
+        is_timed: asked.aim == Aim::Probability,
         written: written(network),
         observation: Observation::default(),
     };
@@ -41,7 +42,7 @@ pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
 }
 
 /// The functions by which a query decides when a run ends.
-pub fn functions(asked: &Optimum) -> Vec<FunctionId> {
+pub(super) fn functions(asked: &Optimum) -> Vec<FunctionId> {
     match &asked.goal {
         Some(Path::Eventually(goal)) => goal.function.into_iter().collect(),
         _ => Vec::new(),
@@ -68,6 +69,8 @@ struct Finder<'n> {
     network: &'n Network,
     influence: Influence,
     bound: RunLimit,
+    /// Whether the goal has to be reached in time.
+    is_timed: bool,
     written: Vec<bool>,
     observation: Observation,
 }
@@ -80,7 +83,12 @@ impl Finder<'_> {
             Shape::Integer { .. } | Shape::Bool | Shape::Double | Shape::Scalar { .. }
         );
         let is_clock = self.network.chances.clocks.binary_search(&offset).is_ok();
-        let is_bound = self.bound == RunLimit::Clock(offset);
+        let is_bound = match self.bound {
+            RunLimit::Clock(clock) => clock == offset,
+            // How much time is left decides whether the goal is still reached.
+            RunLimit::Time => is_clock && self.is_timed && !self.written[offset as usize],
+            RunLimit::Moves => false,
+        };
         if (is_one || is_clock) && !is_bound && !self.influence.differs(offset) {
             return;
         }

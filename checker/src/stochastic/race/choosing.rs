@@ -2,7 +2,7 @@
 
 use super::{Race, TOLERANCE};
 use crate::ir::Urgency;
-use crate::stochastic::advice::View;
+use crate::stochastic::advice::{Advice, View};
 use crate::stochastic::control::{Chosen, Moment};
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
@@ -171,7 +171,7 @@ impl Race<'_> {
         moves: &[u32],
         others: bool,
     ) -> Result<bool, Failure> {
-        let is_allowed = self.advice.as_ref().is_none_or(|one| one.waits());
+        let is_allowed = self.advice.as_ref().is_none_or(Advice::waits);
         Ok(is_allowed && (others || self.can_time_pass(program, moves)?))
     }
 

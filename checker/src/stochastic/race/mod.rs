@@ -418,13 +418,11 @@ impl<'a> Race<'a> {
         self.choices = choices;
         let mut chosen = chosen?;
         if self.is_decided(program.instance(chosen)) {
-            match self.decide(program, process)? {
-                Some(decided) => chosen = decided,
-                None => {
-                    self.make_stale(process as u32);
-                    return self.count_move(process, false);
-                }
-            }
+            let Some(decided) = self.decide(program, process)? else {
+                self.make_stale(process as u32);
+                return self.count_move(process, false);
+            };
+            chosen = decided;
         }
         self.movers.clear();
         self.movers.push((chosen, 0));

@@ -1,0 +1,313 @@
+//! The finite decision process that a partition makes of all remembered decisions, and the values of
+//! its actions.
+//!
+//! A *slot* is an action in a cell. A *stand* is a cell with the actions that are possible there; its
+//! worth is the value of the best of them.
+//!
+//! Invariants:
+//! * `samples` are sorted by slots, and those of a slot by the stands behind them.
+//! * `worths` are those of the values and errors at hand, but while they are computed.
+
+use super::partition::{Cell, Known, WAIT};
+
+/// What a decision was.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// The action in its cell.
+    pub(super) slot: u32,
+    /// The stand behind it.
+    pub(super) next: u32,
+    pub(super) cost: f64,
+    /// Where its point begins, among those of all samples.
+    pub(super) point: u32,
+    /// When it was taken in its run.
+    pub(super) at: f64,
+}
+
+/// The samples of a slot that lead to the same stand.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    next: u32,
+    count: f64,
+    /// The sum of their costs, and of the squares.
+    cost: f64,
+    squares: f64,
+}
+
+/// The finite process.
+#[derive(Debug)]
+pub(super) struct Process {
+    samples: Vec<Sample>,
+    /// The samples in the order in which they came.
+    trail: Vec<Sample>,
+    pub(super) points: Vec<f64>,
+    /// By slot: its cell and its action.
+    slots: Vec<(u32, u32)>,
+    /// By slot: where its samples begin, and its ways.
+    first_samples: Vec<u32>,
+    ways: Vec<Way>,
+    first_ways: Vec<u32>,
+    /// By stand: the slots of its actions.
+    stands: Vec<Box<[u32]>>,
+    /// The cells with their slots and stands, those of late decisions first.
+    groups: Vec<Group>,
+    values: Vec<f64>,
+    /// By slot: the standard error of its value.
+    errors: Vec<f64>,
+    /// By slot: how often its action was taken, if that is more than there are samples.
+    visits: Vec<f64>,
+    worths: Vec<f64>,
+}
+
+/// What belongs to a cell.
+#[derive(Clone, Debug, Default)]
+struct Group {
+    slots: Vec<u32>,
+    stands: Vec<u32>,
+}
+
+/// Sweeps over all values end when no value changes by more than this part of the greatest one,
+const SMALL: f64 = 1e-7;
+/// or after so many.
+const MOST_SWEEPS: usize = 500;
+
+impl Process {
+    /// The process of some samples. Slots are cells with actions, stands are cells with slots; the
+    /// first stand is the end.
+    pub(super) fn new(
+        mut samples: Vec<Sample>,
+        points: Vec<f64>,
+        slots: Vec<(u32, u32)>,
+        stands: Vec<(u32, Box<[u32]>)>,
+    ) -> Process {
+        let trail = samples.clone();
+        samples.sort_by_key(|sample| (sample.slot, sample.next));
+        let (mut first_samples, mut first_ways) = (Vec::new(), Vec::new());
+        let mut ways: Vec<Way> = Vec::new();
+        for (place, of_way) in samples
+            .chunk_by(|one, other| (one.slot, one.next) == (other.slot, other.next))
+            .scan(0, |end, way| {
+                let place = *end;
+                *end += way.len();
+                Some((place, way))
+            })
+        {
+            // There is no slot without samples.
+            if first_samples.len() == of_way[0].slot as usize {
+                first_samples.push(place as u32);
+                first_ways.push(ways.len() as u32);
+            }
+            let costs = of_way.iter().map(|one| one.cost);
+            ways.push(Way {
+                next: of_way[0].next,
+                count: of_way.len() as f64,
+                cost: costs.clone().sum(),
+                squares: costs.map(|cost| cost * cost).sum(),
+            });
+        }
+        first_samples.push(samples.len() as u32);
+        first_ways.push(ways.len() as u32);
+        let mut process = Process {
+            trail,
+            points,
+            first_samples,
+            ways,
+            first_ways,
+            groups: Vec::new(),
+            values: vec![0.0; slots.len()],
+            errors: vec![0.0; slots.len()],
+            visits: Vec::new(),
+            worths: vec![0.0; stands.len()],
+            samples,
+            slots,
+            stands: Vec::new(),
+        };
+        process.group(&stands);
+        process.stands = stands.into_iter().map(|(_, slots)| slots).collect();
+        process
+    }
+
+    /// Orders the cells by when decisions are taken in them.
+    fn group(&mut self, stands: &[(u32, Box<[u32]>)]) {
+        let cells = self.slots.iter().map(|slot| slot.0 + 1).max().unwrap_or(0);
+        let mut groups = vec![Group::default(); cells as usize];
+        let mut times = vec![0.0; cells as usize];
+        let mut counts = vec![0.0; cells as usize];
+        for (slot, &(cell, _)) in (0..).zip(&self.slots) {
+            groups[cell as usize].slots.push(slot);
+            for sample in self.of(slot) {
+                times[cell as usize] += sample.at;
+                counts[cell as usize] += 1.0;
+            }
+        }
+        for (stand, &(cell, _)) in (0..).zip(stands) {
+            // The end belongs to no cell.
+            if let Some(group) = groups.get_mut(cell as usize) {
+                group.stands.push(stand);
+            }
+        }
+        let mut order: Vec<usize> = (0..groups.len()).filter(|&one| counts[one] > 0.0).collect();
+        order.sort_by(|&one, &other| {
+            let (first, second) = (times[one] / counts[one], times[other] / counts[other]);
+            second.total_cmp(&first).then(one.cmp(&other))
+        });
+        let groups = order
+            .into_iter()
+            .map(|cell| std::mem::take(&mut groups[cell]));
+        self.groups = groups.collect();
+    }
+
+    /// The samples of a slot.
+    pub(super) fn of(&self, slot: u32) -> &[Sample] {
+        let first = self.first_samples[slot as usize] as usize;
+        &self.samples[first..self.first_samples[slot as usize + 1] as usize]
+    }
+
+    /// How many slots there are.
+    pub(super) fn slots(&self) -> u32 {
+        self.slots.len() as u32
+    }
+
+    /// The cell of a slot.
+    pub(super) fn cell(&self, slot: u32) -> u32 {
+        self.slots[slot as usize].0
+    }
+
+    /// Computes the worth of a stand: the value of the best action there; 0 where nothing is known.
+    /// What is known from few samples counts as worse by its error, or else luck would be taken for
+    /// skill.
+    fn appraise(&mut self, stand: u32) {
+        let slots = self.stands[stand as usize].iter();
+        let cautious = slots.map(|&slot| self.values[slot as usize] + self.errors[slot as usize]);
+        let least = cautious.fold(f64::INFINITY, f64::min);
+        self.worths[stand as usize] = if least.is_finite() { least } else { 0.0 };
+    }
+
+    /// To wait puts nothing off, so it is not discounted.
+    fn discount(&self, slot: u32, discount: f64) -> f64 {
+        if self.slots[slot as usize].1 == WAIT {
+            1.0
+        } else {
+            discount
+        }
+    }
+
+    /// What a sample costs from there on.
+    pub(super) fn cost(&self, sample: &Sample, discount: f64) -> f64 {
+        let discount = self.discount(sample.slot, discount);
+        sample.cost + discount * self.worths[sample.next as usize]
+    }
+
+    /// Computes the values of all actions in all cells: the means of what the samples cost.
+    ///
+    /// Source: value iteration, with the latest decisions first (Gauss and Seidel).
+    pub(super) fn iterate(&mut self, discount: f64, spread: f64) {
+        let groups = std::mem::take(&mut self.groups);
+        for _ in 0..MOST_SWEEPS {
+            let (mut change, mut greatest) = (0.0_f64, 0.0_f64);
+            for group in &groups {
+                for &slot in &group.slots {
+                    let (value, error) = self.mean(slot, discount, spread);
+                    self.errors[slot as usize] = error;
+                    change = change.max((value - self.values[slot as usize]).abs());
+                    greatest = greatest.max(value.abs());
+                    self.values[slot as usize] = value;
+                }
+                for &stand in &group.stands {
+                    self.appraise(stand);
+                }
+            }
+            if change <= SMALL * greatest {
+                break;
+            }
+        }
+        self.groups = groups;
+    }
+
+    /// The mean of what the samples of a slot cost, and its standard error: as if one more sample were
+    /// off by as much as all runs differ.
+    fn mean(&self, slot: u32, discount: f64, spread: f64) -> (f64, f64) {
+        let discount = self.discount(slot, discount);
+        let ways = self.first_ways[slot as usize]..self.first_ways[slot as usize + 1];
+        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for way in &self.ways[ways.start as usize..ways.end as usize] {
+            let worth = discount * self.worths[way.next as usize];
+            count += way.count;
+            sum += way.cost + way.count * worth;
+            squares += way.squares + worth * (2.0 * way.cost + way.count * worth);
+        }
+        let mean = sum / count;
+        let variance = ((squares - sum * mean).max(0.0) + spread * spread) / count;
+        (mean, (variance / count).sqrt())
+    }
+
+    /// Moves the values of actions towards what each sample costs, the latest sample first. The n-th
+    /// sample of an action counts for 1 / min(`most`, n + 1).
+    ///
+    /// Source: C. Watkins and P. Dayan, "Q-learning", Machine Learning 8 (1992).
+    pub(super) fn follow(&mut self, cells: &[Cell], discount: f64, most: f64, spread: f64) {
+        let visits = self.slots.iter().map(|&(cell, action)| {
+            let known = cells[cell as usize].of(action);
+            known.map_or(0.0, |known| known.visits)
+        });
+        self.visits = visits.collect();
+        let mut stands_of = vec![Vec::new(); self.slots.len()];
+        for (stand, slots) in (0..).zip(&self.stands) {
+            for &slot in slots {
+                stands_of[slot as usize].push(stand);
+            }
+        }
+        for place in (0..self.trail.len()).rev() {
+            let sample = self.trail[place];
+            let slot = sample.slot as usize;
+            let cost = self.cost(&sample, discount);
+            self.visits[slot] += 1.0;
+            let visits = self.visits[slot];
+            let rate = if visits > 1.0 {
+                1.0 / visits.min(most)
+            } else {
+                1.0
+            };
+            self.values[slot] += rate * (cost - self.values[slot]);
+            self.errors[slot] = spread / visits;
+            for &stand in &stands_of[slot] {
+                self.appraise(stand);
+            }
+        }
+    }
+
+    /// Notes in the cells what is known of the actions.
+    pub(super) fn note(&self, cells: &mut [Cell]) {
+        let is_whole = self.visits.is_empty();
+        for cell in cells.iter_mut().filter(|_| is_whole) {
+            cell.known.clear();
+        }
+        for (slot, &(cell, action)) in (0..).zip(&self.slots) {
+            let count = self.of(slot).len() as f64;
+            let known = &mut cells[cell as usize].known;
+            known.retain(|one| one.action != action);
+            known.push(Known {
+                action,
+                visits: self.visits.get(slot as usize).copied().unwrap_or(count),
+                value: self.values[slot as usize],
+                error: self.errors[slot as usize],
+            });
+        }
+        for cell in cells {
+            cell.known.sort_by_key(|one| one.action);
+        }
+    }
+
+    /// Begins with the values that actions had in the cells.
+    pub(super) fn begin_with(&mut self, cells: &[Cell]) {
+        for (slot, &(cell, action)) in self.slots.iter().enumerate() {
+            if let Some(known) = cells[cell as usize].of(action) {
+                self.values[slot] = known.value;
+                self.errors[slot] = known.error;
+            }
+        }
+        for stand in 0..self.stands.len() as u32 {
+            self.appraise(stand);
+        }
+    }
+}
