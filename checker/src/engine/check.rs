@@ -120,6 +120,9 @@ impl LoadedModel {
         let mut answer = match &query.kind {
             QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
             QueryKind::Optimum(asked) => self.answer_optimum(prepared, asked)?,
+            QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
+                self.answer_by_file(prepared)?
+            }
             _ => self.answer_symbolically(prepared)?,
         };
         if let Some(name) = &query.under {
@@ -132,16 +135,9 @@ impl LoadedModel {
     fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
         let PreparedQuery { query, options, .. } = prepared;
         self.executor().wraps().clear();
-        let mut answer = match (&query.kind, self.constant_failure()) {
-            (_, Some(failure)) => Answer::failed(failure),
-            (QueryKind::SaveStrategy { file, strategy }, None) => {
-                self.save_strategy(file, strategy, query.span, options)?
-            }
-            (QueryKind::LoadStrategy { file, .. }, None) => {
-                let name = query.strategy.as_deref().unwrap_or_default();
-                self.load_strategy(file, name, query.span, options)?
-            }
-            _ => {
+        let mut answer = match self.constant_failure() {
+            Some(failure) => Answer::failed(failure),
+            None => {
                 let answer = self.answer_in_zones(prepared, None);
                 if let Some(name) = &query.strategy {
                     self.keep_answer(name, prepared, &answer);
@@ -151,6 +147,23 @@ impl LoadedModel {
         };
         answer.wrapped = self.first_wrap();
         self.complete_failure(query, options, &mut answer);
+        Ok(answer)
+    }
+
+    /// Answers a query that saves or loads a strategy: no code of the model is run.
+    fn answer_by_file(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+        let PreparedQuery { query, options, .. } = prepared;
+        let mut answer = match (&query.kind, self.constant_failure()) {
+            (_, Some(failure)) => Answer::failed(failure),
+            (QueryKind::SaveStrategy { file, strategy }, None) => {
+                self.save_strategy(file, strategy, query.span, options)?
+            }
+            (QueryKind::LoadStrategy { file, features }, None) => {
+                self.load_strategy(query, file, features.as_ref(), options)?
+            }
+            _ => unreachable!("it saves or loads a strategy"),
+        };
+        answer.wrapped = self.network().wrapped_constant;
         Ok(answer)
     }
 
