@@ -3,7 +3,7 @@
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types. It
 works for any model and knows nothing of needles. `model` loads a model; `facts`, `picture` and
 `states` show what is in it. Queries have answers (`answer`) with runs (`runs`), strategies
-(`strategy`, `machine`) and plays against them (`play`). What only some answers need is imported
+(`strategy`, `learned`, `machine`) and plays against them (`play`). What only some answers need is imported
 when it is used.
 """
 
@@ -45,6 +45,7 @@ from ntagen.checker.queries import (
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Cumulative, Distribution, Histogram
+    from ntagen.checker.learned import LearnedStrategy, Optimised
     from ntagen.checker.states import Simulation, SymbolicState
     from ntagen.checker.trajectories import OverTime, Trajectory
 
@@ -64,7 +65,9 @@ __all__ = [
     "Extreme",
     "Histogram",
     "Interrupted",
+    "LearnedStrategy",
     "Model",
+    "Optimised",
     "Options",
     "OverTime",
     "OverflowRule",
@@ -96,6 +99,8 @@ _HOMES = {
     "Cumulative": "distribution",
     "Distribution": "distribution",
     "Histogram": "distribution",
+    "LearnedStrategy": "learned",
+    "Optimised": "learned",
     "OverTime": "trajectories",
     "Simulation": "states",
     "SymbolicState": "states",

@@ -15,6 +15,7 @@ from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Distribution
+    from ntagen.checker.learned import LearnedStrategy, Optimised
     from ntagen.checker.machine import Machine
     from ntagen.checker.options import Options
     from ntagen.checker.picture.page import Svg
@@ -405,14 +406,33 @@ class Answer:
         return None if self.certificate_states is None else "".join(self.certificate_pieces())
 
     @property
-    def strategy(self) -> Strategy | None:
-        """The strategy of the player who wins; ``None`` if none was asked for or found."""
+    def strategy(self) -> Strategy | LearnedStrategy | None:
+        """The strategy of the player who wins, or the one that was learned.
+
+        ``None`` if none was asked for or found.
+        """
+        from ntagen.checker.learned import LearnedStrategy
         from ntagen.checker.strategy import Strategy
 
+        learned = _checker.LearnedStrategy.of_answer(self._raw)
+        if learned is not None:
+            return LearnedStrategy(learned)
         raw = _checker.Strategy.of_answer(self._raw)
         return (
             None if raw is None else Strategy(raw, self._options.forced, self._options.priorities)
         )
+
+    @property
+    def optimised(self) -> Optimised | None:
+        """How the best strategy was found; ``None`` for other queries than ``minE`` and its kin."""
+        from ntagen.checker.learned import Optimised
+
+        text = self._raw.optimised_json()
+        if text is None:
+            return None
+        given = json.loads(text)
+        uniform = given["uniform"] and Estimate.from_object(given["uniform"])
+        return Optimised(**given | {"uniform": uniform})
 
     @property
     def machine(self) -> Machine | None:
@@ -427,6 +447,8 @@ class Answer:
 
     def strategy_json(self) -> str | None:
         """The strategy, or the machine of a game with observations, as JSON text.
+
+        A learned strategy has UPPAAL's form.
 
         ``None`` if none was asked for or found.
         """

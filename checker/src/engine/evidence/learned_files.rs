@@ -120,12 +120,11 @@ impl LoadedModel {
     fn observation_of(&mut self, texts: &FeatureTexts) -> Result<Observation, Mismatch> {
         let mut seen = |texts: &[String], list: &str, is_discrete: bool| {
             let features = texts.iter().enumerate().map(|(index, text)| {
-                self.feature_of(text, is_discrete)
-                    .map_err(|why| Mismatch {
-                        place: format!("{list}[{index}]"),
-                        message: format!("{text} is nothing that is seen of a state: {why}"),
-                        help: Some(SEE_FEATURES),
-                    })
+                self.feature_of(text, is_discrete).map_err(|why| Mismatch {
+                    place: format!("{list}[{index}]"),
+                    message: format!("{text} is nothing that is seen of a state: {why}"),
+                    help: Some(SEE_FEATURES),
+                })
             });
             features.collect::<Result<Vec<Feature>, Mismatch>>()
         };
@@ -194,7 +193,9 @@ fn alike(texts: FeatureTexts, wanted: Option<&FeatureTexts>) -> Result<FeatureTe
     for (list, texts, wanted) in lists {
         let plain = |texts: &[String]| -> Vec<String> {
             let texts = texts.iter();
-            texts.map(|one| learned_actions::without_blanks(one)).collect()
+            texts
+                .map(|one| learned_actions::without_blanks(one))
+                .collect()
         };
         if plain(texts) != plain(wanted) {
             return Err(Mismatch {

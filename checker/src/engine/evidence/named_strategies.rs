@@ -233,11 +233,7 @@ impl LoadedModel {
     }
 
     /// Reads the file of a strategy in zones, for which a query names no features.
-    fn read_zones(
-        &self,
-        file: &Json,
-        features: Option<&FeatureTexts>,
-    ) -> Result<Loaded, Mismatch> {
+    fn read_zones(&self, file: &Json, features: Option<&FeatureTexts>) -> Result<Loaded, Mismatch> {
         let (query, strategy) = strategy_json::read_parsed(self.network(), file)?;
         if features.is_some() {
             return Err(Mismatch {

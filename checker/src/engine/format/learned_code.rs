@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use serde_json::json;
 
 use crate::cancellation;
-use crate::ir::Network;
+use crate::ir::{Network, Seen};
 use crate::learning::{Branch, LearnedStrategy, values};
 
 use super::strategy_c::{comment, quoted, starts, table, wrapped};
@@ -42,6 +42,7 @@ pub fn write(
     query: &str,
 ) -> String {
     let parts = Parts {
+        network,
         strategy,
         nodes: Nodes::of(strategy),
         actions: learned_actions::texts(network, &strategy.moves),
@@ -98,6 +99,7 @@ impl Nodes {
 }
 
 struct Parts<'s> {
+    network: &'s Network,
     strategy: &'s LearnedStrategy,
     nodes: Nodes,
     actions: Vec<String>,
@@ -108,20 +110,30 @@ impl Parts<'_> {
     /// What is said at the beginning, line by line; the function is called so.
     fn opening(&self, call: &str) -> Vec<String> {
         let texts = learned_json::texts(&self.strategy.observation);
+        let discrete = self.with_locations(&texts.discrete);
         let mut lines = vec![
             String::from("A learned strategy for"),
             format!("    {}", self.query),
             String::from("written by ntagen."),
             String::new(),
             format!("{call} is the number of the action to take: of those that are enabled"),
-            String::from("the one that is worth most, and of several best ones the first. It is -1 where learning has"),
-            String::from("not seen these discrete values, or has tried none of the enabled actions; any will do then."),
-            String::from("Ask at each event, and again while time passes: an action is taken as soon as it is decided."),
+            String::from(
+                "the one that is worth most, and of several best ones the first. It is -1 where learning has",
+            ),
+            String::from(
+                "not seen these discrete values, or has tried none of the enabled actions; any will do then.",
+            ),
+            String::from(
+                "Ask at each event, and again while time passes: an action is taken as soon as it is decided.",
+            ),
         ];
         let lists = [
-            ("discrete", &texts.discrete),
+            ("discrete", &discrete),
             ("continuous", &texts.continuous),
-            ("enabled (is the action possible now?), and the numbers of actions", &self.actions),
+            (
+                "enabled (is the action possible now?), and the numbers of actions",
+                &self.actions,
+            ),
         ];
         for (list, texts) in lists {
             lines.push(String::new());
@@ -134,6 +146,23 @@ impl Parts<'_> {
             }
         }
         lines
+    }
+
+    /// The texts of what is seen exactly; of a location with the numbers of all.
+    fn with_locations(&self, texts: &[String]) -> Vec<String> {
+        let features = self.strategy.observation.discrete.iter();
+        let texts = features
+            .zip(texts)
+            .map(|(feature, text)| match feature.seen {
+                Seen::Location(process) => {
+                    let process = &self.network.processes[process.0 as usize];
+                    let names = process.locations.iter().enumerate();
+                    let names = names.map(|(number, one)| format!("{number} {}", one.name));
+                    format!("{text}: {}", names.collect::<Vec<_>>().join(", "))
+                }
+                _ => text.clone(),
+            });
+        texts.collect()
     }
 
     /// The exact values of each regressor.
@@ -189,7 +218,11 @@ impl Parts<'_> {
         integers("roots", &mut nodes.roots.iter().copied());
         integers("features", &mut nodes.features.iter().copied());
         integers("highs", &mut nodes.highs.iter().copied());
-        doubles(&mut text, &format!("{name}_numbers"), nodes.numbers.iter().copied());
+        doubles(
+            &mut text,
+            &format!("{name}_numbers"),
+            nodes.numbers.iter().copied(),
+        );
         text + &C_RUNTIME.replace("NAME", name)
     }
 
@@ -222,7 +255,11 @@ impl Parts<'_> {
             let known: String = known
                 .map(|(one, root)| format!("({},{root}),", one.action))
                 .collect();
-            let key = if key.is_empty() { "(" } else { &format!("({key}") };
+            let key = if key.is_empty() {
+                "("
+            } else {
+                &format!("({key}")
+            };
             let _ = writeln!(text, "    {key}): ({known}),");
         }
         text.push_str("}\n");
@@ -250,7 +287,11 @@ fn doubles(text: &mut String, name: &str, values: impl Iterator<Item = f64>) {
     let _ = write!(text, "static const double {name}[] = {{");
     // C has no tables without entries.
     let none = [String::from("0")];
-    let values = if values.is_empty() { &none[..] } else { &values };
+    let values = if values.is_empty() {
+        &none[..]
+    } else {
+        &values
+    };
     wrapped(text, values.iter().cloned());
     text.push_str("};\n");
 }

@@ -179,12 +179,16 @@ pub fn parsed(bytes: &[u8]) -> Result<Json, Mismatch> {
     reader.disable_recursion_limit();
     let mut values = reader.into_iter::<Json>();
     let no_json = |error| wrong(format!("this is no JSON: {error}"));
-    let file = values.next().ok_or_else(|| wrong(String::from("the file is empty")))?;
+    let file = values
+        .next()
+        .ok_or_else(|| wrong(String::from("the file is empty")))?;
     let file = file.map_err(no_json)?;
     match values.next() {
         None => Ok(file),
         Some(Err(error)) => Err(no_json(error)),
-        Some(Ok(_)) => Err(wrong(String::from("this is no JSON: there is more behind its end"))),
+        Some(Ok(_)) => Err(wrong(String::from(
+            "this is no JSON: there is more behind its end",
+        ))),
     }
 }
 
@@ -403,7 +407,9 @@ impl Reader<'_> {
         }
         if texts.len() != features.len() {
             let count = features.len();
-            return Err(format!("there should be {count} values, one for each of statevars"));
+            return Err(format!(
+                "there should be {count} values, one for each of statevars"
+            ));
         }
         let mut given = Vec::with_capacity(texts.len());
         for (text, feature) in texts.iter().zip(features) {
@@ -421,7 +427,9 @@ impl Reader<'_> {
 
     /// The number of a location in the model.
     fn location(&self, process: u32, number: f64) -> Result<f64, String> {
-        let count = self.names.network.processes[process as usize].locations.len();
+        let count = self.names.network.processes[process as usize]
+            .locations
+            .len();
         let known = self.locations.get(&process);
         let place = number as i64;
         let found = match known {
@@ -437,7 +445,10 @@ impl Reader<'_> {
     }
 
     fn appraisals(&self, at: &At<'_>, is_greatest: bool) -> Result<Vec<Appraisal>, Mismatch> {
-        for (name, wanted) in [("type", TREES_TYPE), ("representation", TREES_REPRESENTATION)] {
+        for (name, wanted) in [
+            ("type", TREES_TYPE),
+            ("representation", TREES_REPRESENTATION),
+        ] {
             let given = at.text(name)?;
             if given != wanted {
                 let message = format!("only {wanted:?} is known here");
@@ -496,7 +507,11 @@ fn grow(tree: &Json, points: usize, nodes: &mut Vec<Branch>) -> Result<u32, Wron
             return Ok(place as u32);
         }
     };
-    let field = |name: &str| given.get(name).ok_or_else(|| wrong("", format!("\"{name}\" is missing")));
+    let field = |name: &str| {
+        given
+            .get(name)
+            .ok_or_else(|| wrong("", format!("\"{name}\" is missing")))
+    };
     let feature = field("var")?;
     let Some(feature) = feature.as_u64().filter(|&var| var < points as u64) else {
         let message = format!("there are {points} pointvars, and none is number {feature}");

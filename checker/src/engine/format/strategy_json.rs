@@ -22,8 +22,8 @@ use crate::zones::dbm::Constraint;
 use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
-use super::learned_json;
 use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, WRITE_ONE, integer};
+use super::learned_json;
 use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::without_under;

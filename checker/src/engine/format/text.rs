@@ -177,7 +177,13 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
 pub fn part_text(network: &Network, part: Part) -> String {
     let edge = network.edge(part);
     let branch = &edge.branches[part.branch as usize];
-    edge_text(network, part, &edge.labels, &selects(network, part), [branch])
+    edge_text(
+        network,
+        part,
+        &edge.labels,
+        &selects(network, part),
+        [branch],
+    )
 }
 
 /// An edge with all the legs of its branch point, as `P.a->(P.b|P.c) { guard, sync, update }`. The
