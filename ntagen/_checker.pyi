@@ -12,6 +12,7 @@ __all__ = [
     "ExactWalk",
     "FailedError",
     "InterruptedError",
+    "LearnedStrategy",
     "LongText",
     "Model",
     "Plans",

@@ -3,8 +3,8 @@
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types. It
 works for any model and knows nothing of needles. `model` loads a model; `facts`, `picture` and
 `states` show what is in it. Queries have answers (`answer`) with runs (`runs`), strategies
-(`strategy`, `learned`, `machine`) and plays against them (`play`). What only some answers need is imported
-when it is used.
+(`strategy`, `learned`, `machine`) and plays against them (`play`). What only some answers need is
+imported when it is used.
 """
 
 from __future__ import annotations

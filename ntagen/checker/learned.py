@@ -1,4 +1,4 @@
-"""Learned strategies: what ``minE``, ``maxE``, ``minPr`` and ``maxPr`` find, and how they found it."""
+"""Learned strategies: what ``minE``, ``maxE``, ``minPr`` and ``maxPr`` find, and how."""
 
 from __future__ import annotations
 

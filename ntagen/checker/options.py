@@ -144,8 +144,9 @@ class Options:
 
     learning_method: LearningMethod = "auto"
     """How ``minE``, ``maxE``, ``minPr`` and ``maxPr`` learn what actions are worth: by Q-learning
-    (``q``), or from the finite process that all samples make (``m``); ``auto`` is ``m``. The options
-    of learning have the names that UPPAAL gives them; ``None`` leaves a number to the engine."""
+    (``q``), or from the finite process that all samples make (``m``); ``auto`` is ``m``. The
+    options of learning have the names that UPPAAL gives them; ``None`` leaves a number to the
+    engine."""
 
     good_runs: int | None = None
     """From how many random runs an iteration learns."""

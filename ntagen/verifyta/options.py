@@ -341,7 +341,8 @@ _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--discount": ("discount", float),
     "--qlearning-alpha": ("qlearning_alpha", float),
 }
-"""For each option of random runs and of learning, the field of `ntagen.checker.Options`, and its type."""
+"""For each option of random runs and of learning, the field of `ntagen.checker.Options`, and its
+type."""
 
 
 def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:

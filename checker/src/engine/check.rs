@@ -123,7 +123,7 @@ impl LoadedModel {
             QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
                 self.answer_by_file(prepared)?
             }
-            _ => self.answer_symbolically(prepared)?,
+            _ => self.answer_symbolically(prepared),
         };
         if let Some(name) = &query.under {
             self.note_freedom(name, &mut answer);
@@ -131,23 +131,22 @@ impl LoadedModel {
         Ok(answer)
     }
 
-    /// Answers a query that is no statistical one; keeps the strategy that it defines.
-    fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+    /// Answers a query about symbolic states; keeps the strategy that it defines.
+    fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Answer {
         let PreparedQuery { query, options, .. } = prepared;
         self.executor().wraps().clear();
-        let mut answer = match self.constant_failure() {
-            Some(failure) => Answer::failed(failure),
-            None => {
-                let answer = self.answer_in_zones(prepared, None);
-                if let Some(name) = &query.strategy {
-                    self.keep_answer(name, prepared, &answer);
-                }
-                answer
+        let mut answer = if let Some(failure) = self.constant_failure() {
+            Answer::failed(failure)
+        } else {
+            let answer = self.answer_in_zones(prepared, None);
+            if let Some(name) = &query.strategy {
+                self.keep_answer(name, prepared, &answer);
             }
+            answer
         };
         answer.wrapped = self.first_wrap();
         self.complete_failure(query, options, &mut answer);
-        Ok(answer)
+        answer
     }
 
     /// Answers a query that saves or loads a strategy: no code of the model is run.

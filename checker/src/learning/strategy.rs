@@ -141,7 +141,7 @@ pub fn words(observation: &Observation, values: &[f64]) -> Option<Vec<i32>> {
         match feature.seen {
             Seen::Location(_) | Seen::Integer(_) => {
                 let word = value as i32;
-                if f64::from(word) != value {
+                if f64::from(word).total_cmp(&(value + 0.0)).is_ne() {
                     return None;
                 }
                 words.push(word);

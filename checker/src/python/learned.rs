@@ -66,6 +66,10 @@ impl LearnedStrategy {
     }
 
     /// The best enabled action; `None` if none of them was tried here.
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "Python's lists are read as vectors"
+    )]
     fn decide(
         &self,
         discrete: Vec<f64>,

@@ -512,7 +512,7 @@ fn the_code_in_c_decides_as_the_strategy_does() {
                 let decided = strategy.decide(&discrete, &continuous, |one| enabled[one as usize]);
                 expected.push(decided.map_or(0xff, |action| action as u8));
             }
-            assert!(expected.iter().any(|&one| one == 0xff));
+            assert!(expected.contains(&0xff));
             assert_eq!(expected, answers(&program, &input));
         }
     });

@@ -176,7 +176,9 @@ def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str]
     if isinstance(learned := answer.strategy, LearnedStrategy):
         defines = None if query.form is None else query.form.defines
         language = LANGUAGES.get(suffix)
-        return [learned.code(language, defines or "strategy") if language else f"{learned.json()}\n"]
+        return [
+            learned.code(language, defines or "strategy") if language else f"{learned.json()}\n"
+        ]
     if suffix == ".c":
         controller = answer.controller_c()
         return None if controller is None else [controller]

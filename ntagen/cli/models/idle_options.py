@@ -15,7 +15,8 @@ _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
     "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
     "certificate",
-    "--strategy": "no answer has a strategy; only control queries, and minE, maxE, minPr and maxPr, can have one",
+    "--strategy": "no answer has a strategy; only control queries, and minE, maxE, minPr and "
+    "maxPr, can have one",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }
@@ -92,7 +93,11 @@ def _find_idle_statistics(
     is_learned = any(query.is_learned for query in queries)
     for name in LEARNING:
         idle(name, not is_learned, "here: no query is for the best strategy")
-    idle("qlearning_alpha", is_learned and values["learning_method"] != "q", "without --learning-method q")
+    idle(
+        "qlearning_alpha",
+        is_learned and values["learning_method"] != "q",
+        "without --learning-method q",
+    )
     has_runs = is_learned or any(query.is_statistical for query in queries)
     for name in ("effort", "repetitions"):
         idle(name, has_runs and "levels" not in given, "without --set 'levels …'")

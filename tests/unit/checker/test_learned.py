@@ -172,7 +172,9 @@ def test_the_module_decides_as_the_strategy_does(tmp_path: Path, minimises: bool
         enabled = [draw.random() < 0.5 for _ in ACTIONS]
         decided = strategy.decide(discrete, continuous, enabled)
         unseen += decided is None
-        assert module["decide"](discrete, continuous, enabled) == (-1 if decided is None else decided)
+        assert module["decide"](discrete, continuous, enabled) == (
+            -1 if decided is None else decided
+        )
     assert 0 < unseen < 50_000
 
 

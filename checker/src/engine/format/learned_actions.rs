@@ -7,6 +7,7 @@
 //! its own, and the same model gives the same texts.
 
 use std::collections::HashMap;
+use std::fmt::Write as _;
 
 use super::text::{self, EntryParts};
 use crate::ir::{EdgeLabels, Network, Part};
@@ -23,7 +24,8 @@ pub fn texts(network: &Network, moves: &[Part]) -> Vec<String> {
     }
     for (text, part) in texts.iter_mut().zip(moves) {
         if counts[text.as_str()] > 1 {
-            text.push_str(&format!(" [edge={}]", part.edge));
+            // Writing to a string cannot fail.
+            let _ = write!(text, " [edge={}]", part.edge);
         }
     }
     texts.push(WAIT.to_owned());
@@ -173,19 +175,17 @@ impl Finder {
     /// There is none, or more than one.
     pub fn find(&self, text: &str) -> Result<u32, Unmatched> {
         let found = self.exact.get(&without_blanks(text));
-        match found.or_else(|| self.plain.get(&plain(text))) {
-            Some(numbers) => match numbers[..] {
+        if let Some(numbers) = found.or_else(|| self.plain.get(&plain(text))) {
+            return match numbers[..] {
                 [number] => Ok(number),
                 _ => Err(Unmatched::Ambiguous),
-            },
-            None => {
-                let ends = ends(text);
-                match self.ends.get(&ends).map(Vec::as_slice) {
-                    Some([number]) if self.asked.get(&ends) == Some(&1) => Ok(*number),
-                    Some(_) => Err(Unmatched::Ambiguous),
-                    None => Err(Unmatched::Unknown),
-                }
-            }
+            };
+        }
+        let ends = ends(text);
+        match self.ends.get(&ends).map(Vec::as_slice) {
+            Some([number]) if self.asked.get(&ends) == Some(&1) => Ok(*number),
+            Some(_) => Err(Unmatched::Ambiguous),
+            None => Err(Unmatched::Unknown),
         }
     }
 }

@@ -250,17 +250,15 @@ impl Parts<'_> {
         let mut roots = self.nodes.roots.iter();
         text.push_str("_KNOWN = {\n");
         for (key, regressor) in self.keys().zip(&self.strategy.regressors) {
-            let key: String = key.iter().map(|value| format!("{value:?},")).collect();
-            let known = regressor.appraisals.iter().zip(&mut roots);
-            let known: String = known
-                .map(|(one, root)| format!("({},{root}),", one.action))
-                .collect();
-            let key = if key.is_empty() {
-                "("
-            } else {
-                &format!("({key}")
-            };
-            let _ = writeln!(text, "    {key}): ({known}),");
+            text.push_str("    (");
+            for value in key {
+                let _ = write!(text, "{value:?},");
+            }
+            text.push_str("): (");
+            for (one, root) in regressor.appraisals.iter().zip(&mut roots) {
+                let _ = write!(text, "({},{root}),", one.action);
+            }
+            text.push_str("),\n");
         }
         text.push_str("}\n");
         let nodes = &self.nodes;

@@ -402,7 +402,7 @@ impl Reader<'_> {
         };
         let texts: Vec<&str> = inner.split(',').map(str::trim).collect();
         let features = &observation.discrete;
-        if features.is_empty() && matches!(texts[..], [""] | ["1"]) {
+        if features.is_empty() && matches!(texts[..], ["" | "1"]) {
             return Ok(Vec::new());
         }
         if texts.len() != features.len() {
@@ -433,7 +433,7 @@ impl Reader<'_> {
         let known = self.locations.get(&process);
         let place = number as i64;
         let found = match known {
-            _ if place as f64 != number => None,
+            _ if number.fract() != 0.0 => None,
             Some(known) => known.get(&place).copied(),
             None => i32::try_from(place).ok(),
         };

@@ -1,4 +1,4 @@
-//! Text, JSON and C: how answers, models and strategies are written and read.
+//! Text, JSON, C and Python: how answers, models and strategies are written and read.
 
 pub mod decision_table;
 pub mod decisions;
