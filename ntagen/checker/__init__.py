@@ -11,7 +11,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ntagen.checker.answer import Answer, Estimate, Extreme, Interrupted, Place, Value, Verdict
+from ntagen.checker.answer import (
+    Answer,
+    Estimate,
+    Extreme,
+    Interrupted,
+    Optimised,
+    Place,
+    Value,
+    Verdict,
+)
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.model import (
@@ -45,7 +54,7 @@ from ntagen.checker.queries import (
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Cumulative, Distribution, Histogram
-    from ntagen.checker.learned import LearnedStrategy, Optimised
+    from ntagen.checker.learned import LearnedStrategy
     from ntagen.checker.states import Simulation, SymbolicState
     from ntagen.checker.trajectories import OverTime, Trajectory
 
@@ -100,7 +109,6 @@ _HOMES = {
     "Distribution": "distribution",
     "Histogram": "distribution",
     "LearnedStrategy": "learned",
-    "Optimised": "learned",
     "OverTime": "trajectories",
     "Simulation": "states",
     "SymbolicState": "states",

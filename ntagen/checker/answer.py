@@ -15,7 +15,7 @@ from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Distribution
-    from ntagen.checker.learned import LearnedStrategy, Optimised
+    from ntagen.checker.learned import LearnedStrategy
     from ntagen.checker.machine import Machine
     from ntagen.checker.options import Options
     from ntagen.checker.picture.page import Svg
@@ -91,6 +91,36 @@ class Estimate:
         """The estimate that an object of the engine describes."""
         compared = given["compared"]
         return cls(**given | {"compared": compared and cls.from_object(compared)})
+
+
+@dataclass(frozen=True, slots=True)
+class Optimised:
+    """How the best strategy was found.
+
+    Attributes:
+        runs: From how many runs it was learned, those that judged it among them.
+        iterations: How many iterations there were.
+        iterations_in_last_reset: How many of them came after the last reset.
+        resets: How often all was forgotten.
+        judged: Its value by the runs that chose it among others; it is too good by a little.
+            `Answer.value` comes from runs that learning has not seen.
+        uniform: What runs are worth in which all is chosen uniformly; ``None`` if a limit came
+            before.
+        comparison: Whether the strategy is ``better`` or ``worse`` than that, or ``alike`` as far
+            as the runs can tell; ``None`` if a limit came before.
+        is_complete: Whether learning came to its end.
+        leaves: How many leaves the trees of the strategy have.
+    """
+
+    runs: int
+    iterations: int
+    iterations_in_last_reset: int
+    resets: int
+    judged: float
+    uniform: Estimate | None
+    comparison: Literal["better", "worse", "alike"] | None
+    is_complete: bool
+    leaves: int
 
 
 class Answer:
@@ -425,8 +455,6 @@ class Answer:
     @property
     def optimised(self) -> Optimised | None:
         """How the best strategy was found; ``None`` for other queries than ``minE`` and its kin."""
-        from ntagen.checker.learned import Optimised
-
         text = self._raw.optimised_json()
         if text is None:
             return None

@@ -1,4 +1,4 @@
-"""Learned strategies: what ``minE``, ``maxE``, ``minPr`` and ``maxPr`` find, and how."""
+"""Learned strategies: what ``minE``, ``maxE``, ``minPr`` and ``maxPr`` find."""
 
 from __future__ import annotations
 
@@ -8,48 +8,16 @@ from pathlib import Path
 from typing import Final, Literal
 
 import ntagen._checker as _checker
-from ntagen.checker.answer import Estimate
 from ntagen.checker.errors import rejecting
 from ntagen.errors import InputError
 from ntagen.files import write_files
-from ntagen.values import dataclass
 
-__all__ = ["LearnedStrategy", "Optimised"]
+__all__ = ["LearnedStrategy"]
 
 Language = Literal["c", "python"]
 
-LANGUAGES: Final[dict[str, Language]] = {".c": "c", ".py": "python"}
+_LANGUAGES: Final[dict[str, Language]] = {".c": "c", ".py": "python"}
 """The languages by the ends of names of files."""
-
-
-@dataclass(frozen=True, slots=True)
-class Optimised:
-    """How the best strategy was found.
-
-    Attributes:
-        runs: From how many runs it was learned, those that judged it among them.
-        iterations: How many iterations there were.
-        iterations_in_last_reset: How many of them came after the last reset.
-        resets: How often all was forgotten.
-        judged: Its value by the runs that chose it among others; it is too good by a little.
-            `Answer.value` comes from runs that learning has not seen.
-        uniform: What runs are worth in which all is chosen uniformly; ``None`` if a limit came
-            before.
-        comparison: Whether the strategy is ``better`` or ``worse`` than that, or ``alike`` as far
-            as the runs can tell; ``None`` if a limit came before.
-        is_complete: Whether learning came to its end.
-        leaves: How many leaves the trees of the strategy have.
-    """
-
-    runs: int
-    iterations: int
-    iterations_in_last_reset: int
-    resets: int
-    judged: float
-    uniform: Estimate | None
-    comparison: Literal["better", "worse", "alike"] | None
-    is_complete: bool
-    leaves: int
 
 
 class LearnedStrategy:
@@ -129,9 +97,17 @@ class LearnedStrategy:
             InputError: The file cannot be written.
         """
         place = Path(path)
-        language = LANGUAGES.get(place.suffix)
-        text = f"{self.json()}\n" if language is None else self.code(language)
-        write_files({place: text})
+        write_files({place: self.file_text(place.suffix)})
+
+    def file_text(self, suffix: str, name: str = "strategy") -> str:
+        """What is written to a file whose name ends so.
+
+        Args:
+            suffix: ``.c`` or ``.py`` for code; every other file has JSON.
+            name: What the names in C begin with.
+        """
+        language = _LANGUAGES.get(suffix)
+        return f"{self.json()}\n" if language is None else self.code(language, name)
 
     def keep(self, name: str) -> None:
         """Makes the strategy available to later queries of the model: ``Pr[<=9](<> p) under S``.

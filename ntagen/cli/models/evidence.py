@@ -170,15 +170,12 @@ def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: 
 
 def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str] | None:
     """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
-    from ntagen.checker.learned import LANGUAGES, LearnedStrategy
+    from ntagen.checker import LearnedStrategy
 
     suffix = Path(target).suffix
     if isinstance(learned := answer.strategy, LearnedStrategy):
         defines = None if query.form is None else query.form.defines
-        language = LANGUAGES.get(suffix)
-        return [
-            learned.code(language, defines or "strategy") if language else f"{learned.json()}\n"
-        ]
+        return [learned.file_text(suffix, defines or "strategy")]
     if suffix == ".c":
         controller = answer.controller_c()
         return None if controller is None else [controller]
