@@ -41,6 +41,7 @@ impl LoadedModel {
                 return result;
             }
             self.stochastic = None;
+            self.renew_learned()?;
         }
     }
 

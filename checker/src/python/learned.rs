@@ -6,12 +6,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::answer::Answer;
-use super::convert::{RejectedError, choice, until_signal_apart};
+use super::convert::{RejectedError, choice, rejected, until_signal_apart};
 use super::model::Model;
+use crate::engine::LoadedModel;
 use crate::engine::format::learned_code::Language;
 use crate::engine::format::learned_json;
 use crate::engine::query_form::unnamed;
-use crate::engine::{LoadedModel, NamedStrategy};
 use crate::learning;
 
 /// A learned strategy.
@@ -115,13 +115,12 @@ impl LearnedStrategy {
     }
 
     /// Lets queries of the model be asked under it by a name.
-    fn keep(&self, name: &str) {
-        self.model.get().with(|model| {
-            model.keep_strategy(NamedStrategy {
-                learned: Some(Arc::clone(&self.inner)),
-                ..NamedStrategy::new(name.to_owned(), self.query.clone(), None)
-            });
+    fn keep(&self, name: &str) -> PyResult<()> {
+        let kept = self.model.get().with(|model| {
+            let learned = Arc::clone(&self.inner);
+            model.keep_known(name, &self.query, learned)
         });
+        kept.map_err(rejected)
     }
 }
 

@@ -465,6 +465,42 @@ fn models_with_random_runs_only_save_and_load() {
     });
 }
 
+#[test]
+fn a_model_that_is_analysed_again_keeps_what_was_learned() {
+    // The run under the strategy needs more slots for dynamic templates than there were.
+    let text = "
+        dynamic Child(int number);
+        int cost;
+        int[0,300] made;
+        process Child(int number) { state A; init A; }
+        process P() {
+          state Go, Choose, Done;
+          urgent Go, Choose;
+          init Go;
+          trans Go -u-> Go { guard made < 200; assign made++, spawn Child(made); },
+                Go -u-> Choose { guard made >= 200; },
+                Choose -> Done { assign cost = 5; },
+                Choose -> Done { assign cost = 2; };
+        }
+        system P;";
+    in_folder("learned-again-analysed", |place| {
+        let folder = Folder::new(place);
+        let mut model = load(text);
+        let regressor = r#""type":"act->point->val","representation":"simpletree","minimize":1"#;
+        let file = format!(
+            r#"{{"version":1.0,"type":"state->regressor","representation":"map",
+            "actions":{{"0":"P.Choose->P.Done {{ 1, tau, cost = 5 }}","1":"P.Choose->P.Done {{ 1, tau, cost = 2 }}"}},
+            "statevars":["P.location","made + 0"],"pointvars":[],"locationnames":{{}},
+            "regressors":{{"(1,200)":{{{regressor},"regressor":{{"0":5.0,"1":2.0}}}}}}}}"#
+        );
+        folder.write("s.json", &file);
+        folder.loaded(&mut model, "strategy S = loadStrategy(\"s.json\")");
+        let answer = folder.ask(&mut model, "E[<=1; 50](max: cost) under S");
+        let value = answer.estimate.expect("it is a mean").value;
+        assert!((value - 2.0).abs() < 1e-9, "{value}");
+    });
+}
+
 /// Reads states as bytes, and writes decisions as bytes.
 const DRIVER: &str = "
 #include <stdio.h>

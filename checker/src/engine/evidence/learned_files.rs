@@ -3,6 +3,8 @@
 //! The features of a file are texts, which are compiled in the stochastic reading, as those of a
 //! query are. A strategy that is read has all moves of the controller of this model, so that its
 //! actions have the numbers that they would have if it had been learned here.
+//!
+//! An observation holds as long as the analysis of the model that it was compiled in.
 
 use std::sync::Arc;
 
@@ -13,7 +15,7 @@ use crate::engine::codes;
 use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::learned_code::{self, Language};
 use crate::engine::format::{learned_actions, learned_json, text};
-use crate::engine::loaded_model::{ANALYSED, LoadedModel};
+use crate::engine::loaded_model::{ANALYSED, LoadedModel, NamedStrategy};
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Feature, FeatureTexts, Network, Observation, Part, Seen, Shape};
@@ -132,6 +134,40 @@ impl LoadedModel {
             discrete: seen(&texts.discrete, "statevars", true)?,
             continuous: seen(&texts.continuous, "pointvars", false)?,
         })
+    }
+
+    /// Keeps a learned strategy of this model, which answers a query, under a name.
+    pub fn keep_known(
+        &mut self,
+        name: &str,
+        query: &str,
+        learned: Arc<LearnedStrategy>,
+    ) -> Result<(), Rejection> {
+        self.keep_strategy(NamedStrategy {
+            learned: Some(learned),
+            ..NamedStrategy::new(name.to_owned(), query.to_owned(), None)
+        });
+        // It may have been made before the model was analysed the last time.
+        self.renew_learned()
+    }
+
+    /// Compiles again what learned strategies see, where the model is analysed anew: code and places
+    /// of variables are others then.
+    pub(in crate::engine) fn renew_learned(&mut self) -> Result<(), Rejection> {
+        for index in 0..self.strategies.len() {
+            let Some(learned) = self.strategies[index].learned.take() else {
+                continue;
+            };
+            self.expect_stochastic()?;
+            let seen = self.observation_of(&learned_json::texts(&learned.observation));
+            self.strategies[index].learned = seen.ok().map(|observation| {
+                Arc::new(LearnedStrategy {
+                    observation: Arc::new(observation),
+                    ..(*learned).clone()
+                })
+            });
+        }
+        Ok(())
     }
 
     /// What a text stands for: an expression, or the name of a variable that no expression can be
