@@ -8,8 +8,8 @@ use pyo3::types::PyBytes;
 
 use super::convert::{
     RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal, until_signal_apart,
+    unwritten,
 };
-use super::learned::LearnedStrategy;
 use super::long_text::LongText;
 use super::model::{BoundRow, Model, bound_rows};
 use super::options;
@@ -446,9 +446,12 @@ impl Answer {
 
     /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
     fn strategy_json(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
-        if let Some(learned) = LearnedStrategy::of_answer(slf.py(), slf) {
-            let learned = Bound::new(slf.py(), learned)?;
-            return Ok(Some(LongText::new(LearnedStrategy::json(&learned)?)));
+        if let Some(learned) = slf.get().inner.evidence.learned.clone() {
+            let held = slf.get().model.clone_ref(slf.py());
+            let text = until_signal_apart(slf.py(), move || {
+                held.get().with(|model| model.learned_text(&learned))
+            })?;
+            return Ok(Some(LongText::new(text.map_err(unwritten)?)));
         }
         written(slf, |answer, network| {
             let (evidence, query) = (&answer.inner.evidence, &answer.query);

@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::answer::Answer;
-use super::convert::{RejectedError, choice, rejected, until_signal_apart};
+use super::convert::{choice, rejected, until_signal_apart, unwritten};
 use super::model::Model;
 use crate::engine::LoadedModel;
 use crate::engine::format::learned_code::Language;
@@ -26,7 +26,7 @@ pub(super) struct LearnedStrategy {
 impl LearnedStrategy {
     /// The learned strategy of an answer; `None` if it has none.
     #[staticmethod]
-    pub(super) fn of_answer(py: Python<'_>, answer: &Bound<'_, Answer>) -> Option<LearnedStrategy> {
+    fn of_answer(py: Python<'_>, answer: &Bound<'_, Answer>) -> Option<LearnedStrategy> {
         let answer = answer.get();
         Some(LearnedStrategy {
             model: answer.model.clone_ref(py),
@@ -97,12 +97,9 @@ impl LearnedStrategy {
     }
 
     /// The strategy as a file.
-    pub(super) fn json(slf: &Bound<'_, Self>) -> PyResult<String> {
+    fn json(slf: &Bound<'_, Self>) -> PyResult<String> {
         let text = written(slf, |own, model| model.learned_text(&own.inner))?;
-        text.map_err(|why| {
-            let message = format!("error: the strategy cannot be written: {why}");
-            RejectedError::new_err((vec![message],))
-        })
+        text.map_err(unwritten)
     }
 
     /// The strategy as a function in "c" or "python", whose names begin so.

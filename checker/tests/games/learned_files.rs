@@ -369,6 +369,16 @@ fn what_does_not_fit_is_refused_and_changes_nothing() {
         }
         let shown = folder.refusal(&mut model, good, "{n, P.location} -> {x}");
         assert!(shown.contains("the query says {n, P.location}"), "{shown}");
+        let huge = fs::File::create(place.join("huge.json")).expect("the folder can be written");
+        huge.set_len((2 << 30) + 1).expect("most of it is a hole");
+        let query = "strategy S = loadStrategy(\"huge.json\")";
+        let refused = try_ask(&mut model, query, &folder.options).expect_err("it is too large");
+        assert!(
+            refused
+                .rendered
+                .join("\n")
+                .contains("huge.json cannot be read: it is too large")
+        );
         // The strategy that was there before is still there.
         let kept = model.strategy("S").and_then(|one| one.learned.clone());
         assert_eq!(

@@ -1,10 +1,10 @@
 //! Texts of the actions of learned strategies: the moves of the controller, as
 //! `P.a->P.b { guard, sync, update }`, and `WAIT`.
 //!
-//! Values of `select` bindings stand in the labels in the place of their names. What a name stands
-//! for may depend on a quantifier, or it may not be there; then the values stand behind, as
-//! `[i=3]`. Where edges have the same text, their numbers stand behind. So each action has a text of
-//! its own, and the same model gives the same texts.
+//! Values of `select` bindings stand in the labels in the place of their names. Where a label has a
+//! quantifier, or no label has the name, the values stand behind, as `[i=3]`. Where edges have the
+//! same text, their numbers stand behind. So each action has a text of its own, and the same model
+//! gives the same texts.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
