@@ -99,6 +99,7 @@ pub(super) fn rejected(rejection: Rejection) -> PyErr {
 }
 
 /// Why a learned strategy has no file, as a refusal.
+#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
 pub(super) fn unwritten(why: String) -> PyErr {
     RejectedError::new_err((vec![format!(
         "error: the strategy cannot be written: {why}"
