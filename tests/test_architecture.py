@@ -61,12 +61,14 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.states"},
     "checker.runs": {"errors", "checker.picture"},
     "checker.machine": {"errors"},
+    "checker.learned": {"checker.errors", "errors", "files", "_checker"},
     "checker.story": {"checker.runs"},
     "checker.play": {"errors", "checker.errors", "checker.runs", "_checker"},
     "checker.decisions": {"checker.runs"},
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
     | {"checker.decisions", "checker.errors", "checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
+    | {"checker.learned"}
     | {"checker.options"}
     | {"checker.story", "checker.strategy", "_checker"}
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
@@ -79,7 +81,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
     | {"checker.options", "checker.queries", "checker.states"}
-    | {"checker.distribution", "checker.trajectories"},
+    | {"checker.distribution", "checker.learned", "checker.trajectories"},
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
@@ -359,7 +361,12 @@ def test_only_the_command_line_prints_or_exits() -> None:
 def test_the_compiled_engine_has_one_door(module: str) -> None:
     users = {item.room for item in imports() if item.module.startswith(module)}
     doors = {"checker.answer", "checker.errors", "checker.model", "checker.states"}
-    assert users <= doors | {"checker.play", "checker.queries", "checker.strategy"}
+    assert users <= doors | {
+        "checker.learned",
+        "checker.play",
+        "checker.queries",
+        "checker.strategy",
+    }
 
 
 def test_commands_print_by_the_terminal_module_only() -> None:

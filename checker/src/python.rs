@@ -5,6 +5,7 @@
 
 mod answer;
 mod convert;
+mod learned;
 mod long_text;
 mod model;
 mod options;
@@ -79,6 +80,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Simulation>()?;
     module.add_class::<play::Strategy>()?;
     module.add_class::<play::Play>()?;
+    module.add_class::<learned::LearnedStrategy>()?;
     module.add_class::<plans::Plans>()?;
     module.add_class::<long_text::LongText>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;

@@ -3,15 +3,24 @@
 The engine is the Rust crate in ``checker/``; this package only gives its answers Python types. It
 works for any model and knows nothing of needles. `model` loads a model; `facts`, `picture` and
 `states` show what is in it. Queries have answers (`answer`) with runs (`runs`), strategies
-(`strategy`, `machine`) and plays against them (`play`). What only some answers need is imported
-when it is used.
+(`strategy`, `learned`, `machine`) and plays against them (`play`). What only some answers need is
+imported when it is used.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ntagen.checker.answer import Answer, Estimate, Extreme, Interrupted, Place, Value, Verdict
+from ntagen.checker.answer import (
+    Answer,
+    Estimate,
+    Extreme,
+    Interrupted,
+    Optimised,
+    Place,
+    Value,
+    Verdict,
+)
 from ntagen.checker.edges import EngineEdge, EnginePlan, EngineStep
 from ntagen.checker.errors import RejectedError
 from ntagen.checker.model import (
@@ -45,6 +54,7 @@ from ntagen.checker.queries import (
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Cumulative, Distribution, Histogram
+    from ntagen.checker.learned import LearnedStrategy
     from ntagen.checker.states import Simulation, SymbolicState
     from ntagen.checker.trajectories import OverTime, Trajectory
 
@@ -64,7 +74,9 @@ __all__ = [
     "Extreme",
     "Histogram",
     "Interrupted",
+    "LearnedStrategy",
     "Model",
+    "Optimised",
     "Options",
     "OverTime",
     "OverflowRule",
@@ -96,6 +108,7 @@ _HOMES = {
     "Cumulative": "distribution",
     "Distribution": "distribution",
     "Histogram": "distribution",
+    "LearnedStrategy": "learned",
     "OverTime": "trajectories",
     "Simulation": "states",
     "SymbolicState": "states",

@@ -15,6 +15,7 @@ from ntagen.values import dataclass
 
 if TYPE_CHECKING:
     from ntagen.checker.distribution import Distribution
+    from ntagen.checker.learned import LearnedStrategy
     from ntagen.checker.machine import Machine
     from ntagen.checker.options import Options
     from ntagen.checker.picture.page import Svg
@@ -90,6 +91,36 @@ class Estimate:
         """The estimate that an object of the engine describes."""
         compared = given["compared"]
         return cls(**given | {"compared": compared and cls.from_object(compared)})
+
+
+@dataclass(frozen=True, slots=True)
+class Optimised:
+    """How the best strategy was found.
+
+    Attributes:
+        runs: From how many runs it was learned, those that judged it among them.
+        iterations: How many iterations there were.
+        iterations_in_last_reset: How many of them came after the last reset.
+        resets: How often all was forgotten.
+        judged: Its value by the runs that chose it among others; it is too good by a little.
+            `Answer.value` comes from runs that learning has not seen.
+        uniform: What runs are worth in which all is chosen uniformly; ``None`` if a limit came
+            before.
+        comparison: Whether the strategy is ``better`` or ``worse`` than that, or ``alike`` as far
+            as the runs can tell; ``None`` if a limit came before.
+        is_complete: Whether learning came to its end.
+        leaves: How many leaves the trees of the strategy have.
+    """
+
+    runs: int
+    iterations: int
+    iterations_in_last_reset: int
+    resets: int
+    judged: float
+    uniform: Estimate | None
+    comparison: Literal["better", "worse", "alike"] | None
+    is_complete: bool
+    leaves: int
 
 
 class Answer:
@@ -405,14 +436,31 @@ class Answer:
         return None if self.certificate_states is None else "".join(self.certificate_pieces())
 
     @property
-    def strategy(self) -> Strategy | None:
-        """The strategy of the player who wins; ``None`` if none was asked for or found."""
+    def strategy(self) -> Strategy | LearnedStrategy | None:
+        """The strategy of the player who wins, or the one that was learned.
+
+        ``None`` if none was asked for or found.
+        """
+        from ntagen.checker.learned import LearnedStrategy
         from ntagen.checker.strategy import Strategy
 
+        learned = _checker.LearnedStrategy.of_answer(self._raw)
+        if learned is not None:
+            return LearnedStrategy(learned)
         raw = _checker.Strategy.of_answer(self._raw)
         return (
             None if raw is None else Strategy(raw, self._options.forced, self._options.priorities)
         )
+
+    @property
+    def optimised(self) -> Optimised | None:
+        """How the best strategy was found; ``None`` for other queries than ``minE`` and its kin."""
+        text = self._raw.optimised_json()
+        if text is None:
+            return None
+        given = json.loads(text)
+        uniform = given["uniform"] and Estimate.from_object(given["uniform"])
+        return Optimised(**given | {"uniform": uniform})
 
     @property
     def machine(self) -> Machine | None:
@@ -427,6 +475,8 @@ class Answer:
 
     def strategy_json(self) -> str | None:
         """The strategy, or the machine of a game with observations, as JSON text.
+
+        A learned strategy has UPPAAL's form.
 
         ``None`` if none was asked for or found.
         """

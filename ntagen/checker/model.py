@@ -313,6 +313,8 @@ class Model:
             ModelError: The model fails.
             KeyboardInterrupt: The user interrupted.
         """
+        from ntagen.checker.strategy import Strategy
+
         form = form_of(query)
         if form is None or not form.is_game:
             raise InputError(
@@ -329,7 +331,7 @@ class Model:
         if answer.verdict == "maybe":
             raise LimitError("the engine could not decide who wins, because the model stops clocks")
         strategy = answer.strategy
-        if strategy is None:
+        if not isinstance(strategy, Strategy):
             if answer.strategy_json() is not None:
                 raise InputError(
                     f"{answer.query.strip()} has a machine over observations, not a strategy "

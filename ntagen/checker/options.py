@@ -26,6 +26,7 @@ PlansWanted = Literal["none", "all"]
 StrategyWanted = Literal["winner", "controller"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 UnderChoice = Literal["race", "eager", "lazy"]
+LearningMethod = Literal["auto", "q", "m"]
 MeanInterval = Literal["auto", "student", "bernstein", "dkw"]
 
 Progress = Callable[[int, int, int, int], object]
@@ -140,6 +141,33 @@ class Options:
     ``race`` for what the strategy allows, with waiting as one more choice where it allows that too,
     until it demands a move; or it moves as soon as it may (``eager``), or only when it must
     (``lazy``)."""
+
+    learning_method: LearningMethod = "auto"
+    """How ``minE``, ``maxE``, ``minPr`` and ``maxPr`` learn what actions are worth: by Q-learning
+    (``q``), or from the finite process that all samples make (``m``); ``auto`` is ``m``. The
+    options of learning have the names that UPPAAL gives them; ``None`` leaves a number to the
+    engine."""
+
+    good_runs: int | None = None
+    """From how many random runs an iteration learns."""
+
+    eval_runs: int | None = None
+    """How many random runs judge the strategy of an iteration."""
+
+    max_iterations: int | None = None
+    """How many iterations there are at most, in total."""
+
+    reset_no_better: int | None = None
+    """After so many iterations without a better strategy, learning ends or begins anew."""
+
+    max_reset_learning: int | None = None
+    """How often learning begins anew, with all forgotten but the best strategy."""
+
+    discount: float | None = None
+    """What a cost counts a decision earlier, as a part of itself: more than 0, at most 1."""
+
+    qlearning_alpha: float | None = None
+    """In Q-learning, the n-th sample counts for 1 / min(`qlearning_alpha`, n + 1)."""
 
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""
@@ -272,8 +300,21 @@ class Options:
             least, greatest = self.value_bounds
             if not -math.inf < least < greatest < math.inf:
                 raise ValueError(f"value_bounds are {least} and {greatest}: the first must be less")
+        self._require_learning()
         if self.discretisation is not None and not 0 < self.discretisation < math.inf:
             raise ValueError(f"discretisation is {self.discretisation}, but must be positive")
+
+    def _require_learning(self) -> None:
+        """Raises an error if an option of learning has no meaning."""
+        least = {"good_runs": 1, "eval_runs": 1, "max_iterations": 1, "reset_no_better": 1}
+        for name, number in (least | {"max_reset_learning": 0}).items():
+            value = getattr(self, name)
+            if value is not None and value < number:
+                raise ValueError(f"{name} is {value}, but must be at least {number}")
+        if self.discount is not None and not 0 < self.discount <= 1:
+            raise ValueError(f"discount is {self.discount}, but must lie between 0 and 1")
+        if self.qlearning_alpha is not None and not 1 <= self.qlearning_alpha < math.inf:
+            raise ValueError(f"qlearning_alpha is {self.qlearning_alpha}, but must be at least 1")
 
 
 Keywords = ParamSpec("Keywords")

@@ -118,7 +118,8 @@ class QueryForm:
     Attributes:
         kind: How its kind is written: ``E<>``, ``A[]``, ``E[]``, ``A<>``, ``-->``, ``sup``,
             ``inf``, ``bounds``, ``control``, ``control_t*``, ``E<> control``, ``saveStrategy``,
-            ``loadStrategy``, ``Pr``, ``E``, ``simulate`` (statistical queries), or ``unsupported``.
+            ``loadStrategy``, ``Pr``, ``E``, ``simulate`` (statistical queries), ``minE``, ``maxE``,
+            ``minPr``, ``maxPr`` (queries for the best strategy), or ``unsupported``.
         defines: The name of the strategy that it defines, or ``None``.
         uses: The name of the strategy that it is asked under, or that it saves, or ``None``.
         is_observed: Whether it is a game in which the controller sees observations only.
@@ -133,6 +134,11 @@ class QueryForm:
     def is_statistical(self) -> bool:
         """Whether random runs answer it."""
         return self.kind in ("Pr", "E", "simulate")
+
+    @property
+    def is_learned(self) -> bool:
+        """Whether it asks for the best strategy, which is learned from random runs."""
+        return self.kind in ("minE", "maxE", "minPr", "maxPr")
 
     @property
     def is_game(self) -> bool:

@@ -52,12 +52,25 @@ class Option:
         return (*(self.value.split("|") if "|" in self.value else ()), *self.more)
 
 
-_LEARNING: Final = "it is for learning, which ntagen does not do"
+_IDLE_IN_LEARNING: Final = "Learning in ntagen has no such setting; it is mentioned in the output."
 
 
-def _refused(names: Sequence[str], why: str) -> list[Option]:
-    return [Option("", f"--{name}", "N", "refused", why) for name in names]
-
+IDLE_IN_LEARNING: Final = (
+    "total-runs",
+    "runs-pr-state",
+    "max-imitation",
+    "filter",
+    "random-search-limit",
+    "deterministic-search-limit",
+    "split-filter-rate",
+    "split-filter-val",
+    "split-ks",
+    "split-lower-t",
+    "split-upper-t",
+    "indifference-smoothing",
+    "indifference-scale",
+)
+"""The options of learning that are accepted and have no effect."""
 
 OPTIONS: Final = (
     Option("-h", "--help", "", "honoured", "Show this help."),
@@ -144,24 +157,30 @@ OPTIONS: Final = (
         "Let the model import these libraries, or those in these folders; several are separated as "
         "in the variable PATH. Only ntagen has this option: it loads no library without it.",
     ),
-    *_refused(
-        (
-            "learning-method",
-            "good-runs",
-            "total-runs",
-            "runs-pr-state",
-            "eval-runs",
-            "max-iterations",
-            "reset-no-better",
-            "max-reset-learning",
-            "qlearning-alpha",
-            "split-filter-rate",
-            "indifference-smoothing",
-            "max-imitation",
-            "filter",
-        ),
-        _LEARNING,
+    Option(
+        "",
+        "--learning-method",
+        "4|5",
+        "honoured",
+        "Q-learning (4) or M-learning (5). -1 and 3 are taken as 5.",
+        ("-1", "3"),
     ),
+    Option("", "--good-runs", "N>0", "honoured", "From how many runs an iteration learns."),
+    Option("", "--eval-runs", "N>0", "honoured", "How many runs judge its strategy."),
+    Option("", "--max-iterations", "N>0", "honoured", "The most iterations, in total."),
+    Option(
+        "",
+        "--reset-no-better",
+        "N>0",
+        "honoured",
+        "After so many iterations without a better strategy learning ends or begins anew.",
+    ),
+    Option("", "--max-reset-learning", "N>=0", "honoured", "How often it begins anew."),
+    Option("", "--discount", "0<..1", "honoured", "What a cost counts a decision earlier."),
+    Option(
+        "", "--qlearning-alpha", ">=1", "honoured", "The n-th sample counts for 1/min(this, n+1)."
+    ),
+    *(Option("", f"--{name}", "X", "idle", _IDLE_IN_LEARNING) for name in IDLE_IN_LEARNING),
 )
 """The options that are known, in the order of the help."""
 
@@ -169,6 +188,8 @@ _RANGES: Final = {
     "0..1": (0.0, 1.0, "between 0 and 1"),
     ">0": (0.0, math.inf, "greater than 0"),
     ">1": (1.0, math.inf, "greater than 1"),
+    "0<..1": (0.0, math.nextafter(1.0, 2.0), "greater than 0 and at most 1"),
+    ">=1": (math.nextafter(1.0, 0.0), math.inf, "at least 1"),
 }
 """For the values that are such numbers: between which they lie, and how to say it."""
 
@@ -281,6 +302,8 @@ def _require(option: Option, value: str) -> None:
         wanted = "an integer"
     elif option.value == "N>0" and not (value.isdecimal() and int(value) > 0):
         wanted = "a positive integer"
+    elif option.value == "N>=0" and not value.isdecimal():
+        wanted = "an integer that is at least 0"
     elif option.value in _RANGES:
         low, high, words = _RANGES[option.value]
         wanted = "" if low < _number(value) < high else f"a number {words}"
@@ -297,6 +320,10 @@ def _number(value: str) -> float:
         return math.nan
 
 
+def _method(number: str) -> str:
+    return "q" if number == "4" else "m"
+
+
 _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--seed": ("seed", int),
     "--runs": ("runs", int),
@@ -305,8 +332,17 @@ _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--epsilon": ("epsilon", float),
     "--delta": ("delta", float),
     "--discretization": ("discretisation", float),
+    "--learning-method": ("learning_method", _method),
+    "--good-runs": ("good_runs", int),
+    "--eval-runs": ("eval_runs", int),
+    "--max-iterations": ("max_iterations", int),
+    "--reset-no-better": ("reset_no_better", int),
+    "--max-reset-learning": ("max_reset_learning", int),
+    "--discount": ("discount", float),
+    "--qlearning-alpha": ("qlearning_alpha", float),
 }
-"""For each option of random runs, the field of `ntagen.checker.Options`, and its type."""
+"""For each option of random runs and of learning, the field of `ntagen.checker.Options`, and its
+type."""
 
 
 def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:
@@ -322,9 +358,15 @@ def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[st
         field, read = _FIELDS[name]
         with contextlib.suppress(InputError):
             _require(_BY_LONG[name], options[name].strip())
-            if field not in given and (number := read(options[name])) >= 0:
-                usable[field] = number
+            value = read(options[name].strip())
+            if field not in given and (isinstance(value, str) or value >= 0):
+                usable[field] = value
     return usable
+
+
+def idle_in_learning(given: Collection[str]) -> list[str]:
+    """Those of these options, by their long names, that learning does not have."""
+    return [f"--{name}" for name in IDLE_IN_LEARNING if f"--{name}" in given]
 
 
 def statistical(given: Mapping[str, str]) -> dict[str, Any]:

@@ -7,13 +7,14 @@ formula is satisfied: scripts rely on both.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from ntagen.errors import LimitError
 from ntagen.verifyta.options import OPTIONS, CommandLine, Option
 
 if TYPE_CHECKING:
-    from ntagen.checker import Answer, Trajectory
+    from ntagen.checker import Answer, Optimised, Trajectory
 
 COMPATIBLE_VERSION: Final = "5.0.0"
 """The version of UPPAAL whose output this is; scripts choose names of files by it."""
@@ -107,7 +108,12 @@ def verdict(answer: Answer) -> str:
 
 
 def estimate(answer: Answer) -> list[str]:
-    """What a statistical query found out, in the form of UPPAAL 5; empty for other queries."""
+    """What a statistical query found out, in the form of UPPAAL 5; empty for other queries.
+
+    Of a query for the best strategy, UPPAAL says how it was learned, and not what it is worth.
+    """
+    if (optimised := answer.optimised) is not None:
+        return _learned(optimised)
     shown = answer.trajectories
     if shown:
         return [
@@ -133,6 +139,22 @@ def estimate(answer: Answer) -> list[str]:
         runs = f"({one.satisfied_runs}/{one.runs} runs)"
         lines.append(f"{runs} Pr({asked}) in [{one.lower:g},{one.upper:g}] ({share})")
     return lines
+
+
+def _learned(found: Optimised) -> list[str]:
+    return [
+        f" -- Result: ({found.runs} runs)",
+        "Learning statistics for best strategy: ",
+        f"\tNumber of resets: {found.resets}",
+        f"\tNumber of iterations in last reset: {found.iterations_in_last_reset}",
+        f"\tNumber of iterations in total: {found.iterations}",
+        "",
+    ]
+
+
+def without_effect(options: Sequence[str]) -> str:
+    """The line about options of learning that are accepted and have no effect."""
+    return f"Without effect on learning in ntagen: {', '.join(options)}"
 
 
 def _trajectory(number: int, trajectory: Trajectory, text: str) -> str:

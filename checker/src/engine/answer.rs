@@ -8,7 +8,7 @@ use crate::game::partial_observation::Machine;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::plan_list::PlanList;
 use crate::ir::{Observation, SiteId};
-use crate::learning::{Comparison, Mean};
+use crate::learning::{Comparison, LearnedStrategy, Mean};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
@@ -42,6 +42,8 @@ pub struct Evidence {
     pub certificate: Option<Certificate>,
     /// The strategy of the player who wins, if it was wanted.
     pub strategy: Option<Arc<Strategy>>,
+    /// The strategy that was learned, or loaded as such a one.
+    pub learned: Option<Arc<LearnedStrategy>>,
     /// The strategy of the controller in a game with observations, if it wins and it was wanted.
     pub machine: Option<Arc<Machine>>,
     /// How the check of the strategy ended, if it was wanted.

@@ -41,6 +41,7 @@ impl LoadedModel {
                 return result;
             }
             self.stochastic = None;
+            self.renew_learned()?;
         }
     }
 
@@ -120,7 +121,10 @@ impl LoadedModel {
         let mut answer = match &query.kind {
             QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
             QueryKind::Optimum(asked) => self.answer_optimum(prepared, asked)?,
-            _ => self.answer_symbolically(prepared)?,
+            QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
+                self.answer_by_file(prepared)?
+            }
+            _ => self.answer_symbolically(prepared),
         };
         if let Some(name) = &query.under {
             self.note_freedom(name, &mut answer);
@@ -128,29 +132,38 @@ impl LoadedModel {
         Ok(answer)
     }
 
-    /// Answers a query that is no statistical one; keeps the strategy that it defines.
-    fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+    /// Answers a query about symbolic states; keeps the strategy that it defines.
+    fn answer_symbolically(&mut self, prepared: &PreparedQuery) -> Answer {
         let PreparedQuery { query, options, .. } = prepared;
         self.executor().wraps().clear();
+        let mut answer = if let Some(failure) = self.constant_failure() {
+            Answer::failed(failure)
+        } else {
+            let answer = self.answer_in_zones(prepared, None);
+            if let Some(name) = &query.strategy {
+                self.keep_answer(name, prepared, &answer);
+            }
+            answer
+        };
+        answer.wrapped = self.first_wrap();
+        self.complete_failure(query, options, &mut answer);
+        answer
+    }
+
+    /// Answers a query that saves or loads a strategy: no code of the model is run.
+    fn answer_by_file(&mut self, prepared: &PreparedQuery) -> Result<Answer, Rejection> {
+        let PreparedQuery { query, options, .. } = prepared;
         let mut answer = match (&query.kind, self.constant_failure()) {
             (_, Some(failure)) => Answer::failed(failure),
             (QueryKind::SaveStrategy { file, strategy }, None) => {
                 self.save_strategy(file, strategy, query.span, options)?
             }
-            (QueryKind::LoadStrategy { file, .. }, None) => {
-                let name = query.strategy.as_deref().unwrap_or_default();
-                self.load_strategy(file, name, query.span, options)?
+            (QueryKind::LoadStrategy { file, features }, None) => {
+                self.load_strategy(query, file, features.as_ref(), options)?
             }
-            _ => {
-                let answer = self.answer_in_zones(prepared, None);
-                if let Some(name) = &query.strategy {
-                    self.keep_answer(name, prepared, &answer);
-                }
-                answer
-            }
+            _ => unreachable!("it saves or loads a strategy"),
         };
-        answer.wrapped = self.first_wrap();
-        self.complete_failure(query, options, &mut answer);
+        answer.wrapped = self.network().wrapped_constant;
         Ok(answer)
     }
 

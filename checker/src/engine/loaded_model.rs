@@ -329,7 +329,7 @@ impl LoadedModel {
     }
 
     /// Analyses the text again, when the first statistical query comes.
-    fn expect_stochastic(&mut self) -> Result<(), Rejection> {
+    pub(super) fn expect_stochastic(&mut self) -> Result<(), Rejection> {
         if self.stochastic.is_some() {
             return Ok(());
         }

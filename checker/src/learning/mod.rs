@@ -20,5 +20,7 @@ pub use judging::{Comparison, compared, judge};
 pub use learner::{Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};
 pub use partition::Partition;
-pub use strategy::{Appraisal, Branch, Followed, LearnedStrategy, Regressor, values, worth};
+pub use strategy::{
+    Appraisal, Branch, Followed, LearnedStrategy, Regressor, order, values, words, worth,
+};
 pub use whole_state::whole_state;

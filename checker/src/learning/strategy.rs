@@ -4,13 +4,14 @@
 //! The controller takes the best of the actions that are possible; of several best ones the first.
 //! Where it has never seen the exact values, or none of the actions, it chooses at random.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
 use super::observation::Sight;
 use super::partition::{Node, Partition, WAIT, beyond};
-use crate::exec::arithmetic::double_of_words;
+use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::ir::{Observation, Part, Seen};
 use crate::stochastic::{
     Chooser, Chosen, ControllerMove, Failure, Guidance, Moment, RunId, StateView,
@@ -83,17 +84,7 @@ impl LearnedStrategy {
             (!regressor.appraisals.is_empty()).then_some(regressor)
         });
         let mut regressors: Vec<Regressor> = numbers.collect();
-        regressors.sort_by(|one, other| {
-            let (one, other) = (
-                values(observation, &one.key),
-                values(observation, &other.key),
-            );
-            one.iter()
-                .zip(&other)
-                .map(|(one, other)| one.total_cmp(other))
-                .find(|order| order.is_ne())
-                .unwrap_or(std::cmp::Ordering::Equal)
-        });
+        regressors.sort_by(|one, other| order(observation, &one.key, &other.key));
         LearnedStrategy {
             is_greatest,
             observation: Arc::clone(observation),
@@ -110,20 +101,71 @@ impl LearnedStrategy {
             .filter(|node| matches!(node, Branch::Worth(_)))
             .count()
     }
+
+    /// The best of the actions that are `enabled`, each by its place, the last one to wait: of
+    /// several best ones the first. There is none where it has never seen the exact values, or has
+    /// tried none of these actions.
+    pub fn decide(
+        &self,
+        discrete: &[f64],
+        continuous: &[f64],
+        enabled: impl Fn(u32) -> bool,
+    ) -> Option<u32> {
+        let key = words(&self.observation, discrete)?;
+        let found = self
+            .regressors
+            .binary_search_by(|one| order(&self.observation, &one.key, &key));
+        let known = &self.regressors[found.ok()?].appraisals;
+        let options = known.iter().filter(|one| enabled(one.action));
+        let options = options.map(|one| Choice {
+            place: one.action as usize,
+            tree: &one.tree,
+        });
+        let options: Vec<Choice<'_>> = options.collect();
+        best(&options, continuous, self.is_greatest).map(|place| place as u32)
+    }
+}
+
+/// How exact values are ordered: by the first number that differs.
+pub fn order(observation: &Observation, one: &[i32], other: &[i32]) -> Ordering {
+    let pairs = numbers(observation, one).zip(numbers(observation, other));
+    let mut orders = pairs.map(|(one, other)| one.total_cmp(&other));
+    let unlike = orders.find(|order| order.is_ne());
+    unlike.unwrap_or(Ordering::Equal)
+}
+
+/// The words that exact values are; `None` if some feature cannot have its value.
+pub fn words(observation: &Observation, values: &[f64]) -> Option<Vec<i32>> {
+    let mut words = Vec::with_capacity(observation.words());
+    for (feature, &value) in observation.discrete.iter().zip(values) {
+        match feature.seen {
+            Seen::Location(_) | Seen::Integer(_) => {
+                let word = value as i32;
+                if f64::from(word).total_cmp(&(value + 0.0)).is_ne() {
+                    return None;
+                }
+                words.push(word);
+            }
+            // Both zeros are the same.
+            _ => words.extend(double_words(value + 0.0)),
+        }
+    }
+    Some(words)
 }
 
 /// The numbers that exact values are.
 pub fn values(observation: &Observation, key: &[i32]) -> Vec<f64> {
+    numbers(observation, key).collect()
+}
+
+fn numbers<'o>(observation: &'o Observation, key: &'o [i32]) -> impl Iterator<Item = f64> + 'o {
     let mut words = key.iter();
-    let mut word = || words.next().copied().unwrap_or(0);
-    let values = observation
-        .discrete
-        .iter()
-        .map(|feature| match feature.seen {
-            Seen::Location(_) | Seen::Integer(_) => f64::from(word()),
-            Seen::Double(_) | Seen::Clock(_) | Seen::Computed(_) => double_of_words(word(), word()),
-        });
-    values.collect()
+    let mut word = move || words.next().copied().unwrap_or(0);
+    let features = observation.discrete.iter();
+    features.map(move |feature| match feature.seen {
+        Seen::Location(_) | Seen::Integer(_) => f64::from(word()),
+        Seen::Double(_) | Seen::Clock(_) | Seen::Computed(_) => double_of_words(word(), word()),
+    })
 }
 
 /// A part of the partition, in which neighbours are one where they rank the actions alike.

@@ -8,6 +8,7 @@ use pyo3::types::PyBytes;
 
 use super::convert::{
     RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal, until_signal_apart,
+    unwritten,
 };
 use super::long_text::LongText;
 use super::model::{BoundRow, Model, bound_rows};
@@ -245,6 +246,12 @@ impl Answer {
         Some(json::estimate(estimate).to_string())
     }
 
+    /// How the best strategy was found, as JSON; `None` for other queries.
+    fn optimised_json(&self) -> Option<String> {
+        let optimised = self.inner.optimised.as_ref()?;
+        Some(json::optimised(optimised).to_string())
+    }
+
     /// "states", "memory" or "time" if a limit stopped the search, "interrupted" if the user ended
     /// random runs.
     #[getter]
@@ -439,6 +446,13 @@ impl Answer {
 
     /// The strategy, or the machine of a game with observations, as JSON; `None` without any.
     fn strategy_json(slf: &Bound<'_, Self>) -> PyResult<Option<LongText>> {
+        if let Some(learned) = slf.get().inner.evidence.learned.clone() {
+            let held = slf.get().model.clone_ref(slf.py());
+            let text = until_signal_apart(slf.py(), move || {
+                held.get().with(|model| model.learned_text(&learned))
+            })?;
+            return Ok(Some(LongText::new(text.map_err(unwritten)?)));
+        }
         written(slf, |answer, network| {
             let (evidence, query) = (&answer.inner.evidence, &answer.query);
             let text = if let Some(machine) = &evidence.machine {

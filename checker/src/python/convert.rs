@@ -98,6 +98,14 @@ pub(super) fn rejected(rejection: Rejection) -> PyErr {
     RejectedError::new_err((rejection.rendered,))
 }
 
+/// Why a learned strategy has no file, as a refusal.
+#[expect(clippy::needless_pass_by_value, reason = "errors are mapped by it")]
+pub(super) fn unwritten(why: String) -> PyErr {
+    RejectedError::new_err((vec![format!(
+        "error: the strategy cannot be written: {why}"
+    )],))
+}
+
 /// How often the counters are shown to Python.
 const SHOW_EVERY: Duration = Duration::from_millis(50);
 

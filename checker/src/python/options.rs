@@ -15,6 +15,7 @@ use super::convert::{
 use crate::engine::limits::Observer;
 use crate::engine::options::RunObserver;
 use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, TraceWanted};
+use crate::learning::{Learning, Method};
 use crate::search::limits::StopReason;
 use crate::search::reachability::report::Order;
 use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
@@ -85,6 +86,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
         run_observer: run_observer(field(given, "run_progress")?, raised.clone()),
         run_source: run_source(field(given, "run_source")?, &raised),
         rare: rare_event(given)?,
+        learning: learning(given)?,
         ..Options::default()
     };
     Ok((options, raised))
@@ -155,6 +157,29 @@ fn precision(given: &Bound<'_, PyAny>) -> PyResult<Precision> {
         runs: field(given, "runs")?,
         seed: field(given, "seed")?,
         ..Precision::default()
+    })
+}
+
+/// How strategies are learned; what is not given is left to the engine.
+fn learning(given: &Bound<'_, PyAny>) -> PyResult<Learning> {
+    let usual = Learning::default();
+    let methods = [("auto", usual.method), ("q", Method::Q), ("m", Method::M)];
+    let method = field::<String>(given, "learning_method")?;
+    let discount: Option<f64> = field(given, "discount")?;
+    let alpha: Option<f64> = field(given, "qlearning_alpha")?;
+    let number = |name: &str, usual: u64| -> PyResult<u64> {
+        Ok(field::<Option<u64>>(given, name)?.unwrap_or(usual))
+    };
+    Ok(Learning {
+        method: choice("method of learning", &method, &methods)?,
+        learning_runs: field(given, "good_runs")?,
+        judging_runs: field(given, "eval_runs")?,
+        iterations: number("max_iterations", usual.iterations)?,
+        patience: number("reset_no_better", usual.patience)?,
+        resets: number("max_reset_learning", usual.resets)?,
+        discount: discount.unwrap_or(usual.discount),
+        alpha: alpha.unwrap_or(usual.alpha),
+        ..usual
     })
 }
 

@@ -16,10 +16,14 @@ mod dead_ends;
 mod families;
 mod game_threads;
 mod guides;
+mod learned_files;
 mod machines;
 mod nodes;
 #[path = "../common/plates.rs"]
 mod plates;
+#[path = "../common/random.rs"]
+#[allow(dead_code, reason = "this program draws in some of the ways only")]
+mod random;
 #[path = "../common/solved.rs"]
 mod solved;
 mod strategy_files;

@@ -11,12 +11,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.cli.models.answer_rows import Format, Human
 from ntagen.cli.models.outcomes import Mistake, Outcome, fault_of, mistakes_in, summary
 from ntagen.cli.terminal import echo, safe
 from ntagen.version import VERSION
+
+if TYPE_CHECKING:
+    from ntagen.checker import Estimate
 
 
 class JsonLines(Format):
@@ -73,6 +76,15 @@ def _record(outcome: Outcome) -> dict[str, object]:
         record |= asdict(answer.estimate)
         if answer.estimate.compared is None:
             del record["compared"]
+    if answer is not None and (found := answer.optimised) is not None:
+        record |= {
+            "iterations": found.iterations,
+            "resets": found.resets,
+            "learning_runs": found.runs,
+            "leaves": found.leaves,
+            "uniform": found.uniform and _interval(found.uniform),
+            "better": found.comparison and found.comparison == "better",
+        }
     if answer is not None and answer.distribution is not None:
         record["distribution"] = answer.distribution.to_json()
     if answer is None:
@@ -81,6 +93,10 @@ def _record(outcome: Outcome) -> dict[str, object]:
     if outcome.is_compared:
         record |= {"expected": outcome.is_as_expected, "expectation": outcome.expected}
     return record
+
+
+def _interval(estimate: Estimate) -> dict[str, float | None]:
+    return {name: getattr(estimate, name) for name in ("value", "lower", "upper", "confidence")}
 
 
 class GitHub(Format):

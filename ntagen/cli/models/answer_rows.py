@@ -124,10 +124,23 @@ def _estimated(answer: Answer, estimate: Estimate) -> list[str]:
         runs += f", and {_runs(estimate.compared)}"
     stopped = [f"stopped by the {answer.limit_text}"] if answer.stop else []
     lines.append(", ".join([*stopped, runs, f"{1000 * answer.seconds:.1f} ms"]))
+    if (optimised := answer.optimised) is not None:
+        lines.append(_learned(answer, optimised.leaves))
     values = answer.distribution
     if values is not None and (shown := _distribution_line(values)) is not None:
         lines.append(shown)
     return [*lines, answer.message] if answer.message else lines
+
+
+def _learned(answer: Answer, leaves: int) -> str:
+    """What a learned strategy sees, and how large it is."""
+    from ntagen.checker import LearnedStrategy
+
+    count = "1 leaf" if leaves == 1 else f"{leaves:,} leaves"
+    if not isinstance(strategy := answer.strategy, LearnedStrategy):
+        return f"strategy: {count}"
+    discrete, continuous = (", ".join(one) for one in (strategy.discrete, strategy.continuous))
+    return f"strategy: {count}; it sees {{{discrete}}} -> {{{continuous}}}"
 
 
 def _made(answer: Answer) -> list[str]:

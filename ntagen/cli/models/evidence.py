@@ -170,7 +170,12 @@ def _trace_file(answer: Answer, query: Asked, suffix: str, as_json: str, model: 
 
 def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str] | None:
     """The strategy in the form that `target` asks for, and no other: large ones take seconds."""
+    from ntagen.checker import LearnedStrategy
+
     suffix = Path(target).suffix
+    if isinstance(learned := answer.strategy, LearnedStrategy):
+        defines = None if query.form is None else query.form.defines
+        return [learned.file_text(suffix, defines or "strategy")]
     if suffix == ".c":
         controller = answer.controller_c()
         return None if controller is None else [controller]
@@ -191,6 +196,6 @@ def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[
         return []
     write_files({Path(target): pieces})
     what = "strategy" if answer.verdict == "satisfied" else "counter-strategy"
-    if Path(target).suffix == ".c":
+    if Path(target).suffix in (".c", ".py"):
         what = "controller"
     return [f"{what} written to {target}"]

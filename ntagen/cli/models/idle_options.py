@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from ntagen.cli.models.options import OPTIONS, SETTINGS, STATISTICAL
+from ntagen.cli.models.options import LEARNING, OPTIONS, SETTINGS, STATISTICAL
 
 if TYPE_CHECKING:
     from ntagen.checker import QueryForm
@@ -15,7 +15,8 @@ _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
     "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
     "certificate",
-    "--strategy": "no answer has a strategy; only control queries can have one",
+    "--strategy": "no answer has a strategy; only control queries, and minE, maxE, minPr and "
+    "maxPr, can have one",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }
@@ -89,7 +90,15 @@ def _find_idle_statistics(
     queries: Sequence[QueryForm],
 ) -> None:
     """Tells the options of statistical queries that no query takes."""
-    has_runs = any(query.is_statistical for query in queries)
+    is_learned = any(query.is_learned for query in queries)
+    for name in LEARNING:
+        idle(name, not is_learned, "here: no query is for the best strategy")
+    idle(
+        "qlearning_alpha",
+        is_learned and values["learning_method"] != "q",
+        "without --learning-method q",
+    )
+    has_runs = is_learned or any(query.is_statistical for query in queries)
     for name in ("effort", "repetitions"):
         idle(name, has_runs and "levels" not in given, "without --set 'levels …'")
     for name in STATISTICAL:
@@ -104,7 +113,7 @@ def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
     """Whether more than one thread can share the work of a query."""
     if query.is_game:
         return not query.is_observed
-    if query.is_statistical:
+    if query.is_statistical or query.is_learned:
         return True
     return values["search"] == "bfs" and query.kind not in ("E[]", "A<>", "-->")
 

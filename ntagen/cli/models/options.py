@@ -54,6 +54,18 @@ def _reductions(value: object) -> str:
     return ",".join(names)
 
 
+LEARNING_METHODS: Final = {"q": "q", "4": "q", "m": "m", "5": "m", "auto": "auto"}
+"""The methods of learning by their names and by UPPAAL's numbers."""
+
+
+def _learning_method(value: object) -> str:
+    """A method of learning, by its name or UPPAAL's number."""
+    method = LEARNING_METHODS.get(str(value).strip().lower())
+    if method is None:
+        raise click.BadParameter(f"{value!r} is not a method of learning; write q (4) or m (5)")
+    return method
+
+
 _SHARE: Final = number(0, 1)
 
 RUNS: Final = (
@@ -175,6 +187,57 @@ STATISTICAL_SETTINGS: Final = (
     ),
 )
 
+LEARNING_SETTINGS: Final = (
+    Setting(
+        "good-runs N",
+        click.IntRange(min=1),
+        "For minE and its kin: an iteration learns from N random runs.  "
+        "[default: as the length of runs needs]",
+        "good_runs",
+    ),
+    Setting(
+        "eval-runs N",
+        click.IntRange(min=1),
+        "For minE and its kin: N random runs judge the strategy of an iteration.  "
+        "[default: as the length of runs needs]",
+        "eval_runs",
+    ),
+    Setting(
+        "max-iterations N",
+        click.IntRange(min=1),
+        "For minE and its kin: the most iterations, in total.  [default: 30]",
+        "max_iterations",
+    ),
+    Setting(
+        "reset-no-better N",
+        click.IntRange(min=1),
+        "For minE and its kin: after N iterations without a better strategy, learning ends or "
+        "begins anew.  [default: 5]",
+        "reset_no_better",
+    ),
+    Setting(
+        "max-reset-learning N",
+        click.IntRange(min=0),
+        "For minE and its kin: how often learning begins anew.  [default: 0]",
+        "max_reset_learning",
+    ),
+    Setting(
+        "discount PART",
+        click.FloatRange(0, 1, min_open=True),
+        "For minE and its kin: what a cost counts a decision earlier.  [default: 1]",
+    ),
+    Setting(
+        "qlearning-alpha N",
+        click.FloatRange(1, 1e18),
+        "For --learning-method q: the n-th sample counts for 1 / min(N, n + 1).  [default: 1000]",
+        "qlearning_alpha",
+    ),
+)
+"""What ``--set`` takes for queries for the best strategy; the names are those of UPPAAL."""
+
+LEARNING: Final = ("learning_method", *(one.field for one in LEARNING_SETTINGS))
+"""The names of options and settings that count for queries for the best strategy only."""
+
 STATISTICAL: Final = (
     *(one.field for one in STATISTICAL_SETTINGS),
     *("runs", "alpha", "epsilon", "discretisation"),
@@ -183,6 +246,7 @@ STATISTICAL: Final = (
 
 SETTINGS: Final = (
     *STATISTICAL_SETTINGS,
+    *LEARNING_SETTINGS,
     Setting(
         "under choice race|eager|lazy",
         click.Choice(["race", "eager", "lazy"]),
@@ -249,6 +313,14 @@ OPTIONS: Final[dict[str, Decorator]] = {
     ),
     **{one.field: one.option() for one in RUNS},
     "discretisation": _DISCRETISATION.option(),
+    "learning_method": click.option(
+        "--learning-method",
+        metavar="q|m",
+        type=_learning_method,
+        default="auto",
+        help="How minE, maxE, minPr and maxPr learn what actions are worth: by Q-learning (q, or 4 "
+        "as in UPPAAL), or from the finite process that all samples make (m, or 5).  [default: m]",
+    ),
     "reductions": click.option(
         "--reductions",
         metavar="all|none|LIST",

@@ -93,7 +93,8 @@ def _checked(line: CommandLine, path: Path) -> int:
     """Answers all queries, or prints the compiled form; returns the exit code."""
     from ntagen.checker import Interrupted, RejectedError
     from ntagen.loading import load_file
-    from ntagen.verifyta.output import header
+    from ntagen.verifyta.options import idle_in_learning
+    from ntagen.verifyta.output import header, without_effect
     from ntagen.verifyta.places import places_of_queries
 
     allowed = (
@@ -113,6 +114,9 @@ def _checked(line: CommandLine, path: Path) -> int:
     places = places_of_queries(texts, query_path or path, in_model=query_path is None)
     if not line.has("-q"):
         echo(header(line))
+        in_model = (name for query in queries for name in query.options)
+        if idle := idle_in_learning({*line.given, *in_model}):
+            echo(without_effect(idle))
     code = 0
     for number, (query, place) in enumerate(zip(queries, places, strict=True), start=1):
         _progress(line, "\n")

@@ -734,7 +734,7 @@ def test_games_without_plans_say_so(
 def test_queries_beside_a_rejected_one_are_answered(
     gate: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ("--query", "E<> Gate.Open", "--query", "maxPr [<=9] : <> Gate.Open")
+    asked = ("--query", "E<> Gate.Open", "--query", "acontrol: A[] true { x[0,9]:9 }")
     asked += ("--query", "A[] Gate.Closed")
     out, err = check_run(capsys, 2, gate, *asked, "--json")
     verdicts = [json.loads(line)["verdict"] for line in out.splitlines()]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ntagen.errors import InputError
-from ntagen.verifyta.options import OPTIONS, parse, statistical
+from ntagen.verifyta.options import OPTIONS, idle_in_learning, of_model, parse, statistical
 from ntagen.verifyta.output import help_text
 
 
@@ -52,7 +52,7 @@ def test_words_that_clients_pass_are_accepted() -> None:
         (["-O", "json"], "-O is 'json', but must be std"),
         (["--seed", "soon"], "--seed is 'soon', but must be an integer"),
         (["--summary=2"], "--summary has no value, but '2' is given"),
-        (["--di", "0"], "the option --di is ambiguous: --diagnostic, --discretization"),
+        (["--di", "0"], "the option --di is ambiguous: --diagnostic, --discretization, --discount"),
         (["-f", ""], "-f needs a value: -f PREFIX"),
     ],
 )
@@ -64,7 +64,7 @@ def test_a_wrong_option_is_named(words: list[str], message: str) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    [["--good-runs", "50"], ["-A"], ["-Z"], ["-sZ"]],
+    [["-A"], ["-Z"], ["-sZ"]],
 )
 def test_what_would_change_a_verdict_is_not_supported(words: list[str]) -> None:
     with pytest.raises(InputError, match="is not supported: "):
@@ -104,3 +104,63 @@ def test_parameters_of_random_runs_become_options_of_queries() -> None:
     for words in (["--runs", "0"], ["-D", "-1"], ["--u1", "0.5"], ["--u0", "2"]):
         with pytest.raises(InputError, match="must be a"):
             parse(words)
+
+
+LEARNING = {
+    "--learning-method": "4",
+    "--good-runs": "500",
+    "--eval-runs": "1",
+    "--max-iterations": "30",
+    "--reset-no-better": "15",
+    "--max-reset-learning": "0",
+    "--discount": "1",
+    "--qlearning-alpha": "1.2e8",
+}
+
+FIELDS = {
+    "learning_method": "q",
+    "good_runs": 500,
+    "eval_runs": 1,
+    "max_iterations": 30,
+    "reset_no_better": 15,
+    "max_reset_learning": 0,
+    "discount": 1.0,
+    "qlearning_alpha": 1.2e8,
+}
+
+
+def test_options_of_learning_become_options_of_queries() -> None:
+    words = [word for pair in LEARNING.items() for word in pair]
+    assert statistical(parse(words).given) == FIELDS
+    assert of_model(LEARNING) == FIELDS
+    assert of_model(LEARNING, ["good_runs", "discount"]).keys() == FIELDS.keys() - {
+        "good_runs",
+        "discount",
+    }
+    for number, method in {"-1": "m", "3": "m", "4": "q", "5": "m"}.items():
+        assert statistical({"--learning-method": number}) == {"learning_method": method}
+    assert of_model({"--discount": "0", "--good-runs": "0", "--eval-runs": "few"}) == {}
+    assert statistical({}) == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--good-runs", "0"], "--good-runs is '0', but must be a positive integer"),
+        (["--max-reset-learning", "-1"], "must be an integer that is at least 0"),
+        (["--discount", "1.5"], "--discount is '1.5', but must be a number greater than 0 and"),
+        (["--qlearning-alpha", "0.5"], "but must be a number at least 1"),
+        (["--learning-method", "7"], "--learning-method is '7', but must be 4, 5, -1 or 3"),
+    ],
+)
+def test_wrong_options_of_learning_are_named(words: list[str], message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse(words)
+    assert message in str(caught.value)
+
+
+def test_options_that_learning_does_not_have_are_accepted_and_known() -> None:
+    words = ["--total-runs", "50", "--filter", "0", "--split-ks=0.25", "--good-runs", "9"]
+    given = parse(words).given
+    assert idle_in_learning(given) == ["--total-runs", "--filter", "--split-ks"]
+    assert statistical(given) == {"good_runs": 9}

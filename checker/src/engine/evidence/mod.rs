@@ -4,6 +4,7 @@ pub mod certificate;
 pub mod checked;
 pub(super) mod error_trace;
 pub mod evidence_file;
+mod learned_files;
 pub mod named_strategies;
 mod permitted;
 pub(super) mod shown_states;

@@ -10,20 +10,35 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::diagnostics::{Diagnostic, Span};
+use serde_json::Value as Json;
+
+use crate::diagnostics::Span;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::freedom::Freedom;
 
 use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
-use crate::engine::format::strategy_json;
+use crate::engine::format::json_reader::Mismatch;
+use crate::engine::format::{learned_json, strategy_json};
 use crate::engine::limits::{LimitWatch, ended_text, stop_text};
 use crate::engine::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::Options;
+use crate::engine::query_form::unnamed;
 use crate::engine::rejection::Rejection;
+use crate::ir::{FeatureTexts, Query};
+use crate::learning::LearnedStrategy;
 use crate::search::limits::Counters;
 use crate::semantics::Reading;
+
+/// What the file of a strategy has.
+enum Loaded {
+    Learned(Arc<LearnedStrategy>),
+    InZones {
+        query: String,
+        strategy: Arc<Strategy>,
+    },
+}
 
 impl LoadedModel {
     /// The strategy with this name, as it is saved: one move a state. If it is not made yet, it is
@@ -104,11 +119,26 @@ impl LoadedModel {
         span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let strategy = self.existing_strategy(name, span, options)?;
+        let learned = self.strategy(name).and_then(|one| one.learned.clone());
+        let known = match learned {
+            Some(_) => None,
+            None => Some(self.existing_strategy(name, span, options)?),
+        };
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let mut watch = LimitWatch::new(options.limits.clone());
-        let text = match watch.bound(|_| strategy_json::text(self.network(), &strategy, query)) {
-            Ok(text) => text,
+        let written = watch.bound(|_| match (&known, &learned) {
+            (Some(strategy), _) => Ok(strategy_json::text(self.network(), strategy, query)),
+            (None, Some(learned)) => self.learned_text(learned),
+            (None, None) => unreachable!("there is a strategy, or an error"),
+        });
+        let path = self.strategy_path(file, options);
+        let text = match written {
+            Ok(Ok(text)) => text,
+            Ok(Err(why)) => {
+                let message = format!("{} cannot be written: {why}", path.display());
+                let help = "learn it with fewer cells";
+                return Err(self.refusal(codes::STRATEGY_FILE, span, message, help));
+            }
             Err((reason, counters)) => {
                 let mut answer = Answer::new(Verdict::Unknown(reason), counters);
                 answer.remark(format!(
@@ -118,7 +148,6 @@ impl LoadedModel {
                 return Ok(answer);
             }
         };
-        let path = self.strategy_path(file, options);
         strategy_place::save(&path, &(text + "\n"), &options.allow_write).map_err(|refusal| {
             let Refusal { message, help } = refusal;
             self.refusal(codes::STRATEGY_FILE, span, message, help)
@@ -128,40 +157,94 @@ impl LoadedModel {
         Ok(answer)
     }
 
-    /// Answers `strategy S = loadStrategy("file")`.
+    /// Answers `strategy S = loadStrategy {d} -> {c} ("file")`.
     pub(crate) fn load_strategy(
         &mut self,
+        query: &Query,
         file: &str,
-        name: &str,
-        span: Span,
+        features: Option<&FeatureTexts>,
         options: &Options,
     ) -> Result<Answer, Rejection> {
+        let (name, span) = (query.strategy.as_deref().unwrap_or_default(), query.span);
         let path = self.strategy_path(file, options);
+        let from = path.display().to_string();
         let bytes = strategy_place::load(&path).map_err(|refusal| {
             let Refusal { message, help } = refusal;
             self.refusal(codes::STRATEGY_FILE, span, message, help)
         })?;
-        let (query, strategy) =
-            strategy_json::read(self.network(), &bytes).map_err(|mismatch| {
-                let message = format!("{}: {mismatch}", path.display());
-                let mut diagnostic = Diagnostic::new(codes::STRATEGY_FILE, span, message);
-                diagnostic.help = mismatch.help.map(str::to_owned);
-                Rejection::new(vec![diagnostic], &self.sources)
-            })?;
-        let strategy = Arc::new(strategy);
-        let states = strategy.states.len();
-        let known = Some(Arc::clone(&strategy));
-        self.keep_strategy(NamedStrategy::new(name.to_owned(), query, known));
-        let evidence = Evidence {
-            strategy: Some(strategy),
-            ..Evidence::default()
+        let mut watch = LimitWatch::new(options.limits.clone());
+        let cut = |(reason, counters)| {
+            let mut answer = Answer::new(Verdict::Unknown(reason), counters);
+            let ended = ended_text(reason);
+            answer.remark(format!("reading strategy {name} was {ended}"));
+            Ok(answer)
         };
-        let from = path.display();
-        let message = format!("strategy {name} with {states} states read from {from}");
+        let file = match watch.bound(|_| learned_json::parsed(&bytes)) {
+            Ok(file) => file.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?,
+            Err(stopped) => return cut(stopped),
+        };
+        drop(bytes);
+        let is_learned = learned_json::is_one(&file);
+        // What is compiled for the file must not be cut off.
+        let meaning = is_learned.then(|| self.meaning_of(&file, features, span, options));
+        let meaning = match meaning.transpose()?.transpose() {
+            Ok(meaning) => meaning,
+            Err(mismatch) => return Err(self.mismatched(span, &from, &mismatch)),
+        };
+        let read = watch.bound(|_| match &meaning {
+            Some(meaning) => {
+                let learned = self.read_learned(&file, meaning);
+                learned.map(|learned| Loaded::Learned(Arc::new(learned)))
+            }
+            None => self.read_zones(&file, features),
+        });
+        let loaded = match read {
+            Ok(read) => read.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?,
+            Err(stopped) => return cut(stopped),
+        };
+        let mut evidence = Evidence::default();
+        let (what, named) = match loaded {
+            Loaded::Learned(learned) => {
+                evidence.learned = Some(Arc::clone(&learned));
+                let text = unnamed(&query.text).to_owned();
+                let what = format!("{} leaves", learned.leaves());
+                let named = NamedStrategy {
+                    learned: Some(learned),
+                    ..NamedStrategy::new(name.to_owned(), text, None)
+                };
+                (what, named)
+            }
+            Loaded::InZones { query, strategy } => {
+                evidence.strategy = Some(Arc::clone(&strategy));
+                let what = format!("{} states", strategy.states.len());
+                (
+                    what,
+                    NamedStrategy::new(name.to_owned(), query, Some(strategy)),
+                )
+            }
+        };
+        self.keep_strategy(named);
+        let message = format!("strategy {name} with {what} read from {from}");
         Ok(Answer {
             message: Some(message),
             evidence,
             ..Answer::new(Verdict::Satisfied, Counters::default())
+        })
+    }
+
+    /// Reads the file of a strategy in zones, for which a query names no features.
+    fn read_zones(&self, file: &Json, features: Option<&FeatureTexts>) -> Result<Loaded, Mismatch> {
+        let (query, strategy) = strategy_json::read_parsed(self.network(), file)?;
+        if features.is_some() {
+            return Err(Mismatch {
+                place: String::new(),
+                message: String::from("this strategy was not learned, and sees the whole state"),
+                help: Some("write loadStrategy(\"…\") without features"),
+            });
+        }
+        Ok(Loaded::InZones {
+            query,
+            strategy: Arc::new(strategy),
         })
     }
 

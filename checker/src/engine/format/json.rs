@@ -8,6 +8,7 @@ use serde_json::{Map, Value as Json, json};
 use crate::cancellation;
 use crate::game::strategy::plan_list::PlanStep;
 use crate::ir::Network;
+use crate::learning::Comparison;
 use crate::network::Part;
 use crate::search::liveness::ending::RunEnding;
 use crate::search::optimum::extremum::{Extreme, Extremes};
@@ -17,7 +18,7 @@ use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
 
 use super::text::{self, Value};
-use crate::engine::answer::Values;
+use crate::engine::answer::{Optimised, Values};
 use crate::engine::evidence::witness::{Proof, Witness, WitnessKind};
 
 /// An edge.
@@ -162,6 +163,32 @@ pub fn estimate(estimate: &Estimate) -> Json {
         "runs": estimate.runs,
         "satisfied_runs": estimate.satisfied_runs,
         "compared": compared,
+    })
+}
+
+/// How the best strategy was found. `judged` is its value by the runs that chose it, `uniform` what
+/// runs are worth in which all is chosen uniformly, and `comparison` says whether it is better.
+pub fn optimised(optimised: &Optimised) -> Json {
+    let uniform = optimised.uniform.as_ref().map(|uniform| {
+        let mut object = estimate(uniform);
+        object["value"] = real(uniform.value);
+        object
+    });
+    let comparison = optimised.comparison.map(|comparison| match comparison {
+        Comparison::Better => "better",
+        Comparison::Worse => "worse",
+        Comparison::Alike => "alike",
+    });
+    json!({
+        "runs": optimised.runs,
+        "iterations": optimised.iterations,
+        "iterations_in_last_reset": optimised.iterations_in_last_reset,
+        "resets": optimised.resets,
+        "judged": real(optimised.judged.value),
+        "uniform": uniform,
+        "comparison": comparison,
+        "is_complete": optimised.is_complete,
+        "leaves": optimised.leaves,
     })
 }
 

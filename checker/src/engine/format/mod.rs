@@ -1,4 +1,4 @@
-//! Text, JSON and C: how answers, models and strategies are written and read.
+//! Text, JSON, C and Python: how answers, models and strategies are written and read.
 
 pub mod decision_table;
 pub mod decisions;
@@ -6,6 +6,9 @@ pub mod distribution_json;
 pub mod explain;
 pub mod json;
 pub mod json_reader;
+pub mod learned_actions;
+pub mod learned_code;
+pub mod learned_json;
 pub mod machine_c;
 pub mod machine_json;
 pub mod model_json;

@@ -446,6 +446,11 @@ pub(super) fn texts(text: &mut String, actions: impl Iterator<Item = String>) {
 
 /// A table of the smallest type that holds its values.
 pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = i64>) {
+    table(text, &format!("controller_{name}"), values);
+}
+
+/// The same under another name.
+pub(super) fn table(text: &mut String, name: &str, values: impl Iterator<Item = i64>) {
     let values: Vec<i64> = values.collect();
     let low = values.iter().copied().min().unwrap_or(0);
     let high = values.iter().copied().max().unwrap_or(0);
@@ -457,7 +462,7 @@ pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = 
         (-0x8000.., ..=0x7fff) => "int16_t",
         _ => "int32_t",
     };
-    let _ = write!(text, "static const {kind} controller_{name}[] = {{");
+    let _ = write!(text, "static const {kind} {name}[] = {{");
     let values = if values.is_empty() { vec![0] } else { values };
     wrapped(
         text,
@@ -475,7 +480,7 @@ pub(super) fn array(text: &mut String, name: &str, values: impl Iterator<Item = 
 const COLUMNS: usize = 120;
 
 /// Writes entries separated by commas, on several lines if they are many.
-fn wrapped(text: &mut String, entries: impl Iterator<Item = String>) {
+pub(super) fn wrapped(text: &mut String, entries: impl Iterator<Item = String>) {
     let mut line = String::new();
     let mut is_first = true;
     for entry in entries {

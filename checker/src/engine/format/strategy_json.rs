@@ -23,6 +23,7 @@ use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
 use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, WRITE_ONE, integer};
+use super::learned_json;
 use super::text::{self, ValuePlace};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::without_under;
@@ -173,6 +174,11 @@ fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), M
     if format == MACHINE_FORMAT {
         let message = "this is a machine that goes by observations, and no strategy over states";
         return Err(whole.wrong(message, "`ntagen verify MODEL FILE` checks it"));
+    }
+    if learned_json::is_one(file) {
+        let message = "this is a learned strategy, which says what actions are worth";
+        let help = "the query strategy S = loadStrategy(\"…\") reads it";
+        return Err(whole.wrong(message, help));
     }
     if format != FORMAT {
         let message = format!("this is no strategy of ntagen: its \"format\" is not \"{FORMAT}\"");

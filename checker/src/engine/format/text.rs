@@ -177,29 +177,61 @@ pub fn minimal_constraints(network: &Network, zone: &Zone) -> Vec<String> {
 pub fn part_text(network: &Network, part: Part) -> String {
     let edge = network.edge(part);
     let branch = &edge.branches[part.branch as usize];
-    edge_text(network, part, &edge.labels, edge.select.len(), [branch])
+    edge_text(
+        network,
+        part,
+        &edge.labels,
+        &selects(network, part),
+        [branch],
+    )
 }
 
 /// An edge with all the legs of its branch point, as `P.a->(P.b|P.c) { guard, sync, update }`. The
 /// labels are those of the edge to the branch point.
 pub fn entry_text(network: &Network, part: Part) -> String {
-    let process = &network.processes[part.process as usize];
+    let entry = entry(network, part);
+    entry_text_with(network, part, entry.labels, &entry.selects)
+}
+
+/// What the edges of an entry share.
+pub(super) struct EntryParts<'n> {
+    /// The labels of the edge to the branch point, or of the whole edge.
+    pub(super) labels: &'n EdgeLabels,
+    /// The values of its select bindings.
+    pub(super) selects: Vec<(&'n str, i32)>,
+}
+
+/// The entry of an edge.
+pub(super) fn entry(network: &Network, part: Part) -> EntryParts<'_> {
     let edge = network.edge(part);
     let (labels, bindings) = match &edge.leg {
         Some(leg) => (&leg.entry, leg.bindings),
         None => (&edge.labels, edge.select.len()),
     };
-    let edges = process.edges_of_entry(EdgeId(part.edge));
-    let branches = edges.flat_map(|edge| &edge.branches);
-    edge_text(network, part, labels, bindings, branches)
+    let mut selects = selects(network, part);
+    selects.truncate(bindings);
+    EntryParts { labels, selects }
 }
 
-/// An edge with these labels, the values of its first `bindings`, and these ends.
+/// An entry with these labels, and these select values behind them.
+pub(super) fn entry_text_with(
+    network: &Network,
+    part: Part,
+    labels: &EdgeLabels,
+    shown: &[(&str, i32)],
+) -> String {
+    let process = &network.processes[part.process as usize];
+    let edges = process.edges_of_entry(EdgeId(part.edge));
+    let branches = edges.flat_map(|edge| &edge.branches);
+    edge_text(network, part, labels, shown, branches)
+}
+
+/// An edge with these labels, these select values behind them, and these ends.
 fn edge_text<'n>(
     network: &'n Network,
     part: Part,
     labels: &EdgeLabels,
-    bindings: usize,
+    shown: &[(&str, i32)],
     branches: impl IntoIterator<Item = &'n Branch>,
 ) -> String {
     let process = &network.processes[part.process as usize];
@@ -242,7 +274,7 @@ fn edge_text<'n>(
         or(sync, "tau"),
         or(update, "1")
     );
-    for (name, value) in selects(network, part).into_iter().take(bindings) {
+    for (name, value) in shown {
         // Writing to a string cannot fail.
         let _ = write!(text, " [{name}={value}]");
     }

@@ -145,6 +145,7 @@ fn found(
     let uniform = values(behaviour, FRESH)?;
     let mut answer = Answer::new(Verdict::Satisfied, Counters::default());
     answer.estimate.clone_from(&value);
+    answer.evidence.learned = Some(Arc::clone(&strategy));
     let comparison = value.as_ref().zip(uniform.as_ref());
     let comparison = comparison.map(|(value, uniform)| compared(value, uniform, asked.is_greatest));
     answer.remark(remark(
