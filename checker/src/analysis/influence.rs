@@ -1,13 +1,13 @@
 //! Which words of a state make a difference to what may happen from there on, and to how a number
 //! grows.
 //!
-//! A word *makes a difference* if a guard, an invariant, a rate, a weight or a channel depends on it,
-//! or the value of a word that does, or by how much the number grows. A word that is only added to,
-//! and is a term of the number, makes none: whatever it is, the number grows by as much.
+//! A word *makes a difference* if a guard, an invariant, a rate, a weight or a channel depends on
+//! it, or the value of a word that does, or by how much the number grows. A word that is only added
+//! to, and is a term of the number, makes none: whatever it is, the number grows by as much.
 //!
-//! For each function the analysis finds on what the words depend that it writes: in every word a sum
-//! of words with constant factors, and the rest. Order and branches within a function are ignored:
-//! whatever is read where a function branches may decide about all that it writes.
+//! For each function the analysis finds on what the words depend that it writes: in every word a
+//! sum of words with constant factors, and the rest. Order and branches within a function are
+//! ignored: whatever is read where a function branches may decide about all that it writes.
 //!
 //! What it cannot follow makes all words count that the function reads, or all there are.
 
@@ -115,8 +115,8 @@ pub struct Influence {
 }
 
 impl Influence {
-    /// Those of a network in the stochastic reading, if these functions are asked of its states, and
-    /// it matters how much the number grows that another one leaves.
+    /// Those of a network in the stochastic reading, if these functions are asked of its states,
+    /// and it matters how much the number grows that another one leaves.
     pub fn new(
         network: &Network,
         asked: impl IntoIterator<Item = FunctionId>,

@@ -1,7 +1,7 @@
 //! Compiled queries for the best strategy.
 
 use super::ids::{FunctionId, ProcessId};
-use super::statistical::{Path, RunBound};
+use super::runs::{Path, RunBound};
 
 /// `minE`, `maxE`, `minPr` or `maxPr`.
 #[derive(Clone, Debug)]

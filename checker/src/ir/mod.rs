@@ -30,6 +30,7 @@ mod moves;
 mod network;
 mod operands;
 mod queries;
+mod runs;
 mod statistical;
 
 mod accesses;
@@ -46,4 +47,5 @@ pub use moves::*;
 pub use network::*;
 pub(crate) use operands::{Access, Operand};
 pub use queries::*;
+pub use runs::*;
 pub use statistical::*;

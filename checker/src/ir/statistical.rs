@@ -1,9 +1,9 @@
 //! Compiled statistical queries.
 
-use super::formulas::Formula;
 use super::ids::FunctionId;
 use super::labels::Guard;
 use super::learning::Optimum;
+use super::runs::{Path, RunBound};
 
 /// The kinds of statistical queries.
 #[derive(Clone, Debug)]
@@ -65,41 +65,6 @@ pub struct Simulation {
     pub items: Vec<ShownItem>,
     /// What a run must reach to be shown, and how many such runs there are at most.
     pub filter: Option<(Guard, u64)>,
-}
-
-/// How long a run is.
-#[derive(Clone, Debug)]
-pub struct RunBound {
-    /// What is limited.
-    pub limit: RunLimit,
-    /// To which value.
-    pub value: f64,
-    /// How many runs, if the query says it.
-    pub runs: Option<u64>,
-}
-
-/// What limits a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunLimit {
-    /// Time.
-    Time,
-    /// The clock with this first word.
-    Clock(u32),
-    /// The number of moves.
-    Moves,
-}
-
-/// What is asked of a run. Conditions are masks (see [`super::Chances`]).
-#[derive(Clone, Debug)]
-pub enum Path {
-    /// `<> p`
-    Eventually(Guard),
-    /// `[] p`
-    Always(Guard),
-    /// `p U q`
-    Until(Guard, Guard),
-    /// Any other formula over time.
-    Formula(Formula),
 }
 
 /// What is asked of one run.

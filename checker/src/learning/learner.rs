@@ -1,13 +1,14 @@
-//! Learning a strategy: runs are made, what they cost is remembered, the partition is cut where that
-//! tells something apart, and the values of actions are computed again, iteration by iteration. Each
-//! iteration gives a strategy that takes the best action everywhere; the best of them is kept.
+//! Learning a strategy: runs are made, what they cost is remembered, the partition is cut where
+//! that tells something apart, and the values of actions are computed again, iteration by
+//! iteration. Each iteration gives a strategy that takes the best action everywhere; the best of
+//! them is kept.
 //!
 //! Whether one is better than another is judged by the same runs for all of them, which learning
 //! never sees. All is determined by the seed: results count in the order of run numbers.
 //!
 //! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract), for Q-learning
-//! and M-learning on partitions; D. Russo et al., "A tutorial on Thompson sampling" (2018), for what
-//! is tried while learning.
+//! and M-learning on partitions; D. Russo et al., "A tutorial on Thompson sampling" (2018), for
+//! what is tried while learning.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -186,7 +187,8 @@ impl Learner<'_> {
         })
     }
 
-    /// Makes the runs of an iteration, and remembers their decisions. Returns whether all were made.
+    /// Makes the runs of an iteration, and remembers their decisions. Returns whether all were
+    /// made.
     fn collect(
         &mut self,
         iteration: u64,

@@ -33,8 +33,8 @@ pub struct Learning {
     pub patience: u64,
     /// How often it begins anew.
     pub resets: u64,
-    /// What a cost counts a decision earlier, as a part of itself; `None` is 1, but [`LONG_DISCOUNT`]
-    /// where runs have more than [`LONG`] decisions.
+    /// What a cost counts a decision earlier, as a part of itself; `None` is 1, but
+    /// [`LONG_DISCOUNT`] where runs have more than [`LONG`] decisions.
     pub discount: Option<f64>,
     /// In Q-learning: the n-th sample counts for 1 / min(`alpha`, n + 1).
     pub alpha: f64,

@@ -1,8 +1,8 @@
-//! The finite decision process that a partition makes of all remembered decisions, and the values of
-//! its actions.
+//! The finite decision process that a partition makes of all remembered decisions, and the values
+//! of its actions.
 //!
-//! A *slot* is an action in a cell. A *stand* is a cell with the actions that are possible there; its
-//! worth is the value of the best of them.
+//! A *slot* is an action in a cell. A *stand* is a cell with the actions that are possible there;
+//! its worth is the value of the best of them.
 //!
 //! Invariants:
 //! * `samples` are sorted by slots, and those of a slot by the stands behind them.
@@ -224,8 +224,8 @@ impl Process {
         self.groups = groups;
     }
 
-    /// The mean of what the samples of a slot cost, and its standard error: as if one more sample were
-    /// off by as much as all runs differ.
+    /// The mean of what the samples of a slot cost, and its standard error: as if one more sample
+    /// were off by as much as all runs differ.
     fn mean(&self, slot: u32, discount: f64, spread: f64) -> (f64, f64) {
         let discount = self.discount(slot, discount);
         let ways = self.first_ways[slot as usize]..self.first_ways[slot as usize + 1];
@@ -241,8 +241,8 @@ impl Process {
         (mean, (variance / count).sqrt())
     }
 
-    /// Moves the values of actions towards what each sample costs, the latest sample first. The n-th
-    /// sample of an action counts for 1 / min(`most`, n + 1).
+    /// Moves the values of actions towards what each sample costs, the latest sample first. The
+    /// n-th sample of an action counts for 1 / min(`most`, n + 1).
     ///
     /// Source: C. Watkins and P. Dayan, "Q-learning", Machine Learning 8 (1992).
     pub(super) fn follow(&mut self, cells: &[Cell], discount: f64, most: f64, spread: f64) {

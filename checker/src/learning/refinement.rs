@@ -4,8 +4,8 @@
 //! greatest sum, over actions, of the squares of Welch's t. It is made if that cannot be chance,
 //! and if the difference matters: if it is more than a small part of what runs differ by.
 //!
-//! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract: cuts by tests of
-//! both sides); B. L. Welch, Biometrika 34 (1947), for the test.
+//! Source: M. Jaeger et al., "Teaching Stratego to play ball", ATVA 2019 (abstract: cuts by tests
+//! of both sides); B. L. Welch, Biometrika 34 (1947), for the test.
 
 use super::partition::Partition;
 use super::process::Process;

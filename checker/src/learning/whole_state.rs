@@ -1,8 +1,8 @@
 //! What a strategy sees that no features were given for: the whole state.
 //!
 //! Locations, truth values, scalars, and integers with a range of at most [`MOST_VALUES`] are seen
-//! exactly. All other integers, doubles and clocks are seen in intervals. What never changes is left
-//! out, and what makes no difference to what may still happen and to what that costs
+//! exactly. All other integers, doubles and clocks are seen in intervals. What never changes is
+//! left out, and what makes no difference to what may still happen and to what that costs
 //! ([`Influence`]).
 
 use crate::analysis::Influence;

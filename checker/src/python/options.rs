@@ -177,7 +177,7 @@ fn learning(given: &Bound<'_, PyAny>) -> PyResult<Learning> {
         iterations: number("max_iterations", usual.iterations)?,
         patience: number("reset_no_better", usual.patience)?,
         resets: number("max_reset_learning", usual.resets)?,
-        discount: discount.unwrap_or(usual.discount),
+        discount: discount.or(usual.discount),
         alpha: alpha.unwrap_or(usual.alpha),
         ..usual
     })

@@ -5,12 +5,13 @@
 //! * If it sees clocks, it is asked at once, whenever something has happened or one more of its
 //!   moves is enabled. It moves at once, or it waits; then it is asked again after the time that it
 //!   says, which is when what it sees changes next.
-//! * If it sees none, a delay is drawn for its moves as for all others, and it is asked when that is
-//!   over. If it waits then, it is not asked again before something has happened.
+//! * If it sees none, a delay is drawn for its moves as for all others, and it is asked when that
+//!   is over. If it waits then, it is not asked again before something has happened.
 //!
-//! In both, it chooses among all moves that are enabled, of whatever process, and it must move where time cannot pass and nobody else can move. So a delay of the
-//! controller depends on what it sees and on nothing else, and what is decided is the same in
-//! random runs, in the closed loop, and in code that is made of a strategy.
+//! In both, it chooses among all moves that are enabled, of whatever process, and it must move
+//! where time cannot pass and nobody else can move. So a delay of the controller depends on what it
+//! sees and on nothing else, and what is decided is the same in random runs, in the closed loop,
+//! and in code that is made of a strategy.
 //!
 //! A move of the controller is known by its entry: the number of an instance in the program.
 

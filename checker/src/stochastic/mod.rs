@@ -13,6 +13,7 @@ mod constants;
 mod control;
 mod correspondence;
 mod cubic;
+mod entry;
 mod estimate;
 mod extreme;
 mod failure;

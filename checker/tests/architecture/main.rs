@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms in reading order: each may use those before it.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 18] = [
     "cancellation",
     "diagnostics",
     "tuning",
@@ -21,6 +21,7 @@ const ROOMS: [&str; 17] = [
     "search",
     "game",
     "stochastic",
+    "learning",
     "verify",
     "engine",
     "python",

@@ -31,8 +31,6 @@ mod outputs;
 mod planning;
 mod transition;
 
-pub(super) use advised::entry;
-
 use std::cell::Cell;
 
 use rustc_hash::FxHashMap;

@@ -223,21 +223,35 @@ fn mistakes_in_statistical_queries() {
 #[test]
 fn unsupported_queries_are_named() {
     check("Pmax", "unsupported: statistical model checking");
-    check(
-        "strategy S = minE(c)[<=9]{P.location}->{x}: <> g under T",
-        "strategy S = unsupported: learning under T",
-    );
-    check("maxPr[<=3]: <> g", "unsupported: learning");
-    check(
-        "strategy S = acontrol: A[] p {x[0,1]:4}",
-        "strategy S = unsupported: acontrol (approximate control)",
-    );
     check("sat: Scenario", "unsupported: live sequence chart scenario");
     check("A[ p U q ]", "unsupported: `A[p U q]` outside `control:`");
     check(
         "E<> foreach (c : T) c.n > 3",
         "unsupported: `foreach` over the instances of a dynamic template",
     );
+}
+
+#[test]
+fn best_strategies_and_shields_are_asked_for() {
+    check(
+        "strategy S = minE(c)[<=9]{P.location}->{x}: <> g under T imitate U",
+        "strategy S = minE(c)[<=9]{ (. P location)} -> { x}: g under T imitate U",
+    );
+    check("maxPr[#<=3]: <> g", "maxPr[#<=3]: g");
+    check("maxE(c)[x<=3] {} -> {}: <> g", "maxE(c)[x<=3]{} -> {}: g");
+    for (text, hint) in [("minE[<=3]: <> g", "W0108"), ("minE(c)[<=3]", "W0109")] {
+        let (found, diagnostics) = query(text);
+        assert!(found.is_some() && diagnostics[0].contains(hint), "{text}");
+    }
+    check(
+        "strategy S = acontrol: A[] p { P.location, i[0,5], x[-1,1]:4 }",
+        "strategy S = acontrol: p {(. P location), i[0,5], x[(- 1),1]:4}",
+    );
+    check_mistake("minPr(c)[<=3]: <> g", "E0145 at 1:1");
+    check_mistake("minE(c)[<=3]: [] g", "E0146 at 1:15");
+    check_mistake("maxPr[<=3]", "E0146");
+    check_mistake("minE(c): <> g", "E0105");
+    check_mistake("minE(c)[<=3] {a}: <> g", "E0105");
 }
 
 #[test]

@@ -2,8 +2,8 @@
 
 use checker::diagnostics::{Diagnostic, SourceMap, Span};
 use checker::syntax::ast::{
-    Control, Document, Estimated, Expr, ExprKind, Formula, Interval, Objective, Path, Query,
-    QueryKind, RunBound, RunLimit, Shown, Statistical, TypeExpr, TypeKind,
+    Control, Document, Estimated, Expr, ExprKind, Formula, Interval, Measured, Objective, Optimum,
+    Path, Query, QueryKind, RunBound, RunLimit, Shield, Shown, Statistical, TypeExpr, TypeKind,
 };
 use checker::syntax::{Parsed, parse_query, print_type, read_model};
 
@@ -154,7 +154,11 @@ pub(crate) fn query_shape(query: &Query) -> String {
         .under
         .as_ref()
         .map_or(String::new(), |name| format!(" under {}", name.text));
-    format!("{strategy}{}{under}", kind_shape(&query.kind))
+    let imitate = query
+        .imitate
+        .as_ref()
+        .map_or(String::new(), |name| format!(" imitate {}", name.text));
+    format!("{strategy}{}{under}{imitate}", kind_shape(&query.kind))
 }
 
 fn kind_shape(kind: &QueryKind) -> String {
@@ -177,11 +181,47 @@ fn kind_shape(kind: &QueryKind) -> String {
         QueryKind::Control(control) => control_shape(control),
         QueryKind::SaveStrategy { file, strategy } => format!("save {file:?} {}", strategy.text),
         QueryKind::LoadStrategy { file, .. } => format!("load {file:?}"),
-        QueryKind::Optimum(_) => "optimum".to_owned(),
-        QueryKind::Shield(_) => "shield".to_owned(),
+        QueryKind::Optimum(optimum) => optimum_shape(optimum),
+        QueryKind::Shield(shield) => shield_shape(shield),
         QueryKind::Statistical(query) => statistical_shape(query),
         QueryKind::Unsupported(name) => format!("unsupported: {}", name.text),
     }
+}
+
+fn optimum_shape(query: &Optimum) -> String {
+    let best = if query.is_greatest { "max" } else { "min" };
+    let measured = match &query.measured {
+        Measured::Expected(Some(price)) => format!("E({})", shape(price)),
+        Measured::Expected(None) => String::from("E"),
+        Measured::Probability => String::from("Pr"),
+    };
+    let features = query.features.as_ref().map_or(String::new(), |features| {
+        let (discrete, continuous) = (shapes(&features.discrete), shapes(&features.continuous));
+        format!("{{{discrete}}} -> {{{continuous}}}")
+    });
+    let goal = query.goal.as_ref();
+    let goal = goal.map_or(String::new(), |goal| format!(": {}", shape(goal)));
+    format!(
+        "{best}{measured}{}{features}{goal}",
+        bound_shape(&query.bound)
+    )
+}
+
+fn shield_shape(query: &Shield) -> String {
+    let axes = query.axes.iter().map(|axis| {
+        let bounds = axis.bounds.as_ref().map_or(String::new(), |bounds| {
+            format!("[{},{}]", shape(&bounds[0]), shape(&bounds[1]))
+        });
+        let cells = axis.cells.as_ref();
+        let cells = cells.map_or(String::new(), |cells| format!(":{}", shape(cells)));
+        format!("{}{bounds}{cells}", shape(&axis.place))
+    });
+    let axes: Vec<String> = axes.collect();
+    format!(
+        "acontrol: {} {{{}}}",
+        shape(&query.invariant),
+        axes.join(", ")
+    )
 }
 
 fn statistical_shape(query: &Statistical) -> String {

@@ -14,6 +14,10 @@ sup{p: x
 inf:
 E<> for all
 E<> P.a ?
+minPr(c)[<=3]: <> p
+minE(c)[<=3]: [] p
+minE[<=3]: <> p
+minE(c)[<=3]
 // expect: W0105 at 13:1 "`whatever` is not an expectation"
 // expect: E0140 at 1:1 "this query has no path quantifier"
 // expect: E0105 at 2:3 "a path quantifier is one word"
@@ -30,3 +34,7 @@ E<> P.a ?
 // expect: E0105 at 14:5 "expected an expression, found the end of the text"
 // expect: E0105 at 15:9 "expected the end of the query, found `all`"
 // expect: E0105 at 16:9 "expected the end of the query, found `?`"
+// expect: E0145 at 17:1 "`minPr` has no expression: it is for the probability of `<> p`"
+// expect: E0146 at 18:15 "a run ends where the goal behind `<>` holds, but this is `[]`"
+// expect: W0108 at 19:1 "this has no expression, so each unit of time costs 1"
+// expect: W0109 at 20:13 "this has no goal, so a run ends at its bound only"
