@@ -245,7 +245,7 @@ fn best_strategies_and_shields_are_asked_for() {
     }
     check(
         "strategy S = acontrol: A[] p { P.location, i[0,5], x[-1,1]:4 }",
-        "strategy S = acontrol: p {(. P location), i[0,5], x[(- 1),1]:4}",
+        "strategy S = acontrol: p {(. P location), i[0,5], x[(Minus 1),1]:4}",
     );
     check_mistake("minPr(c)[<=3]: <> g", "E0145 at 1:1");
     check_mistake("minE(c)[<=3]: [] g", "E0146 at 1:15");
