@@ -69,8 +69,9 @@ class Estimate:
         confidence: The confidence of the interval; the method says what it means.
         method: What made the interval: ``Clopper-Pearson``, ``confidence sequence``,
             ``Student (asymptotic)``, ``empirical Bernstein``,
-            ``empirical Bernstein confidence sequence``, ``Dvoretzky-Kiefer-Wolfowitz`` or
-            ``importance splitting, Student (asymptotic)``.
+            ``empirical Bernstein confidence sequence``, ``Dvoretzky-Kiefer-Wolfowitz``,
+            ``importance splitting, Student (asymptotic)`` or, of a best strategy whose value was
+            computed without runs, ``value iteration``.
         runs: The number of runs; with importance splitting, of parts of runs.
         satisfied_runs: How many of them are satisfied; ``None`` for means and with splitting.
         compared: What runs say of the second probability of a comparison,
@@ -85,6 +86,11 @@ class Estimate:
     runs: int
     satisfied_runs: int | None
     compared: Estimate | None = None
+
+    @property
+    def is_computed(self) -> bool:
+        """Whether the value lies between the ends for certain, since no runs were needed."""
+        return self.method == "value iteration"
 
     @classmethod
     def from_object(cls, given: dict[str, Any]) -> Estimate:
@@ -209,7 +215,7 @@ class Answer:
         if self.trajectories:
             states = f"{len(self.trajectories)} runs shown"
             return f"<Answer: {', '.join(facts)}; {states}, {1000 * self.seconds:.1f} ms>"
-        if self.estimate is not None:
+        if self.estimate is not None and not self.estimate.is_computed:
             states = f"{self.estimate.runs} runs"
             return f"<Answer: {', '.join(facts)}; {states} in {1000 * self.seconds:.1f} ms>"
         return f"<Answer: {', '.join(facts)}; {states} explored in {1000 * self.seconds:.1f} ms>"

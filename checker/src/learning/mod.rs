@@ -5,6 +5,7 @@
 
 mod episode;
 mod experience;
+mod exact;
 mod explorer;
 mod judging;
 mod learner;
@@ -16,6 +17,7 @@ mod refinement;
 mod strategy;
 mod whole_state;
 
+pub use exact::{Exact, ExactAnswer, Inexact, solve_exactly};
 pub use judging::{Comparison, compared, judge};
 pub use learner::{Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};

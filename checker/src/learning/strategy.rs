@@ -74,17 +74,28 @@ impl LearnedStrategy {
         moves: &[ControllerMove],
         is_greatest: bool,
     ) -> LearnedStrategy {
+        let trees = (0..partition.observations() as u32)
+            .map(|one| (partition.key(one).to_vec(), simplified(partition, one, 0)));
+        LearnedStrategy::of_trees(trees, observation, moves, is_greatest)
+    }
+
+    /// The strategy of these trees, by exact values.
+    pub(super) fn of_trees(
+        trees: impl Iterator<Item = (Vec<i32>, Ranked)>,
+        observation: &Arc<Observation>,
+        moves: &[ControllerMove],
+        is_greatest: bool,
+    ) -> LearnedStrategy {
         let sign = if is_greatest { -1.0 } else { 1.0 };
-        let numbers = (0..partition.observations() as u32).filter_map(|one| {
-            let tree = simplified(partition, one, 0);
-            let regressor = Regressor {
-                key: partition.key(one).to_vec(),
-                appraisals: appraisals(&tree, moves, sign),
-            };
-            (!regressor.appraisals.is_empty()).then_some(regressor)
+        let numbers = trees.filter_map(|(key, tree)| {
+            let appraisals = appraisals(&tree, moves, sign);
+            (!appraisals.is_empty()).then_some(Regressor { key, appraisals })
         });
         let mut regressors: Vec<Regressor> = numbers.collect();
-        regressors.sort_by(|one, other| order(observation, &one.key, &other.key));
+        regressors.sort_by_cached_key(|one| {
+            let values = values(observation, &one.key).into_iter();
+            values.map(in_total_order).collect::<Vec<i64>>()
+        });
         LearnedStrategy {
             is_greatest,
             observation: Arc::clone(observation),
@@ -153,6 +164,12 @@ pub fn words(observation: &Observation, values: &[f64]) -> Option<Vec<i32>> {
     Some(words)
 }
 
+/// A number that is as great among others as [`f64::total_cmp`] says.
+fn in_total_order(value: f64) -> i64 {
+    let bits = value.to_bits() as i64;
+    bits ^ (((bits >> 63) as u64) >> 1) as i64
+}
+
 /// The numbers that exact values are.
 pub fn values(observation: &Observation, key: &[i32]) -> Vec<f64> {
     numbers(observation, key).collect()
@@ -169,21 +186,26 @@ fn numbers<'o>(observation: &'o Observation, key: &'o [i32]) -> impl Iterator<It
 }
 
 /// A part of the partition, in which neighbours are one where they rank the actions alike.
-enum Ranked {
+pub(super) enum Ranked {
+    /// Its actions.
     Cell(Vec<Rated>),
+    /// Two parts.
     Cut {
+        /// The feature that is compared.
         feature: u32,
+        /// The number it is compared with.
         bound: f64,
+        /// Where it is not greater, and where it is.
         parts: Box<[Ranked; 2]>,
     },
 }
 
 /// An action with its cost.
 #[derive(Clone, Copy)]
-struct Rated {
-    action: u32,
-    cost: f64,
-    visits: f64,
+pub(super) struct Rated {
+    pub(super) action: u32,
+    pub(super) cost: f64,
+    pub(super) visits: f64,
 }
 
 fn simplified(partition: &Partition, observation: u32, node: u32) -> Ranked {

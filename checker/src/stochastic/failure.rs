@@ -40,6 +40,10 @@ pub enum Failure {
     /// In more than [`super::MOVES_WITHOUT_RISE`] moves the clock that bounds the run has not risen
     /// above this value.
     BoundNotApproached(f64),
+    /// Runs can cycle in no time and get better by it each time: there is no best strategy.
+    NoBest,
+    /// Under every strategy some runs cycle in no time for ever.
+    NeverEnds,
     /// The value of an expression is no finite number.
     NoNumber,
     /// A value whose mean is asked for lies outside the bounds that the user gave.

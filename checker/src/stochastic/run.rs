@@ -374,7 +374,7 @@ fn position(race: &Race<'_>, bound: &RunBound, ahead: f64) -> f64 {
 }
 
 /// How much time the bound leaves if nothing happens.
-fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
+pub(super) fn rest(race: &Race<'_>, bound: &RunBound) -> f64 {
     match bound.limit {
         RunLimit::Time => (bound.value - race.time).max(0.0),
         RunLimit::Moves => f64::INFINITY,

@@ -90,7 +90,7 @@ class Human(Format):
             echo(pointer, err=True)
 
     def _facts(self, answer: Answer, *, shows_runs: bool) -> list[str]:
-        if answer.estimate is not None:
+        if answer.estimate is not None and not answer.estimate.is_computed:
             return _estimated(answer, answer.estimate)
         if shows_runs:
             return _made(answer)
@@ -101,6 +101,8 @@ class Human(Format):
         if answer.stop:
             facts.insert(0, f"stopped by the {answer.limit_text}")
         lines = [f"value: {json.dumps(answer.value)}"] if answer.value is not None else []
+        if answer.estimate is not None:
+            lines = [f"value: {_ends(answer.estimate)}"]
         lines.append(", ".join(facts))
         lines += [answer.message] if answer.message else []
         if answer.wrapped is not None and answer.verdict != "error":
@@ -196,9 +198,13 @@ def _is_printable(text: str) -> bool:
     return True
 
 
-def _interval(estimate: Estimate) -> str:
+def _ends(estimate: Estimate) -> str:
     between = f"in [{_number(estimate.lower)}, {_number(estimate.upper)}]"
-    return f"{_number(estimate.value)}, {between} at {100 * estimate.confidence:g} % confidence"
+    return f"{_number(estimate.value)}, {between}"
+
+
+def _interval(estimate: Estimate) -> str:
+    return f"{_ends(estimate)} at {100 * estimate.confidence:g} % confidence"
 
 
 def _runs(estimate: Estimate) -> str:

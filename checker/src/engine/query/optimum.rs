@@ -12,14 +12,14 @@ use crate::engine::loaded_model::{ANALYSED, LoadedModel, NamedStrategy, Prepared
 use crate::engine::options::RunsSoFar;
 use crate::engine::query_form::unnamed;
 use crate::engine::rejection::Rejection;
-use crate::ir::{Optimum, Query};
+use crate::ir::{Network, Optimum, Query};
 use crate::learning::{
-    Comparison, Followed, Learned, LearnedStrategy, Learning, Mean, compared, judge, learn,
-    whole_state,
+    Comparison, Exact, ExactAnswer, Followed, Inexact, Learned, LearnedStrategy, Learning, Mean,
+    compared, judge, learn, solve_exactly, whole_state,
 };
-use crate::search::limits::{Counters, Watch as _};
-use crate::stochastic::statistics::Interval;
-use crate::stochastic::{Behaviour, Estimate, Failure, Runner};
+use crate::search::limits::{Counters, StopReason, Watch as _};
+use crate::stochastic::statistics::{Interval, Method};
+use crate::stochastic::{Behaviour, Estimate, Failure, NotFinite, Runner, Stand};
 
 /// The numbers of the runs that say what a strategy is worth: learning never uses them.
 const FRESH: u64 = 1 << 41;
@@ -88,6 +88,15 @@ fn found(
     asked: &Optimum,
     watch: &mut LimitWatch,
 ) -> Result<Option<(Answer, Arc<LearnedStrategy>)>, Failure> {
+    let inexact = match solve_exactly(behaviour, asked, &mut |counters| watch.look(counters))? {
+        ExactAnswer::Best(best) => return Ok(Some(exact(best))),
+        ExactAnswer::Unbounded => return Err(Failure::NoBest),
+        ExactAnswer::NeverEnds => return Err(Failure::NeverEnds),
+        ExactAnswer::Left(Inexact::Limit(StopReason::Time | StopReason::Interrupted)) => {
+            return Ok(None);
+        }
+        ExactAnswer::Left(reason) => reason,
+    };
     let options = &prepared.options;
     let observation = match &asked.features {
         Some(features) => Arc::new(features.clone()),
@@ -148,6 +157,8 @@ fn found(
     answer.evidence.learned = Some(Arc::clone(&strategy));
     let comparison = value.as_ref().zip(uniform.as_ref());
     let comparison = comparison.map(|(value, uniform)| compared(value, uniform, asked.is_greatest));
+    let inexact = not_exact(behaviour.network, inexact);
+    answer.remark(format!("not computed exactly: {inexact}"));
     answer.remark(remark(
         progress.runs,
         progress.iterations,
@@ -167,6 +178,68 @@ fn found(
         leaves: strategy.leaves() as u64,
     });
     Ok(Some((answer, strategy)))
+}
+
+/// The answer that was computed.
+fn exact(best: Exact) -> (Answer, Arc<LearnedStrategy>) {
+    let Exact {
+        lower,
+        upper,
+        strategy,
+        counters,
+    } = best;
+    let mut answer = Answer::new(Verdict::Satisfied, counters);
+    answer.estimate = Some(Estimate {
+        value: lower + (upper - lower) / 2.0,
+        lower,
+        upper,
+        confidence: 1.0,
+        method: Method::ValueIteration,
+        runs: 0,
+        satisfied_runs: None,
+        decision: None,
+        compared: None,
+        is_complete: true,
+    });
+    let states = counters.stored;
+    answer.remark(format!("exact: value iteration over {states} states"));
+    (answer, strategy)
+}
+
+/// Why a value is learned and not computed.
+fn not_exact(network: &Network, reason: Inexact) -> String {
+    let place = |stand: Stand| {
+        let process = &network.processes[stand.process.0 as usize];
+        let location = &process.locations[stand.location.0 as usize];
+        format!("{}.{}", process.name, location.name)
+    };
+    match reason {
+        Inexact::NotFinite(reason) => match reason {
+            NotFinite::Drawn(stand) => format!("the delay in {} is drawn", place(stand)),
+            NotFinite::Wait(stand) => {
+                format!("the controller chooses how long it waits in {}", place(stand))
+            }
+            NotFinite::Flow => "rates of clocks change as time passes".to_owned(),
+            NotFinite::Random(stand) => {
+                format!("an update behind {} draws a random number", place(stand))
+            }
+            NotFinite::Rounded(stand) => {
+                format!("rounding decides when {} can be left", place(stand))
+            }
+            NotFinite::Demand => "the strategy that is refined demands moves in time".to_owned(),
+        },
+        Inexact::Library => "functions of libraries may be of any kind".to_owned(),
+        Inexact::TooLarge => "there are more than 10 million states".to_owned(),
+        Inexact::Limit(reason) => match reason {
+            StopReason::Memory => "its states take more memory than allowed".to_owned(),
+            _ => "there are more states than allowed".to_owned(),
+        },
+        Inexact::Hidden => {
+            "the features do not tell states apart in which different moves are best".to_owned()
+        }
+        Inexact::MixedCycles => "cycles that take no time have both gains and costs".to_owned(),
+        Inexact::Slow => "bounds of the value come too slowly near to each other".to_owned(),
+    }
 }
 
 /// Whether a limit was reached.

@@ -109,6 +109,8 @@ fn span_of(network: &Network, failure: &Failure, query: &Query) -> Span {
         | Failure::ImpossibleDemand
         | Failure::BoundNeverReached
         | Failure::BoundNotApproached(_)
+        | Failure::NoBest
+        | Failure::NeverEnds
         | Failure::NoNumber
         | Failure::NotRepeatable => query.span,
     }
@@ -169,6 +171,14 @@ fn message_of(network: &Network, failure: &Failure) -> String {
             "in {MOVES_WITHOUT_RISE} moves of a random run, the clock that bounds it does not rise \
              above {highest}"
         ),
+        Failure::NoBest => {
+            "there is no best strategy: runs can go round a cycle in no time, and each round makes \
+             the value better"
+                .to_owned()
+        }
+        Failure::NeverEnds => {
+            "under every strategy, runs may go round a cycle in no time for ever".to_owned()
+        }
         Failure::NoNumber => {
             "the value of the expression is no finite number in some run".to_owned()
         }
@@ -216,6 +226,13 @@ fn help_for(failure: &Failure, query: &Query) -> &'static str {
         Failure::BoundNeverReached => "bound the run by time: [<=100]",
         Failure::BoundNotApproached(_) => {
             "bound the run by time, [<=100], or by its moves, [#<=1000]"
+        }
+        Failure::NoBest => {
+            "let time pass in the cycle, limit how often it is gone round, or bound the run by its \
+             moves: [#<=1000]"
+        }
+        Failure::NeverEnds => {
+            "let time pass in every loop, or give it a way out that the controller can take"
         }
         Failure::NoNumber => {
             "keep arguments of functions in their domains, and divisors away from 0"

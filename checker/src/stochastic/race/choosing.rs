@@ -132,7 +132,7 @@ impl Race<'_> {
 
     /// The moves that the controller can make now, by their entries, and whether the environment
     /// can move, too: one of its processes whose delay is over.
-    fn moves_of_controller(
+    pub(super) fn moves_of_controller(
         &mut self,
         program: &Program<'_>,
         winner: usize,
@@ -176,7 +176,7 @@ impl Race<'_> {
     }
 
     /// Whether time can pass while the controller makes none of these moves.
-    fn can_time_pass(&mut self, program: &Program<'_>, moves: &[u32]) -> Result<bool, Failure> {
+    pub(super) fn can_time_pass(&mut self, program: &Program<'_>, moves: &[u32]) -> Result<bool, Failure> {
         if self.committed > 0 || self.bounds.iter().any(|&bound| bound <= TOLERANCE) {
             return Ok(false);
         }

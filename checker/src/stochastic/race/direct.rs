@@ -148,14 +148,26 @@ impl Backend for Race<'_> {
     }
 
     fn draw_uniform(&mut self, maximum: f64) -> f64 {
+        if let Some(drawn) = &mut self.drawn {
+            drawn.note(maximum > 0.0);
+            return 0.0;
+        }
         maximum * self.machine.stream().uniform()
     }
 
     fn draw_exponential(&mut self, rate: f64) -> f64 {
+        if let Some(drawn) = &mut self.drawn {
+            drawn.note(true);
+            return 0.0;
+        }
         self.machine.stream().exponential(rate)
     }
 
     fn draw_below(&mut self, count: i32) -> i32 {
+        if let Some(drawn) = &mut self.drawn {
+            drawn.note(count > 1);
+            return 0;
+        }
         self.machine.stream().below(count as u32) as i32
     }
 
@@ -189,6 +201,9 @@ impl Backend for Race<'_> {
     fn set_plan(&mut self, process: usize, attempt: Option<f64>, stay: Option<f64>, _: bool) {
         self.attempts[process] = attempt.unwrap_or(f64::INFINITY);
         self.bounds[process] = stay.unwrap_or(f64::INFINITY);
+        if let Some(drawn) = &mut self.drawn {
+            drawn.keep(process);
+        }
     }
 
     fn set_window_count(&mut self, count: i32) {

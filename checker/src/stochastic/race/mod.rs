@@ -30,6 +30,10 @@ mod direct;
 mod outputs;
 mod planning;
 mod transition;
+mod unfolding;
+
+pub(super) use unfolding::{Drawn, Step, Unfolded};
+pub use unfolding::NotFinite;
 
 use std::cell::Cell;
 
@@ -116,6 +120,8 @@ pub(in crate::stochastic) struct Race<'a> {
     standstill: Option<(f64, usize)>,
     /// How long all invariants together let time pass, if that matters to the strategy.
     longest_stay: f64,
+    /// Which delays would be drawn, if none are: see [`unfolding`].
+    pub(in crate::stochastic) drawn: Option<Drawn>,
 }
 
 impl<'a> Race<'a> {
@@ -156,6 +162,7 @@ impl<'a> Race<'a> {
             control: guidance.map(Control::new),
             standstill: None,
             longest_stay: f64::INFINITY,
+            drawn: None,
         }
     }
 

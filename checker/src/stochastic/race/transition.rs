@@ -95,16 +95,7 @@ impl Race<'_> {
                 self.movers[index].1 = rules::branch(self, program, mover)? as u32;
             }
         }
-        if let Some(update) = &network.before_update {
-            self.machine.update(update, &[])?;
-        }
-        for index in 0..self.movers.len() {
-            let (number, branch) = self.movers[index];
-            let mover = program.instance(number);
-            let branch: &Branch = &mover.edge.branches[branch as usize];
-            self.update(&mover.edge.update, &mover.values)?;
-            self.update(&branch.update, &mover.values)?;
-        }
+        self.run_updates(program)?;
         for index in 0..self.movers.len() {
             let (number, branch) = self.movers[index];
             let mover = program.instance(number);
@@ -117,6 +108,21 @@ impl Race<'_> {
         let mut rated = program.rated.iter();
         if rated.any(|&process| self.is_stale[process as usize]) {
             self.renew_rates(program)?;
+        }
+        Ok(())
+    }
+
+    /// Runs what comes before the updates of a move, and these, the sender's first.
+    pub(super) fn run_updates(&mut self, program: &Program<'_>) -> Result<(), Failure> {
+        if let Some(update) = &self.network().before_update {
+            self.machine.update(update, &[])?;
+        }
+        for index in 0..self.movers.len() {
+            let (number, branch) = self.movers[index];
+            let mover = program.instance(number);
+            let branch: &Branch = &mover.edge.branches[branch as usize];
+            self.update(&mover.edge.update, &mover.values)?;
+            self.update(&branch.update, &mover.values)?;
         }
         Ok(())
     }

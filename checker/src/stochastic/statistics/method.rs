@@ -20,6 +20,8 @@ pub enum Method {
     DvoretzkyKieferWolfowitz,
     /// Of independent repetitions of importance splitting: right in the limit of many.
     ImportanceSplitting,
+    /// No runs: the value itself is computed between bounds.
+    ValueIteration,
 }
 
 impl Method {
@@ -33,6 +35,7 @@ impl Method {
             Method::EmpiricalBernsteinSequence => "empirical Bernstein confidence sequence",
             Method::DvoretzkyKieferWolfowitz => "Dvoretzky-Kiefer-Wolfowitz",
             Method::ImportanceSplitting => "importance splitting, Student (asymptotic)",
+            Method::ValueIteration => "value iteration",
         }
     }
 }

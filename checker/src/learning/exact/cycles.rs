@@ -1,0 +1,181 @@
+//! A component of states that may come again.
+//!
+//! First it is brought into a form in which iteration cannot go wrong: nodes without a strategy
+//! that ends almost surely are left out, and nodes between which the controller can go to and fro
+//! for nothing become one (`collapse.rs`). Then lower bounds rise by value iteration, from values
+//! that no look can lower. Upper bounds come from the strategy that is best by the lower ones: its
+//! mean numbers of moves say how far above them its own costs can lie. They are guessed by that,
+//! verified by one look at each node, and lowered by further ones.
+//!
+//! Invariants:
+//! * Lower bounds never exceed what one look at them gives, so no strategy costs less.
+//! * Upper bounds are never below what one look under the policy gives, and the policy leaves the
+//!   component almost surely, so it costs no more.
+//!
+//! Sources: A. Hartmanns, B. L. Kaminski, "Optimistic value iteration", CAV 2020; D. Bertsekas,
+//! J. Tsitsiklis, "An analysis of stochastic shortest path problems", Math. Oper. Res. 16 (1991).
+
+use super::collapse::{Local, collapsed};
+use super::process::Process;
+use super::solve::{Solution, Unsolved};
+use crate::cancellation;
+
+/// A component.
+pub(super) struct Cyclic<'s> {
+    pub(super) process: &'s Process,
+    pub(super) nodes: &'s [u32],
+    /// By node of the process: room for its place in the component; all `u32::MAX`.
+    pub(super) places: &'s mut [u32],
+    /// Known behind the component.
+    pub(super) solution: &'s mut Solution,
+    /// How near the bounds are to be, as a part of the greatest value.
+    pub(super) precision: f64,
+}
+
+/// So many sweeps, and the bounds are as near as they come.
+const MOST_SWEEPS: usize = 100_000;
+/// Bounds are guessed after so many sweeps first, and then after twice as many each time.
+const FIRST_GUESS: usize = 8;
+/// A mean number of moves counts as an upper bound if each move takes this much of it, or more.
+const STEP: f64 = 0.5;
+
+/// Finds the bounds in a component.
+pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
+    let precision = cyclic.precision;
+    let Some((local, members)) = collapsed(&mut cyclic)? else {
+        // None of its states has a strategy that ends.
+        return Ok(());
+    };
+    let mut lower = local.start();
+    let mut sweeps = 0;
+    let mut until = FIRST_GUESS;
+    loop {
+        while sweeps < until {
+            local.raise(&mut lower);
+            sweeps += 1;
+        }
+        let policy = local.best(&lower);
+        if let Some(upper) = local.upper(&lower, &policy, precision, 4 * until) {
+            members.give(cyclic.process, &local, (&lower, &upper, &policy), cyclic.solution);
+            return Ok(());
+        }
+        if sweeps > MOST_SWEEPS {
+            return Err(Unsolved::Slow);
+        }
+        until *= 2;
+    }
+}
+
+impl Local {
+    /// Values that one look at them does not lower.
+    fn start(&self) -> Vec<f64> {
+        let least = self.least_behind;
+        let deepest = self.costs.iter().copied().fold(0.0, f64::min);
+        match &self.longest {
+            Some(longest) if deepest < 0.0 => {
+                longest.iter().map(|moves| least + deepest * moves).collect()
+            }
+            _ => vec![least; self.nodes()],
+        }
+    }
+
+    /// One sweep of value iteration.
+    fn raise(&self, values: &mut [f64]) {
+        for node in 0..self.nodes() {
+            let totals = self.choices(node).map(|choice| self.total(choice, values));
+            let best = totals.fold(f64::INFINITY, f64::min);
+            values[node] = values[node].max(best);
+        }
+        cancellation::work(self.targets.len());
+    }
+
+    /// What a choice costs by lower bounds.
+    fn total(&self, choice: usize, values: &[f64]) -> f64 {
+        self.lower_behind[choice] + self.inside(choice, values)
+    }
+
+    /// The part of the nodes of the component.
+    pub(super) fn inside(&self, choice: usize, values: &[f64]) -> f64 {
+        let ways = self.ways(choice);
+        let targets = self.targets[ways.clone()].iter();
+        let chances = &self.chances[ways];
+        targets
+            .zip(chances)
+            .map(|(&to, chance)| chance * values[to as usize])
+            .sum()
+    }
+
+    /// The best choices by lower bounds.
+    fn best(&self, values: &[f64]) -> Vec<u32> {
+        let best = |node: usize| {
+            let mut choices = self.choices(node);
+            let first = choices.next().expect("every node has a choice");
+            let (mut best, mut least) = (first, self.total(first, values));
+            for choice in choices {
+                let total = self.total(choice, values);
+                if total < least {
+                    (best, least) = (choice, total);
+                }
+            }
+            best as u32
+        };
+        (0..self.nodes()).map(best).collect()
+    }
+
+    /// Upper bounds of what a policy costs that are near enough to the lower bounds; `None` if
+    /// these are not good enough.
+    fn upper(
+        &self,
+        lower: &[f64],
+        policy: &[u32],
+        precision: f64,
+        most: usize,
+    ) -> Option<Vec<f64>> {
+        let moves = self.moves_of(policy, most)?;
+        let above = |node: usize| {
+            let choice = policy[node] as usize;
+            self.upper_behind[choice] + self.inside(choice, lower) - lower[node]
+        };
+        let excess = (0..self.nodes()).map(above).fold(0.0, f64::max);
+        let mut upper: Vec<f64> = lower.to_vec();
+        for (upper, moves) in upper.iter_mut().zip(&moves) {
+            *upper += excess / STEP * moves;
+        }
+        let scale = lower.iter().map(|one| one.abs()).fold(0.0, f64::max);
+        let slack = precision * scale + self.gap_behind;
+        for _ in 0..most {
+            let mut gap: f64 = 0.0;
+            for node in 0..self.nodes() {
+                let choice = policy[node] as usize;
+                let total = self.upper_behind[choice] + self.inside(choice, &upper);
+                upper[node] = upper[node].min(total);
+                gap = gap.max(upper[node] - lower[node]);
+            }
+            cancellation::work(self.targets.len());
+            if gap <= slack {
+                return Some(upper);
+            }
+        }
+        None
+    }
+
+    /// Upper bounds, for this purpose, of the moves until a policy leaves the component; `None` if
+    /// so many sweeps do not find them.
+    fn moves_of(&self, policy: &[u32], most: usize) -> Option<Vec<f64>> {
+        let mut moves = vec![0.0; self.nodes()];
+        for _ in 0..most {
+            let mut rise: f64 = 0.0;
+            for (node, &choice) in policy.iter().enumerate() {
+                let next = 1.0 + self.inside(choice as usize, &moves);
+                rise = rise.max(next - moves[node]);
+                moves[node] = next;
+            }
+            cancellation::work(self.targets.len());
+            let takes = |node: usize| moves[node] - self.inside(policy[node] as usize, &moves);
+            if rise <= STEP / 2.0 && (0..self.nodes()).all(|node| takes(node) >= STEP) {
+                return Some(moves);
+            }
+        }
+        None
+    }
+}
