@@ -156,7 +156,9 @@ fn tracked_words(
     let is_stochastic = !network.chances.clocks.is_empty() || network.chances.stream > 0;
     let variables = network.layout.variables.iter().filter(|variable| {
         let keeps = keeps_scalars && has_scalars(&variable.shape);
-        (is_stochastic || !variable.meta) && !keeps && variable.shape.words() <= MOST_WORDS_OF_VARIABLE
+        (is_stochastic || !variable.meta)
+            && !keeps
+            && variable.shape.words() <= MOST_WORDS_OF_VARIABLE
     });
     let words = variables.flat_map(|variable| {
         let first = variable.offset;

@@ -4,8 +4,8 @@
 //! A learned strategy says what each action costs from there on, cell by cell of a partition.
 
 mod episode;
-mod experience;
 mod exact;
+mod experience;
 mod explorer;
 mod judging;
 mod learner;

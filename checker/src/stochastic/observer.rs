@@ -102,7 +102,12 @@ impl<'q> Observer<'q> {
 }
 
 /// What a run is worth that ends so much later than its state says.
-pub(super) fn aim_of(race: &mut Race<'_>, aim: Aim, satisfied: bool, ahead: f64) -> Result<f64, Failure> {
+pub(super) fn aim_of(
+    race: &mut Race<'_>,
+    aim: Aim,
+    satisfied: bool,
+    ahead: f64,
+) -> Result<f64, Failure> {
     Ok(match aim {
         Aim::Probability => f64::from(satisfied),
         Aim::Time => race.time + ahead,

@@ -76,7 +76,8 @@ impl<'a> Unfolder<'a> {
             moves,
             is_asked,
         };
-        self.race.unfold(&self.program, asked, step, &mut self.found)
+        self.race
+            .unfold(&self.program, asked, step, &mut self.found)
     }
 
     /// What the run is worth beyond what its state says, if it ends in the last state.

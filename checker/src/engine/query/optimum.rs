@@ -217,7 +217,10 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
         Inexact::NotFinite(reason) => match reason {
             NotFinite::Drawn(stand) => format!("the delay in {} is drawn", place(stand)),
             NotFinite::Wait(stand) => {
-                format!("the controller chooses how long it waits in {}", place(stand))
+                format!(
+                    "the controller chooses how long it waits in {}",
+                    place(stand)
+                )
             }
             NotFinite::Flow => "rates of clocks change as time passes".to_owned(),
             NotFinite::Random(stand) => {
@@ -229,7 +232,9 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
             NotFinite::Demand => "the strategy that is refined demands moves in time".to_owned(),
         },
         Inexact::Library => "functions of libraries may be of any kind".to_owned(),
-        Inexact::TooLarge => "there are more than 10 million states".to_owned(),
+        Inexact::TooLarge => {
+            "there are more than 10 million states, or they take more than 4 GiB".to_owned()
+        }
         Inexact::Limit(reason) => match reason {
             StopReason::Memory => "its states take more memory than allowed".to_owned(),
             _ => "there are more states than allowed".to_owned(),

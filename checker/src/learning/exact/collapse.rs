@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use super::components::components;
 use super::cycles::Cyclic;
+use super::ending::ending;
 use super::process::Process;
 use super::solve::{Solution, Unsolved};
 use crate::cancellation;
@@ -121,101 +122,6 @@ pub(super) fn collapsed(cyclic: &mut Cyclic<'_>) -> Result<Option<(Local, Member
     Ok(Some((local, Members { of: groups })))
 }
 
-/// The nodes from which some strategy ends almost surely, in their order.
-fn ending(cyclic: &mut Cyclic<'_>, nodes: &[u32]) -> Vec<u32> {
-    let (process, upper) = (cyclic.process, &cyclic.solution.upper);
-    for (place, &node) in (0..).zip(nodes) {
-        cyclic.places[node as usize] = place;
-    }
-    let places = &*cyclic.places;
-    let before = Backwards::new(process, nodes, places);
-    let mut inside = vec![true; nodes.len()];
-    loop {
-        let is_allowed = |choice: u32| {
-            let mut outcomes = process.outcomes(choice as usize);
-            outcomes.all(|(target, _)| match places[target as usize] {
-                u32::MAX => upper[target as usize].is_finite(),
-                place => inside[place as usize],
-            })
-        };
-        let mut reached = vec![false; nodes.len()];
-        let mut open: Vec<u32> = Vec::new();
-        let mut reach = |&(from, choice): &(u32, u32), open: &mut Vec<u32>| {
-            if inside[from as usize] && !reached[from as usize] && is_allowed(choice) {
-                reached[from as usize] = true;
-                open.push(from);
-            }
-        };
-        for one in &before.leaving {
-            reach(one, &mut open);
-        }
-        while let Some(to) = open.pop() {
-            for one in before.of(to) {
-                reach(one, &mut open);
-            }
-        }
-        cancellation::work(nodes.len());
-        if reached == inside {
-            break;
-        }
-        inside = reached;
-    }
-    for &node in nodes {
-        cyclic.places[node as usize] = u32::MAX;
-    }
-    let kept = nodes.iter().zip(inside).filter(|one| one.1);
-    kept.map(|one| *one.0).collect()
-}
-
-/// The ways of a component, by where they lead: each as the place of the node and the choice.
-struct Backwards {
-    ends: Vec<u32>,
-    ways: Vec<(u32, u32)>,
-    /// Those that lead out of it.
-    leaving: Vec<(u32, u32)>,
-}
-
-impl Backwards {
-    fn new(process: &Process, nodes: &[u32], places: &[u32]) -> Backwards {
-        let mut leaving = Vec::new();
-        let mut ends = vec![0; nodes.len() + 1];
-        for &node in nodes {
-            for way in process.ways_of_node(node) {
-                let place = places[process.targets[way] as usize];
-                if place != u32::MAX {
-                    ends[place as usize + 1] += 1;
-                }
-            }
-        }
-        for place in 0..nodes.len() {
-            ends[place + 1] += ends[place];
-        }
-        let mut ways = vec![(0, 0); ends[nodes.len()] as usize];
-        let mut next = ends.clone();
-        for (from, &node) in (0..).zip(nodes) {
-            for choice in process.choices(node) {
-                for (target, _) in process.outcomes(choice) {
-                    let way = (from, choice as u32);
-                    match places[target as usize] {
-                        u32::MAX => leaving.push(way),
-                        place => {
-                            ways[next[place as usize] as usize] = way;
-                            next[place as usize] += 1;
-                        }
-                    }
-                }
-            }
-        }
-        Backwards { ends, ways, leaving }
-    }
-
-    /// Those that lead to the node with this place.
-    fn of(&self, place: u32) -> &[(u32, u32)] {
-        let place = place as usize;
-        &self.ways[self.ends[place] as usize..self.ends[place + 1] as usize]
-    }
-}
-
 /// The component of these groups of nodes. `inner` choices of the process are left out, as are
 /// those that may lead where no strategy ends.
 fn local(cyclic: &mut Cyclic<'_>, groups: &[Vec<u32>], inner: &[u32]) -> Local {
@@ -280,7 +186,11 @@ fn end_components(local: &Local, may: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
         }
         let mut changes = false;
         for node in 0..local.nodes() {
-            for choice in local.choices(node).filter(|&choice| is_kept[choice]).collect::<Vec<_>>() {
+            for choice in local
+                .choices(node)
+                .filter(|&choice| is_kept[choice])
+                .collect::<Vec<_>>()
+            {
                 let mut targets = local.targets[local.ways(choice)].iter();
                 if targets.any(|&to| part_of[to as usize] != part_of[node]) {
                     is_kept[choice] = false;
@@ -304,11 +214,7 @@ fn end_components(local: &Local, may: impl Fn(usize) -> bool) -> Vec<Vec<u32>> {
 
 /// Puts the nodes of end components together; returns the groups, and the choices of the process
 /// that are inside, ascending.
-fn merged(
-    local: &Local,
-    groups: Vec<Vec<u32>>,
-    parts: &[Vec<u32>],
-) -> (Vec<Vec<u32>>, Vec<u32>) {
+fn merged(local: &Local, groups: Vec<Vec<u32>>, parts: &[Vec<u32>]) -> (Vec<Vec<u32>>, Vec<u32>) {
     let mut owner: Vec<u32> = (0..local.nodes() as u32).collect();
     let mut inner = Vec::new();
     for choices in parts {

@@ -34,8 +34,12 @@ pub(super) struct Cyclic<'s> {
 
 /// So many sweeps, and the bounds are as near as they come.
 const MOST_SWEEPS: usize = 100_000;
-/// Bounds are guessed after so many sweeps first, and then after twice as many each time.
-const FIRST_GUESS: usize = 8;
+/// So many guesses of upper bounds, and there are none.
+const MOST_GUESSES: usize = 12;
+/// After a guess that was wrong, lower bounds must rise so many times less.
+const NEARER: f64 = 8.0;
+/// A guess takes so many sweeps more than there were before, at most.
+const FIRST_SWEEPS: usize = 64;
 /// A mean number of moves counts as an upper bound if each move takes this much of it, or more.
 const STEP: f64 = 0.5;
 
@@ -47,22 +51,27 @@ pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
         return Ok(());
     };
     let mut lower = local.start();
-    let mut sweeps = 0;
-    let mut until = FIRST_GUESS;
+    let (mut sweeps, mut guesses) = (0, 0);
+    let mut near = precision;
     loop {
-        while sweeps < until {
-            local.raise(&mut lower);
-            sweeps += 1;
+        let rise = local.raise(&mut lower);
+        sweeps += 1;
+        let scale = lower.iter().map(|one| one.abs()).fold(0.0, f64::max);
+        if rise <= near * scale {
+            let policy = local.best(&lower);
+            let most = (sweeps + FIRST_SWEEPS) << guesses;
+            let slack = precision * scale + local.gap_behind;
+            if let Some(upper) = local.upper(&lower, &policy, slack, most) {
+                let found = (&lower[..], &upper[..], &policy[..]);
+                members.give(cyclic.process, &local, found, cyclic.solution);
+                return Ok(());
+            }
+            near /= NEARER;
+            guesses += 1;
         }
-        let policy = local.best(&lower);
-        if let Some(upper) = local.upper(&lower, &policy, precision, 4 * until) {
-            members.give(cyclic.process, &local, (&lower, &upper, &policy), cyclic.solution);
-            return Ok(());
-        }
-        if sweeps > MOST_SWEEPS {
+        if sweeps > MOST_SWEEPS || guesses > MOST_GUESSES {
             return Err(Unsolved::Slow);
         }
-        until *= 2;
     }
 }
 
@@ -72,21 +81,25 @@ impl Local {
         let least = self.least_behind;
         let deepest = self.costs.iter().copied().fold(0.0, f64::min);
         match &self.longest {
-            Some(longest) if deepest < 0.0 => {
-                longest.iter().map(|moves| least + deepest * moves).collect()
-            }
+            Some(longest) if deepest < 0.0 => longest
+                .iter()
+                .map(|moves| least + deepest * moves)
+                .collect(),
             _ => vec![least; self.nodes()],
         }
     }
 
-    /// One sweep of value iteration.
-    fn raise(&self, values: &mut [f64]) {
+    /// One sweep of value iteration; returns the greatest rise.
+    fn raise(&self, values: &mut [f64]) -> f64 {
+        let mut rise: f64 = 0.0;
         for node in 0..self.nodes() {
             let totals = self.choices(node).map(|choice| self.total(choice, values));
             let best = totals.fold(f64::INFINITY, f64::min);
+            rise = rise.max(best - values[node]);
             values[node] = values[node].max(best);
         }
         cancellation::work(self.targets.len());
+        rise
     }
 
     /// What a choice costs by lower bounds.
@@ -122,15 +135,9 @@ impl Local {
         (0..self.nodes()).map(best).collect()
     }
 
-    /// Upper bounds of what a policy costs that are near enough to the lower bounds; `None` if
-    /// these are not good enough.
-    fn upper(
-        &self,
-        lower: &[f64],
-        policy: &[u32],
-        precision: f64,
-        most: usize,
-    ) -> Option<Vec<f64>> {
+    /// Upper bounds of what a policy costs that are as near to the lower bounds as `slack`; `None`
+    /// if so many sweeps find none.
+    fn upper(&self, lower: &[f64], policy: &[u32], slack: f64, most: usize) -> Option<Vec<f64>> {
         let moves = self.moves_of(policy, most)?;
         let above = |node: usize| {
             let choice = policy[node] as usize;
@@ -141,8 +148,6 @@ impl Local {
         for (upper, moves) in upper.iter_mut().zip(&moves) {
             *upper += excess / STEP * moves;
         }
-        let scale = lower.iter().map(|one| one.abs()).fold(0.0, f64::max);
-        let slack = precision * scale + self.gap_behind;
         for _ in 0..most {
             let mut gap: f64 = 0.0;
             for node in 0..self.nodes() {

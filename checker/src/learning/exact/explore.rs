@@ -12,6 +12,8 @@ use crate::stochastic::{Behaviour, Failure, NotFinite, PossibleMove, Stage, Unfo
 const MOST_STATES: u32 = 10_000_000;
 /// As are those with more ways.
 const MOST_WAYS: usize = 1 << 30;
+/// And those that take more bytes.
+const MOST_BYTES: u64 = 4 << 30;
 /// Limits are looked at after so many states.
 const STATES_BETWEEN_LOOKS: u32 = 256;
 
@@ -71,10 +73,12 @@ pub(super) fn explore<'n>(
     let mut next = 0;
     while next < explored.states.len() {
         if next % STATES_BETWEEN_LOOKS == 0 {
-            if let Some(reason) = look(&explored.counters(next)) {
+            let counters = explored.counters(next);
+            if let Some(reason) = look(&counters) {
                 return Ok(Err(Unexplored::Limit(reason)));
             }
-            if explored.states.len() > MOST_STATES || explored.process.ways() > MOST_WAYS {
+            let is_large = explored.states.len() > MOST_STATES || counters.bytes > MOST_BYTES;
+            if is_large || explored.process.ways() > MOST_WAYS {
                 return Ok(Err(Unexplored::TooLarge));
             }
         }
@@ -91,17 +95,22 @@ pub(super) fn explore<'n>(
         }
         next += 1;
     }
+    if let Some(reason) = look(&explored.counters(next)) {
+        return Ok(Err(Unexplored::Limit(reason)));
+    }
     Ok(Ok(explored))
 }
 
 impl Explored<'_> {
     pub(super) fn counters(&self, explored: u32) -> Counters {
         let stored = u64::from(self.states.len());
+        let seen =
+            (self.keys.capacity() + self.decisions.capacity()) * 4 + self.points.capacity() * 8;
         Counters {
             explored: u64::from(explored),
             stored,
             waiting: stored - u64::from(explored),
-            bytes: self.states.bytes() + self.process.bytes(),
+            bytes: self.states.bytes() + self.process.bytes() + seen as u64,
         }
     }
 

@@ -9,6 +9,7 @@
 mod collapse;
 mod components;
 mod cycles;
+mod ending;
 mod explore;
 mod policy;
 mod process;
@@ -93,6 +94,10 @@ pub fn solve_exactly(
     if !network.externals.is_empty() {
         return Ok(ExactAnswer::Left(Inexact::Library));
     }
+    if behaviour.restriction.is_some() && asked.bound.limit != RunLimit::Time {
+        // It may look at the time, which is then no part of the state.
+        return Ok(ExactAnswer::Left(Inexact::NotFinite(NotFinite::Demand)));
+    }
     if let Some(features) = &asked.features {
         return solve_for(behaviour, asked, features.clone(), None, look);
     }
@@ -100,7 +105,8 @@ pub fn solve_exactly(
     let mut with_time = observation.clone();
     let found = solve_for(behaviour, asked, observation, None, look)?;
     // How much time is left is part of the whole state, too, if a clock shows it.
-    if let (ExactAnswer::Left(Inexact::Hidden), Some(clock)) = (&found, clock_of_time(asked, network))
+    if let (ExactAnswer::Left(Inexact::Hidden), Some(clock)) =
+        (&found, clock_of_time(asked, network))
         && !with_time.continuous.contains(&clock)
     {
         with_time.continuous.push(clock.clone());
@@ -151,7 +157,11 @@ fn solve_for(
         kept.extend(features(&observation).flat_map(words_of));
     }
     kept.extend(shown.into_iter().flat_map(words_of));
-    let asked_about: &[u32] = if asked.features.is_none() { &words } else { &[] };
+    let asked_about: &[u32] = if asked.features.is_none() {
+        &words
+    } else {
+        &[]
+    };
     let mut explored = loop {
         let counting = Counting::new(network, asked, &observation, &kept, is_refined);
         let seen = (&observation, asked_about);

@@ -10,6 +10,7 @@
 use super::explore::Explored;
 use super::process::Process;
 use super::solve::Solution;
+use crate::cancellation;
 use crate::learning::strategy::{Ranked, Rated};
 
 /// Actions whose costs differ by less than this part are as good as each other, if that is needed
@@ -101,6 +102,7 @@ impl Chooser<'_> {
 
     /// The tree of some decisions; `None` if it cannot be cut any more, but must.
     fn tree(&mut self, places: &mut [u32]) -> Option<Ranked> {
+        cancellation::work(places.len());
         if let Some(leaf) = self.leaf(places) {
             return Some(Ranked::Cell(leaf));
         }

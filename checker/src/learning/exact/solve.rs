@@ -15,6 +15,7 @@
 use super::components::components;
 use super::cycles::{self, Cyclic};
 use super::process::Process;
+use crate::cancellation;
 
 /// The bounds, and who attains the upper one.
 #[derive(Debug)]
@@ -57,6 +58,7 @@ pub(super) fn solve(process: &Process) -> Result<Solution, Unsolved> {
         };
         let mut places = Vec::new();
         for part in 0..parts.len() {
+            cancellation::work(parts.nodes(part).len());
             match parts.nodes(part) {
                 &[node] if !process.returns(node) => solution.look_at(process, node),
                 nodes => {

@@ -14,7 +14,9 @@ use rustc_hash::FxBuildHasher;
 
 use crate::analysis::{Influence, LiveVariables};
 use crate::exec::arithmetic::{double_of_words, double_words};
-use crate::ir::{Aim, FunctionId, Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape};
+use crate::ir::{
+    Aim, FunctionId, Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape,
+};
 use crate::learning::whole_state::functions;
 use crate::stochastic::Stage;
 
@@ -65,8 +67,8 @@ impl<'n> Counting<'n> {
         hidden[chances.stream as usize..][..STREAM_WORDS].fill(true);
         let seconds = second_words(network);
         let counts = |&word: &u32| {
-            let differs = influence.differs(word)
-                || seconds[word as usize] && influence.differs(word - 1);
+            let differs =
+                influence.differs(word) || seconds[word as usize] && influence.differs(word - 1);
             let is_location = (word as usize) < network.processes.len();
             let counts = differs || is_location || is_refined || kept.contains(&word);
             counts && !hidden[word as usize]
@@ -242,7 +244,8 @@ impl<'n> States<'n> {
     /// Makes the state with a number.
     pub(super) fn load(&self, number: u32, words: &mut Vec<i32>) -> Stage {
         let width = self.counting.width();
-        self.counting.read(&self.keys[number as usize * width..][..width], words)
+        self.counting
+            .read(&self.keys[number as usize * width..][..width], words)
     }
 }
 

@@ -8,7 +8,10 @@ struct Numbers(u64);
 
 impl Numbers {
     fn below(&mut self, count: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
         (self.0 >> 33) % count
     }
 }
@@ -96,7 +99,9 @@ fn cost(process: &Process, policy: &[usize]) -> Option<f64> {
 /// The least cost of all strategies without memory.
 fn least(process: &Process) -> Option<f64> {
     let nodes = process.nodes();
-    let mut policy: Vec<usize> = (0..nodes as u32).map(|node| process.choices(node).start).collect();
+    let mut policy: Vec<usize> = (0..nodes as u32)
+        .map(|node| process.choices(node).start)
+        .collect();
     let mut best: Option<f64> = None;
     loop {
         if let Some(cost) = cost(process, &policy) {
@@ -124,19 +129,28 @@ fn agrees(process: &Process, seed: u64) {
         Err(reason) => {
             assert_ne!(reason, Unsolved::Slow, "seed {seed}");
             let all = &process.costs;
-            assert!(all.iter().any(|&cost| cost < 0.0), "seed {seed}: {reason:?}");
+            assert!(
+                all.iter().any(|&cost| cost < 0.0),
+                "seed {seed}: {reason:?}"
+            );
             return;
         }
     };
     let (lower, upper) = (solution.lower[0], solution.upper[0]);
     let Some(exact) = least(process) else {
-        assert!(upper.is_infinite(), "seed {seed}: no strategy ends, {upper}");
+        assert!(
+            upper.is_infinite(),
+            "seed {seed}: no strategy ends, {upper}"
+        );
         return;
     };
     let slack = 1e-9 * exact.abs().max(1.0);
     assert!(lower <= exact + slack, "seed {seed}: {lower} > {exact}");
     assert!(exact <= upper + slack, "seed {seed}: {exact} > {upper}");
-    assert!(upper - lower <= 1e-6 * exact.abs() + slack, "seed {seed}: {lower}, {upper}");
+    assert!(
+        upper - lower <= 1e-6 * exact.abs() + slack,
+        "seed {seed}: {lower}, {upper}"
+    );
     let policy: Vec<usize> = solution
         .policy
         .iter()

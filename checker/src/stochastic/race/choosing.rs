@@ -176,7 +176,11 @@ impl Race<'_> {
     }
 
     /// Whether time can pass while the controller makes none of these moves.
-    pub(super) fn can_time_pass(&mut self, program: &Program<'_>, moves: &[u32]) -> Result<bool, Failure> {
+    pub(super) fn can_time_pass(
+        &mut self,
+        program: &Program<'_>,
+        moves: &[u32],
+    ) -> Result<bool, Failure> {
         if self.committed > 0 || self.bounds.iter().any(|&bound| bound <= TOLERANCE) {
             return Ok(false);
         }

@@ -27,13 +27,16 @@
 mod advised;
 mod choosing;
 mod direct;
+mod drawn;
+mod outcomes;
 mod outputs;
 mod planning;
 mod transition;
 mod unfolding;
 
-pub(super) use unfolding::{Drawn, Step, Unfolded};
+pub(super) use drawn::Drawn;
 pub use unfolding::NotFinite;
+pub(super) use unfolding::{Step, Unfolded};
 
 use std::cell::Cell;
 

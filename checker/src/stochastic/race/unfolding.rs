@@ -11,15 +11,13 @@
 //!   too, and legs and branches come by weight.
 //! * What a process plans does not depend on when it has planned; so a state is all that counts.
 
-use std::collections::BTreeMap;
-
+use super::outcomes::{Context, Entries, Found, Lottery, known};
 use super::{Next, Race};
-use crate::ir::{Aim, Optimum, ProcessId, RunLimit, STREAM_WORDS, Urgency};
+use crate::ir::{Aim, Optimum, RunLimit, Urgency};
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::failure::{Failure, Stand};
 use crate::stochastic::observer::{aim_of, watched};
-use crate::stochastic::program::{Instance, Program};
-use crate::stochastic::rules;
+use crate::stochastic::program::Program;
 use crate::stochastic::run::rest;
 
 /// Why a state has no finite number of outcomes with known chances.
@@ -37,32 +35,6 @@ pub enum NotFinite {
     Rounded(Stand),
     /// The strategy that is refined demands moves at certain times.
     Demand,
-}
-
-/// Which delays would be drawn.
-#[derive(Clone, Debug)]
-pub(in crate::stochastic) struct Drawn {
-    /// Of the plan that is being made.
-    is_drawn: bool,
-    of_process: Vec<bool>,
-}
-
-impl Drawn {
-    pub(in crate::stochastic) fn new(processes: usize) -> Drawn {
-        Drawn {
-            is_drawn: false,
-            of_process: vec![false; processes],
-        }
-    }
-
-    pub(super) fn note(&mut self, is_drawn: bool) {
-        self.is_drawn |= is_drawn;
-    }
-
-    /// The plan is that of this process.
-    pub(super) fn keep(&mut self, process: usize) {
-        self.of_process[process] = std::mem::take(&mut self.is_drawn);
-    }
 }
 
 /// A state of which all is asked that may come next.
@@ -116,26 +88,11 @@ impl Unfolded {
     }
 }
 
-/// Some instances, one of which is taken, with their chances.
-type Lottery = Vec<(u32, f64)>;
-
 /// Who may move next, and when.
 struct Rivals {
     delay: f64,
     winners: Vec<usize>,
     stopped_by: Option<usize>,
-}
-
-type Found<T> = Result<Result<T, NotFinite>, Failure>;
-
-/// Goes on with what was found, or returns why nothing can be.
-macro_rules! known {
-    ($found:expr) => {
-        match $found? {
-            Ok(known) => known,
-            Err(reason) => return Ok(Err(reason)),
-        }
-    };
 }
 
 impl Race<'_> {
@@ -216,7 +173,7 @@ impl Race<'_> {
     }
 
     /// What the state says of the value.
-    fn worth(&mut self, aim: Aim) -> Result<f64, Failure> {
+    pub(super) fn worth(&mut self, aim: Aim) -> Result<f64, Failure> {
         match aim {
             Aim::Probability => Ok(0.0),
             _ => aim_of(self, aim, false, 0.0),
@@ -235,8 +192,7 @@ impl Race<'_> {
             return Ok(Ok(Rivals {
                 delay: 0.0,
                 winners,
-                stopped_by: all
-                    .find(|&one| self.urgency(one) == Urgency::Committed),
+                stopped_by: all.find(|&one| self.urgency(one) == Urgency::Committed),
             }));
         }
         self.plan_anew(program)?;
@@ -273,23 +229,6 @@ impl Race<'_> {
         }))
     }
 
-    /// Takes those out of the race whose delays would be drawn; returns when the first of them
-    /// could move, and who.
-    fn set_drawn_apart(&mut self) -> Option<(f64, usize)> {
-        let drawn = self.drawn.as_ref().expect("nothing is drawn");
-        let mut earliest: Option<(f64, usize)> = None;
-        for (process, &is_drawn) in drawn.of_process.iter().enumerate() {
-            if !is_drawn {
-                continue;
-            }
-            let low = std::mem::replace(&mut self.attempts[process], f64::INFINITY);
-            if low.is_finite() && earliest.is_none_or(|(known, _)| low < known) {
-                earliest = Some((low, process));
-            }
-        }
-        earliest
-    }
-
     /// The processes with an output that is enabled now, or of those in committed locations.
     fn all_with_outputs(
         &mut self,
@@ -299,8 +238,7 @@ impl Race<'_> {
         let mut all = Vec::new();
         loop {
             for process in 0..self.locations.len() {
-                let is_asked =
-                    !only_committed || self.urgency(process) == Urgency::Committed;
+                let is_asked = !only_committed || self.urgency(process) == Urgency::Committed;
                 if is_asked && self.find_outputs(program, process)? {
                     all.push(process);
                 }
@@ -334,7 +272,7 @@ impl Race<'_> {
             }
             let entries = self.entries(program);
             let each = share / entries.len() as f64;
-            for legs in entries.values() {
+            for legs in entries.iter() {
                 if self.is_decided(program.instance(legs[0])) {
                     found.asked += each;
                     decides = decides.or(Some(winner));
@@ -367,15 +305,24 @@ impl Race<'_> {
         if self.can_time_pass(program, &moves)? {
             return Ok(Err(NotFinite::Wait(self.stand(winner))));
         }
+        let mut known: Option<(u32, Entries)> = None;
         for &entry in &moves {
-            let process = program.instance(entry).process as usize;
-            self.find_outputs(program, process)?;
-            let entries = self.entries(program);
-            let legs = entries.get(&entry).cloned().unwrap_or_default();
-            for (instance, chance) in self.of_legs(program, &legs, 1.0)? {
+            let process = program.instance(entry).process;
+            let entries = match known.take_if(|known| known.0 == process) {
+                Some((_, entries)) => entries,
+                None => {
+                    self.find_outputs(program, process as usize)?;
+                    self.entries(program)
+                }
+            };
+            let is_it = |legs: &&[u32]| program.instance(legs[0]).entry == entry;
+            let legs = entries.iter().find(is_it);
+            let legs = legs.expect("the controller can make the move");
+            for (instance, chance) in self.of_legs(program, legs, 1.0)? {
                 known!(self.outcomes_of(program, context, instance, chance, found));
             }
             found.choices.push((Some(entry), found.outcomes.len()));
+            known = Some((process, entries));
         }
         let waits = self.advice.as_ref().is_none_or(|one| one.waits());
         if let Some(control) = &mut self.control {
@@ -414,7 +361,7 @@ impl Race<'_> {
             }
             let entries = self.entries(program);
             let each = share / entries.len() as f64;
-            for legs in entries.values() {
+            for legs in entries.iter() {
                 for (instance, chance) in self.of_legs(program, legs, each)? {
                     known!(self.outcomes_of(program, context, instance, chance, found));
                 }
@@ -422,231 +369,4 @@ impl Race<'_> {
         }
         Ok(Ok(()))
     }
-
-    /// The instances that are enabled, by their entries.
-    fn entries(&self, program: &Program<'_>) -> BTreeMap<u32, Vec<u32>> {
-        by_entry(program, &self.choices)
-    }
-
-    /// The legs of an entry, of which one is taken by weight.
-    fn of_legs(
-        &mut self,
-        program: &Program<'_>,
-        legs: &[u32],
-        chance: f64,
-    ) -> Result<Lottery, Failure> {
-        if let [only] = *legs
-            && program.instance(only).edge.leg.is_none()
-        {
-            return Ok(vec![(only, chance)]);
-        }
-        let mut weights = Vec::with_capacity(legs.len());
-        for &leg in legs {
-            weights.push(self.weight(program, program.instance(leg), 0)?);
-        }
-        let first = program.instance(legs[0]);
-        let shares = self.shares(first, &weights, chance)?;
-        Ok(legs.iter().copied().zip(shares).filter(|one| one.1 > 0.0).collect())
-    }
-
-    fn weight(
-        &mut self,
-        program: &Program<'_>,
-        mover: &Instance<'_>,
-        branch: usize,
-    ) -> Result<f64, Failure> {
-        let weight = rules::number(self, program.weight(mover, branch), &mover.values)?;
-        if weight >= 0.0 && weight.is_finite() {
-            Ok(weight)
-        } else {
-            Err(Failure::Weight(self.stand(mover.process as usize), mover.id))
-        }
-    }
-
-    /// The chances of some weights.
-    fn shares(
-        &self,
-        mover: &Instance<'_>,
-        weights: &[f64],
-        chance: f64,
-    ) -> Result<Vec<f64>, Failure> {
-        let total: f64 = weights.iter().sum();
-        if total > 0.0 {
-            return Ok(weights.iter().map(|weight| chance * weight / total).collect());
-        }
-        Err(Failure::NoWeight(self.stand(mover.process as usize), mover.id))
-    }
-
-    /// Adds all outcomes of the move that a sender begins.
-    fn outcomes_of(
-        &mut self,
-        program: &Program<'_>,
-        context: &mut Context,
-        sender: u32,
-        chance: f64,
-        found: &mut Unfolded,
-    ) -> Found<()> {
-        let mut moves: Vec<(Vec<u32>, f64)> = vec![(vec![sender], 1.0)];
-        let instance = program.instance(sender);
-        if let Some(channel) = self.channel(instance)? {
-            for receivers in self.receivers_of(program, instance, channel)? {
-                let with = moves.iter().flat_map(|(movers, chance)| {
-                    receivers.iter().map(move |&(one, share)| {
-                        let movers = movers.iter().copied().chain([one]);
-                        (movers.collect(), chance * share)
-                    })
-                });
-                moves = with.collect();
-            }
-            moves.retain(|(movers, _)| {
-                self.movers.clear();
-                self.movers.extend(movers.iter().map(|&one| (one, 0)));
-                self.allows_move(program)
-            });
-            let total: f64 = moves.iter().map(|one| one.1).sum();
-            if moves.is_empty() {
-                return Err(Failure::NoProgress(self.stand(instance.process as usize)));
-            }
-            for one in &mut moves {
-                one.1 /= total;
-            }
-        }
-        for (movers, share) in moves {
-            known!(self.branches_of(program, context, &movers, chance * share, found));
-        }
-        Ok(Ok(()))
-    }
-
-    /// Of each receiver, or of the one receiver, which instances it may be.
-    fn receivers_of(
-        &mut self,
-        program: &Program<'_>,
-        sender: &Instance<'_>,
-        channel: u32,
-    ) -> Result<Vec<Lottery>, Failure> {
-        let is_broadcast = self.network().channels[channel as usize].broadcast;
-        let is_committed = |race: &Self, process: u32| {
-            race.urgency(process as usize) == Urgency::Committed
-        };
-        let needs_commitment =
-            !is_broadcast && self.committed > 0 && !is_committed(self, sender.process);
-        let mut lotteries = Vec::new();
-        self.movers.clear();
-        for &process in program.receivers(channel) {
-            if process == sender.process
-                || (needs_commitment && !is_committed(self, process))
-            {
-                continue;
-            }
-            self.add_ready(program, process, channel)?;
-            if is_broadcast {
-                lotteries.extend(self.one_of_movers(program)?);
-            }
-        }
-        if !is_broadcast {
-            lotteries.extend(self.one_of_movers(program)?);
-        }
-        Ok(lotteries)
-    }
-
-    fn one_of_movers(&mut self, program: &Program<'_>) -> Result<Option<Lottery>, Failure> {
-        if self.movers.is_empty() {
-            return Ok(None);
-        }
-        let inputs: Vec<u32> = self.movers.drain(..).map(|mover| mover.0).collect();
-        let entries = by_entry(program, &inputs);
-        let each = 1.0 / entries.len() as f64;
-        let mut lottery = Lottery::new();
-        for legs in entries.values() {
-            lottery.extend(self.of_legs(program, legs, each)?);
-        }
-        Ok(Some(lottery))
-    }
-
-    /// Adds an outcome for each combination of the branches of those that move.
-    fn branches_of(
-        &mut self,
-        program: &Program<'_>,
-        context: &mut Context,
-        movers: &[u32],
-        chance: f64,
-        found: &mut Unfolded,
-    ) -> Found<()> {
-        let mut ways: Vec<(Vec<u32>, f64)> = vec![(Vec::new(), chance)];
-        for &mover in movers {
-            let instance = program.instance(mover);
-            let branches = instance.edge.branches.len();
-            let shares = if branches < 2 {
-                vec![1.0]
-            } else {
-                let mut weights = Vec::with_capacity(branches);
-                for branch in 0..branches {
-                    weights.push(self.weight(program, instance, branch)?);
-                }
-                self.shares(instance, &weights, 1.0)?
-            };
-            let with = ways.iter().flat_map(|(way, chance)| {
-                let shares = (0..).zip(&shares).filter(|(_, share)| **share > 0.0);
-                shares.map(move |(branch, share)| {
-                    (way.iter().copied().chain([branch]).collect(), chance * share)
-                })
-            });
-            ways = with.collect();
-        }
-        for (way, chance) in ways {
-            self.movers.clear();
-            self.movers.extend(movers.iter().copied().zip(way));
-            known!(self.outcome(program, context, chance, found));
-        }
-        Ok(Ok(()))
-    }
-
-    /// Adds the state after the move that `movers` make, and goes back.
-    fn outcome(
-        &mut self,
-        program: &Program<'_>,
-        context: &mut Context,
-        chance: f64,
-        found: &mut Unfolded,
-    ) -> Found<()> {
-        self.run_updates(program)?;
-        for index in 0..self.movers.len() {
-            let (number, branch) = self.movers[index];
-            let mover = program.instance(number);
-            let target = mover.edge.branches[branch as usize].target;
-            self.machine.enter(ProcessId(mover.process), target);
-        }
-        if let Some(update) = &self.network().after_update {
-            self.machine.update(update, &[])?;
-        }
-        let stream = self.network().chances.stream as usize;
-        let stream = stream..stream + STREAM_WORDS;
-        if self.machine.words()[stream.clone()] != context.base[stream] {
-            let sender = program.instance(self.movers[0].0);
-            return Ok(Err(NotFinite::Random(self.stand(sender.process as usize))));
-        }
-        let gain = self.worth(context.aim)? - context.before;
-        found.outcomes.push(Outcome { chance, gain });
-        found.words.extend_from_slice(self.machine.words());
-        self.machine.restore(&context.base);
-        Ok(Ok(()))
-    }
-}
-
-/// What all outcomes of a state share.
-struct Context {
-    aim: Aim,
-    /// What the state said of the value before the delay.
-    before: f64,
-    /// The words after the delay.
-    base: Vec<i32>,
-}
-
-fn by_entry(program: &Program<'_>, instances: &[u32]) -> BTreeMap<u32, Vec<u32>> {
-    let mut entries: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for &one in instances {
-        let entry = program.instance(one).entry;
-        entries.entry(entry).or_default().push(one);
-    }
-    entries
 }
