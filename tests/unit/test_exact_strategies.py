@@ -11,17 +11,16 @@ from pathlib import Path
 import pytest
 
 from ntagen.checker import Answer, RejectedError, load
+from tests.benchmarks.best_strategy import GAMES
 from tests.oracles.learning.cases import CASES, HELD_BACK, Case, Method
 
-COMPUTED = [
-    case for case in CASES + HELD_BACK if case.method in (Method.FINITE, Method.STEPS)
-]
+COMPUTED = [case for case in CASES + HELD_BACK if case.method in (Method.FINITE, Method.STEPS)]
 NEAR = 1e-6
 
 
-def asked(text: str, query: str, name: str = "model.xta", **options: object) -> Answer:
+def asked(text: str, query: str, *, states: int | None = None) -> Answer:
     """The answer to a query for a strategy, named S."""
-    return load(text, name).check(f"strategy S = {query}", **options)
+    return load(text).check(f"strategy S = {query}", states=states)
 
 
 def assert_computed(answer: Answer, exact: float) -> None:
@@ -134,6 +133,84 @@ def test_limits_leave_it_to_learning() -> None:
     path = Path(__file__).parents[1] / "oracles" / "learning" / "parts.xta"
     answer = asked(path.read_text(encoding="utf-8"), "minE(cost)[<=1]: <> Shop.Done", states=5)
     assert "not computed exactly: there are more states than allowed" in (answer.message or "")
+
+
+# Two processes of the environment and one of the controller compete where time stands still;
+# afterwards two move at the same moment, one of them with two kinds of listeners.
+RACE = """
+broadcast chan all;
+int a, cost;
+clock x;
+process Control() {
+  state C, D { x <= 2 }, E;
+  urgent C;
+  init C;
+  trans C -> D { assign cost += 2; }, C -> D { guard a > 2; assign cost += a; },
+        D -> E { guard x >= 2; assign cost += 3; }, D -> E { guard x >= 2; assign cost = 0; };
+}
+process Early(const int by) {
+  state U, V { x <= 2 }, W;
+  urgent U;
+  branchpoint B;
+  init U;
+  trans U -u-> V { assign a += by; }, U -u-> B { },
+        B -> V { assign a += 2 * by; probability 3; }, B -> V { probability 1; },
+        V -u-> W { guard x >= 2; sync all!; assign a += 1; };
+}
+process Listener() {
+  state L, M, N;
+  init L;
+  trans L -u-> M { sync all?; assign cost += a; }, L -u-> N { sync all?; assign cost -= 1; },
+        M -u-> N { sync all?; assign cost += 5; };
+}
+First = Early(1);
+Second = Early(3);
+One = Listener();
+Other = Listener();
+system Control, First, Second, One, Other;
+"""
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "minE(cost)[<=3]: <> x >= 3",
+        "maxE(cost)[<=3]: <> x >= 3",
+        "minE(cost + 1)[<=3]{a, cost, Control.location}->{x}: <> x >= 3",
+        "maxPr[<=3]: <> First.W && Second.W && cost > 12",
+        "minPr[<=3]: <> First.W && Second.W && cost > 12",
+        "maxPr[#<=4]: <> Control.E && a > 3",
+        "minPr[#<=4]: <> Control.E && a > 3",
+    ],
+)
+def test_runs_of_a_race_have_the_value_that_was_computed(query: str) -> None:
+    model = load(RACE)
+    answer = model.check(f"strategy S = {query}")
+    assert answer.estimate is not None
+    assert answer.estimate.is_computed, answer
+    bound = query[query.index("[") : query.index("]")]
+    goal = query[query.index("<>") :]
+    price = query[query.index("(") : query.index(")") + 1] if "(" in query else ""
+    follow = f"Pr{bound}]({goal})" if "Pr" in query else f"E{bound}](max: x >= 3 ? {price} : -99)"
+    found = model.check(f"{follow} under S", alpha=1e-6, seed=3, runs=50_000).estimate
+    assert found is not None
+    assert found.lower is not None
+    assert found.upper is not None
+    assert found.lower <= answer.estimate.value <= found.upper
+
+
+@pytest.mark.parametrize(
+    ("game", "value"), [("gambler", 0.286142419), ("grid", 209.309465), ("inventory", 242.950412)]
+)
+def test_larger_games_have_the_values_that_storm_finds(game: str, value: float) -> None:
+    instance = GAMES[game](10_000)
+    assert_computed(asked(instance.model, instance.query), value)
+
+
+def test_the_limit_of_time_ends_it() -> None:
+    instance = GAMES["grid"](1_000_000)
+    answer = load(instance.model).check(f"strategy S = {instance.query}", timeout_s=0.2)
+    assert (answer.verdict, answer.stop) == ("unknown", "time")
 
 
 # Random games: node s of some has edges to branch points, whose legs go to other nodes.

@@ -1,12 +1,15 @@
 //! States with all that may come next: what exact answers are computed from.
 
 use super::behaviour::Behaviour;
+use super::constants::TOLERANCE;
 use super::control::{Chooser, Chosen, Control, Guidance, Moment, StateView};
 use super::failure::Failure;
+use super::observer::{aim_of, watched};
 use super::program::Program;
-use super::race::{Drawn, NotFinite, Race, Step, Unfolded};
+use super::race::{Drawn, Found, NotFinite, Race, Unfolded, known};
+use super::run::rest;
 use super::run_id::RunId;
-use crate::ir::{Aim, Optimum};
+use crate::ir::{Aim, Optimum, RunLimit};
 
 /// A state of a run, beside its words.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,19 +68,61 @@ impl<'a> Unfolder<'a> {
         words: &[i32],
         stage: Stage,
     ) -> Result<Result<(), NotFinite>, Failure> {
-        let Stage {
-            time,
-            moves,
-            is_asked,
-        } = stage;
-        let step = Step {
-            words,
-            time,
-            moves,
-            is_asked,
+        self.found.clear();
+        let before = known!(self.enter(asked, words, stage));
+        let Unfolder {
+            program,
+            race,
+            found,
+        } = self;
+        let bound = &asked.bound;
+        if bound.limit == RunLimit::Moves && stage.moves as f64 >= bound.value {
+            let end = watch(race, asked, 0.0)?.unwrap_or((false, 0.0));
+            return self.ends(asked, end, before);
+        }
+        let rest = rest(race, bound);
+        let rivals = known!(race.first_rivals(program, rest));
+        let slack = if rest > 0.0 {
+            TOLERANCE * bound.value.max(1.0)
+        } else {
+            TOLERANCE
         };
-        self.race
-            .unfold(&self.program, asked, step, &mut self.found)
+        let nobody = rivals.winners.is_empty();
+        let is_over = rest + slack < rivals.delay
+            || (nobody && rest.is_finite() && rest <= rivals.delay + slack);
+        let delay = rivals.delay.min(rest).max(0.0);
+        if let Some(end) = watch(race, asked, delay)? {
+            return self.ends(asked, end, before);
+        }
+        if is_over {
+            race.wait(delay)?;
+            return self.ends(asked, (false, 0.0), before);
+        }
+        if nobody {
+            return match race.lock_of(&rivals) {
+                Some(failure) => Err(failure),
+                None if bound.limit == RunLimit::Moves => self.ends(asked, (false, 0.0), before),
+                None => Err(Failure::BoundNeverReached),
+            };
+        }
+        known!(race.wait_for_rivals(delay));
+        found.delay = delay;
+        let is_asked = stage.is_asked;
+        race.go_on_from(program, asked.aim, &rivals.winners, before, is_asked, found)
+    }
+
+    /// Goes to a state; what it says of the value.
+    fn enter(&mut self, asked: &Optimum, words: &[i32], stage: Stage) -> Found<f64> {
+        let moment = (stage.time, stage.moves);
+        known!(self.race.go_to(&self.program, words, moment));
+        Ok(Ok(self.race.worth(asked.aim)?))
+    }
+
+    /// Notes that the run ends, satisfied or not, so much later.
+    fn ends(&mut self, asked: &Optimum, (satisfied, ahead): (bool, f64), before: f64) -> Found<()> {
+        let value = aim_of(&mut self.race, asked.aim, satisfied, ahead)?;
+        self.found.end = Some(value - before);
+        Ok(Ok(()))
     }
 
     /// What the run is worth beyond what its state says, if it ends in the last state.
@@ -144,6 +189,14 @@ impl<'a> Unfolder<'a> {
     /// The last state as whoever decides sees it, after the delay.
     pub fn view(&mut self) -> StateView<'_> {
         self.race.machine.view_of_state()
+    }
+}
+
+/// Whether what is to be reached is reached in the delay behind a state, and after which time.
+fn watch(race: &mut Race<'_>, asked: &Optimum, delay: f64) -> Result<Option<(bool, f64)>, Failure> {
+    match &asked.goal {
+        Some(goal) => watched(race, goal, delay),
+        None => Ok(None),
     }
 }
 

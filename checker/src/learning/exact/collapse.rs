@@ -11,10 +11,9 @@
 use std::ops::Range;
 
 use super::components::components;
-use super::cycles::Cyclic;
 use super::ending::ending;
 use super::process::Process;
-use super::solve::{Solution, Unsolved};
+use super::solution::{Cyclic, Solution, Unsolved};
 use crate::cancellation;
 
 /// The component, with what lies behind it as numbers.

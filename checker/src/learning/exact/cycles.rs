@@ -16,21 +16,8 @@
 //! J. Tsitsiklis, "An analysis of stochastic shortest path problems", Math. Oper. Res. 16 (1991).
 
 use super::collapse::{Local, collapsed};
-use super::process::Process;
-use super::solve::{Solution, Unsolved};
+use super::solution::{Cyclic, Unsolved};
 use crate::cancellation;
-
-/// A component.
-pub(super) struct Cyclic<'s> {
-    pub(super) process: &'s Process,
-    pub(super) nodes: &'s [u32],
-    /// By node of the process: room for its place in the component; all `u32::MAX`.
-    pub(super) places: &'s mut [u32],
-    /// Known behind the component.
-    pub(super) solution: &'s mut Solution,
-    /// How near the bounds are to be, as a part of the greatest value.
-    pub(super) precision: f64,
-}
 
 /// So many sweeps, and the bounds are as near as they come.
 const MOST_SWEEPS: usize = 100_000;
@@ -51,12 +38,14 @@ pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
         return Ok(());
     };
     let mut lower = local.start();
+    // Where costs cancel out, the bounds can be no nearer than their sums are rounded.
+    let costs = local.costs.iter().map(|one| one.abs()).fold(0.0, f64::max);
     let (mut sweeps, mut guesses) = (0, 0);
     let mut near = precision;
     loop {
         let rise = local.raise(&mut lower);
         sweeps += 1;
-        let scale = lower.iter().map(|one| one.abs()).fold(0.0, f64::max);
+        let scale = lower.iter().map(|one| one.abs()).fold(costs, f64::max);
         if rise <= near * scale {
             let policy = local.best(&lower);
             let most = (sweeps + FIRST_SWEEPS) << guesses;

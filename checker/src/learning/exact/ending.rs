@@ -3,8 +3,8 @@
 //! Source: L. de Alfaro, "Formal verification of probabilistic systems", thesis (1997):
 //! those that can reach the end by choices that never lead elsewhere, as often as that changes.
 
-use super::cycles::Cyclic;
 use super::process::Process;
+use super::solution::Cyclic;
 use crate::cancellation;
 
 /// The nodes from which some strategy ends almost surely, in their order.

@@ -13,6 +13,7 @@ mod ending;
 mod explore;
 mod policy;
 mod process;
+mod solution;
 mod solve;
 mod states;
 #[cfg(test)]
@@ -23,7 +24,8 @@ use std::sync::Arc;
 use self::explore::{Explored, Unexplored, explore};
 use self::policy::{Chosen, choose};
 use self::process::Process;
-use self::solve::{Solution, Unsolved, solve};
+use self::solution::{Solution, Unsolved};
+use self::solve::solve;
 use self::states::Counting;
 use super::strategy::LearnedStrategy;
 use super::whole_state::whole_state;
@@ -79,6 +81,8 @@ pub enum Inexact {
 
 /// The nearness of what the strategy is worth to the best value, as a part of it.
 const PRECISION: f64 = 1e-6;
+/// And as a part of the greatest cost of a move, where the costs of a run cancel out.
+const ROUNDING: f64 = 1e-10;
 
 /// Answers a query for the best strategy exactly, if that is possible. `look` sees the counters now
 /// and then; a reason ends it.
@@ -248,7 +252,9 @@ fn strategy(explored: &Explored<'_>, solution: &mut Solution) -> Option<Chosen> 
         }
         let alone = solve(&process.under(&taken)).ok()?;
         let (least, own) = (solution.lower[0], alone.upper[0]);
-        if !own.is_finite() || own - least > PRECISION * least.abs() {
+        let costs = process.costs.iter().map(|cost| cost.abs());
+        let rounding = ROUNDING * costs.fold(0.0, f64::max);
+        if !own.is_finite() || own - least > PRECISION * least.abs() + rounding {
             return None;
         }
         solution.upper[0] = own;

@@ -9,7 +9,7 @@
 
 use super::explore::Explored;
 use super::process::Process;
-use super::solve::Solution;
+use super::solution::Solution;
 use crate::cancellation;
 use crate::learning::strategy::{Ranked, Rated};
 

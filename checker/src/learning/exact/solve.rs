@@ -13,31 +13,10 @@
 //! Markov decision processes", CAV 2017.
 
 use super::components::components;
-use super::cycles::{self, Cyclic};
+use super::cycles;
 use super::process::Process;
+use super::solution::{Cyclic, Solution, Unsolved};
 use crate::cancellation;
-
-/// The bounds, and who attains the upper one.
-#[derive(Debug)]
-pub(super) struct Solution {
-    pub(super) lower: Vec<f64>,
-    pub(super) upper: Vec<f64>,
-    /// By node: the best choice.
-    pub(super) policy: Vec<u32>,
-    /// Whether no state comes again.
-    pub(super) is_acyclic: bool,
-}
-
-/// Why there are no bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Unsolved {
-    /// The cost falls without bound.
-    Unbounded,
-    /// Costs of both signs lie on cycles.
-    MixedCycles,
-    /// Bounds do not come near enough to each other.
-    Slow,
-}
 
 /// Bounds are to be this near to each other, as a part of the value.
 const PRECISION: f64 = 1e-6;

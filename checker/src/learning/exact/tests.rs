@@ -1,7 +1,8 @@
 //! Random processes against all their strategies, and what has no best strategy.
 
 use super::process::{NOBODY, Process};
-use super::solve::{Unsolved, solve};
+use super::solution::Unsolved;
+use super::solve::solve;
 
 /// Numbers that look random.
 struct Numbers(u64);
@@ -127,7 +128,7 @@ fn agrees(process: &Process, seed: u64) {
     let solution = match solve(process) {
         Ok(solution) => solution,
         Err(reason) => {
-            assert_ne!(reason, Unsolved::Slow, "seed {seed}");
+            assert_ne!(reason, Unsolved::Slow, "seed {seed}: {process:?}");
             let all = &process.costs;
             assert!(
                 all.iter().any(|&cost| cost < 0.0),

@@ -27,16 +27,15 @@
 mod advised;
 mod choosing;
 mod direct;
-mod drawn;
 mod outcomes;
 mod outputs;
 mod planning;
 mod transition;
+mod unfolded;
 mod unfolding;
 
-pub(super) use drawn::Drawn;
-pub use unfolding::NotFinite;
-pub(super) use unfolding::{Step, Unfolded};
+pub use unfolded::NotFinite;
+pub(super) use unfolded::{Drawn, Found, Unfolded, known};
 
 use std::cell::Cell;
 
@@ -123,7 +122,7 @@ pub(in crate::stochastic) struct Race<'a> {
     standstill: Option<(f64, usize)>,
     /// How long all invariants together let time pass, if that matters to the strategy.
     longest_stay: f64,
-    /// Which delays would be drawn, if none are: see [`unfolding`].
+    /// Which delays would be drawn, if none are: see `unfolding.rs`.
     pub(in crate::stochastic) drawn: Option<Drawn>,
 }
 

@@ -1,30 +1,12 @@
 //! The outcomes of moves, with their chances: which legs, receivers and branches take part, and
-//! what the updates do. See [`super::unfolding`].
+//! what the updates do. See `unfolding.rs`.
 
 use super::Race;
-use super::unfolding::{NotFinite, Outcome, Unfolded};
+use super::unfolded::{Found, Lottery, NotFinite, Outcome, Unfolded, known};
 use crate::ir::{Aim, ProcessId, STREAM_WORDS, Urgency};
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::{Instance, Program};
 use crate::stochastic::rules;
-
-/// Some instances, one of which is taken, with their chances.
-pub(super) type Lottery = Vec<(u32, f64)>;
-
-/// What was found, or why it is not finite.
-pub(super) type Found<T> = Result<Result<T, NotFinite>, Failure>;
-
-/// Goes on with what was found, or returns why nothing can be.
-macro_rules! known {
-    ($found:expr) => {
-        match $found? {
-            Ok(known) => known,
-            Err(reason) => return Ok(Err(reason)),
-        }
-    };
-}
-
-pub(super) use known;
 
 impl Race<'_> {
     /// The instances that are enabled, by their entries.

@@ -11,173 +11,67 @@
 //!   too, and legs and branches come by weight.
 //! * What a process plans does not depend on when it has planned; so a state is all that counts.
 
-use super::outcomes::{Context, Entries, Found, Lottery, known};
+use super::outcomes::{Context, Entries};
+use super::unfolded::{Found, Lottery, NotFinite, Rivals, Unfolded, known};
 use super::{Next, Race};
-use crate::ir::{Aim, Optimum, RunLimit, Urgency};
+use crate::ir::{Aim, Urgency};
 use crate::stochastic::constants::TOLERANCE;
-use crate::stochastic::failure::{Failure, Stand};
-use crate::stochastic::observer::{aim_of, watched};
+use crate::stochastic::failure::Failure;
 use crate::stochastic::program::Program;
-use crate::stochastic::run::rest;
-
-/// Why a state has no finite number of outcomes with known chances.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NotFinite {
-    /// The delay is drawn of a process that may move next.
-    Drawn(Stand),
-    /// The controller chooses how long it waits.
-    Wait(Stand),
-    /// The rates of clocks change as time passes.
-    Flow,
-    /// An update draws a random number.
-    Random(Stand),
-    /// Rounding has put the delay of a process beside the times at which it can move.
-    Rounded(Stand),
-    /// The strategy that is refined demands moves at certain times.
-    Demand,
-}
-
-/// A state of which all is asked that may come next.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::stochastic) struct Step<'s> {
-    pub(in crate::stochastic) words: &'s [i32],
-    /// How long the run has lasted.
-    pub(in crate::stochastic) time: f64,
-    /// How many moves it has made.
-    pub(in crate::stochastic) moves: u64,
-    /// Whether the controller is being asked, after chance has decided that it is.
-    pub(in crate::stochastic) is_asked: bool,
-}
-
-/// What may come next.
-#[derive(Clone, Debug, Default)]
-pub(in crate::stochastic) struct Unfolded {
-    /// What the run is worth beyond what its state says, if it ends here.
-    pub(in crate::stochastic) end: Option<f64>,
-    /// How long time passes before.
-    pub(in crate::stochastic) delay: f64,
-    /// The chance that the controller is asked.
-    pub(in crate::stochastic) asked: f64,
-    /// What it can do, each with the end of its outcomes; the first outcomes are those of nobody's
-    /// choice.
-    pub(in crate::stochastic) choices: Vec<(Option<u32>, usize)>,
-    /// The end of the outcomes of nobody's choice.
-    pub(in crate::stochastic) chance_end: usize,
-    pub(in crate::stochastic) outcomes: Vec<Outcome>,
-    /// The words of the states after the outcomes, one after the other.
-    pub(in crate::stochastic) words: Vec<i32>,
-}
-
-/// A move that may be made.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::stochastic) struct Outcome {
-    pub(in crate::stochastic) chance: f64,
-    /// By how much the value grows.
-    pub(in crate::stochastic) gain: f64,
-}
-
-impl Unfolded {
-    fn clear(&mut self) {
-        self.end = None;
-        self.delay = 0.0;
-        self.asked = 0.0;
-        self.choices.clear();
-        self.chance_end = 0;
-        self.outcomes.clear();
-        self.words.clear();
-    }
-}
-
-/// Who may move next, and when.
-struct Rivals {
-    delay: f64,
-    winners: Vec<usize>,
-    stopped_by: Option<usize>,
-}
 
 impl Race<'_> {
-    /// Finds all that may come next.
-    pub(in crate::stochastic) fn unfold(
+    /// What the state says of the value.
+    pub(in crate::stochastic) fn worth(&mut self, aim: Aim) -> Result<f64, Failure> {
+        match aim {
+            Aim::Probability => Ok(0.0),
+            Aim::Time => Ok(self.time),
+            Aim::Expected(number) => self.machine.real(number, &[]),
+        }
+    }
+
+    /// Goes to a state of which all is asked that may come next; without it if that is not finite.
+    pub(in crate::stochastic) fn go_to(
         &mut self,
         program: &Program<'_>,
-        asked: &Optimum,
-        step: Step<'_>,
-        found: &mut Unfolded,
+        words: &[i32],
+        (time, moves): (f64, u64),
     ) -> Found<()> {
-        found.clear();
-        self.machine.restore(step.words);
-        (self.time, self.moves) = (step.time, step.moves);
+        self.machine.restore(words);
+        (self.time, self.moves) = (time, moves);
         self.resume(program)?;
-        if self.motion.is_flowing() {
-            return Ok(Err(NotFinite::Flow));
-        }
-        let before = self.worth(asked.aim)?;
-        let bound = &asked.bound;
-        if bound.limit == RunLimit::Moves && self.moves as f64 >= bound.value {
-            let (end, ahead) = self.watch(asked, 0.0)?.unwrap_or((false, 0.0));
-            found.end = Some(aim_of(self, asked.aim, end, ahead)? - before);
-            return Ok(Ok(()));
-        }
-        let rest = rest(self, bound);
+        let flows = self.motion.is_flowing();
+        Ok(if flows { Err(NotFinite::Flow) } else { Ok(()) })
+    }
+
+    /// Who may move next if the run lasts so long from now on; no plan was made before.
+    pub(in crate::stochastic) fn first_rivals(
+        &mut self,
+        program: &Program<'_>,
+        rest: f64,
+    ) -> Found<Rivals> {
         self.rest = rest;
         self.take_advice(program)?;
         self.look_for_decisions(program);
-        let rivals = known!(self.rivals(program, rest));
-        let slack = if rest > 0.0 {
-            TOLERANCE * bound.value.max(1.0)
-        } else {
-            TOLERANCE
-        };
-        let nobody = rivals.winners.is_empty();
-        let is_over = rest + slack < rivals.delay
-            || (nobody && rest.is_finite() && rest <= rivals.delay + slack);
-        let delay = rivals.delay.min(rest).max(0.0);
-        if let Some((satisfied, ahead)) = self.watch(asked, delay)? {
-            found.end = Some(aim_of(self, asked.aim, satisfied, ahead)? - before);
-            return Ok(Ok(()));
-        }
-        if is_over || nobody {
-            if !is_over {
-                let next = Next {
-                    delay: rivals.delay,
-                    winner: None,
-                    stopped_by: rivals.stopped_by,
-                };
-                return match self.time_lock(next) {
-                    Some(failure) => Err(failure),
-                    None if bound.limit == RunLimit::Moves => {
-                        found.end = Some(aim_of(self, asked.aim, false, 0.0)? - before);
-                        Ok(Ok(()))
-                    }
-                    None => Err(Failure::BoundNeverReached),
-                };
-            }
-            self.wait(delay)?;
-            found.end = Some(aim_of(self, asked.aim, false, 0.0)? - before);
-            return Ok(Ok(()));
-        }
+        self.rivals(program, rest)
+    }
+
+    /// Why the run fails in which nobody moves after that, if it does.
+    pub(in crate::stochastic) fn lock_of(&self, rivals: &Rivals) -> Option<Failure> {
+        self.time_lock(Next {
+            delay: rivals.delay,
+            winner: None,
+            stopped_by: rivals.stopped_by,
+        })
+    }
+
+    /// Lets time pass until the rivals move; not finite if a strategy may demand moves meanwhile.
+    pub(in crate::stochastic) fn wait_for_rivals(&mut self, delay: f64) -> Found<()> {
         if delay > TOLERANCE && self.has_decisions() {
             return Ok(Err(NotFinite::Demand));
         }
         self.wait(delay)?;
-        found.delay = delay;
         self.take_advice_again();
-        self.go_on_from(program, asked.aim, &rivals.winners, before, step, found)
-    }
-
-    fn watch(&mut self, asked: &Optimum, delay: f64) -> Result<Option<(bool, f64)>, Failure> {
-        match &asked.goal {
-            Some(goal) => watched(self, goal, delay),
-            None => Ok(None),
-        }
-    }
-
-    /// What the state says of the value.
-    pub(super) fn worth(&mut self, aim: Aim) -> Result<f64, Failure> {
-        match aim {
-            Aim::Probability => Ok(0.0),
-            _ => aim_of(self, aim, false, 0.0),
-        }
+        Ok(Ok(()))
     }
 
     /// Who may move next, and when; all plans are stale.
@@ -229,6 +123,23 @@ impl Race<'_> {
         }))
     }
 
+    /// Takes those out of the race whose delays would be drawn; returns when the first of them
+    /// could move, and who.
+    fn set_drawn_apart(&mut self) -> Option<(f64, usize)> {
+        let drawn = self.drawn.as_ref().expect("nothing is drawn");
+        let mut earliest: Option<(f64, usize)> = None;
+        for (process, &is_drawn) in drawn.of_process.iter().enumerate() {
+            if !is_drawn {
+                continue;
+            }
+            let low = std::mem::replace(&mut self.attempts[process], f64::INFINITY);
+            if low.is_finite() && earliest.is_none_or(|(known, _)| low < known) {
+                earliest = Some((low, process));
+            }
+        }
+        earliest
+    }
+
     /// The processes with an output that is enabled now, or of those in committed locations.
     fn all_with_outputs(
         &mut self,
@@ -250,13 +161,13 @@ impl Race<'_> {
     }
 
     /// Finds what the winners may do, now that the delay is over.
-    fn go_on_from(
+    pub(in crate::stochastic) fn go_on_from(
         &mut self,
         program: &Program<'_>,
         aim: Aim,
         winners: &[usize],
         before: f64,
-        step: Step<'_>,
+        is_asked: bool,
         found: &mut Unfolded,
     ) -> Found<()> {
         let base = self.machine.words().to_vec();
@@ -281,13 +192,13 @@ impl Race<'_> {
                 }
             }
         }
-        if !step.is_asked {
+        if !is_asked {
             for (instance, chance) in by_chance {
                 known!(self.outcomes_of(program, &mut context, instance, chance, found));
             }
         }
         found.chance_end = found.outcomes.len();
-        let Some(winner) = decides.filter(|_| step.is_asked || found.chance_end == 0) else {
+        let Some(winner) = decides.filter(|_| is_asked || found.chance_end == 0) else {
             return Ok(Ok(()));
         };
         self.decisions(program, &mut context, winner, found)
@@ -351,14 +262,19 @@ impl Race<'_> {
         self.take_advice(program)?;
         self.look_for_decisions(program);
         let rivals = known!(self.rivals(program, self.rest));
-        if rivals.delay > TOLERANCE || rivals.winners.is_empty() {
+        // Who could only make a move of the controller tries again until another one wins.
+        let mut winners = Vec::new();
+        for one in rivals.winners {
+            if self.find_outputs(program, one)? {
+                winners.push(one);
+            }
+        }
+        if rivals.delay > TOLERANCE || winners.is_empty() {
             return Ok(Err(NotFinite::Wait(self.stand(winner))));
         }
-        let share = 1.0 / rivals.winners.len() as f64;
-        for &winner in &rivals.winners {
-            if !self.find_outputs(program, winner)? {
-                return Ok(Err(NotFinite::Rounded(self.stand(winner))));
-            }
+        let share = 1.0 / winners.len() as f64;
+        for winner in winners {
+            self.find_outputs(program, winner)?;
             let entries = self.entries(program);
             let each = share / entries.len() as f64;
             for legs in entries.iter() {
