@@ -44,7 +44,8 @@ pub(super) enum Unexplored {
 }
 
 /// Explores what can be reached. What is seen at decisions is kept; of those words it is found out
-/// whether something may still read them there. `look` sees the counters now and then, and may end it.
+/// whether something may still read them there. `look` sees the counters now and then, and may end
+/// it.
 ///
 /// # Errors
 /// A run fails in some state.

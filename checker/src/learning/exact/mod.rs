@@ -190,7 +190,7 @@ fn solve_for(
     if asked.features.is_none() {
         leave_out(&mut explored, &mut observation, asked_about, shown);
     }
-    answer(behaviour, asked, &explored, observation)
+    Ok(answer(behaviour, asked, &explored, observation))
 }
 
 fn answer(
@@ -198,18 +198,18 @@ fn answer(
     asked: &Optimum,
     explored: &Explored<'_>,
     observation: Observation,
-) -> Result<ExactAnswer, Failure> {
+) -> ExactAnswer {
     let mut solution = match solve(&explored.process) {
         Ok(solution) => solution,
-        Err(Unsolved::Unbounded) => return Ok(ExactAnswer::Unbounded),
-        Err(Unsolved::MixedCycles) => return Ok(ExactAnswer::Left(Inexact::MixedCycles)),
-        Err(Unsolved::Slow) => return Ok(ExactAnswer::Left(Inexact::Slow)),
+        Err(Unsolved::Unbounded) => return ExactAnswer::Unbounded,
+        Err(Unsolved::MixedCycles) => return ExactAnswer::Left(Inexact::MixedCycles),
+        Err(Unsolved::Slow) => return ExactAnswer::Left(Inexact::Slow),
     };
     if !solution.upper[0].is_finite() {
-        return Ok(ExactAnswer::NeverEnds);
+        return ExactAnswer::NeverEnds;
     }
     let Some(chosen) = strategy(explored, &mut solution) else {
-        return Ok(ExactAnswer::Left(Inexact::Hidden));
+        return ExactAnswer::Left(Inexact::Hidden);
     };
     let moves = Runner::of(behaviour).moves_of_controller();
     let strategy = LearnedStrategy::of_trees(
@@ -224,12 +224,12 @@ fn answer(
     } else {
         (explored.start + least, explored.start + greatest)
     };
-    Ok(ExactAnswer::Best(Exact {
+    ExactAnswer::Best(Exact {
         lower: lower + 0.0,
         upper: upper + 0.0,
         strategy: Arc::new(strategy),
         counters: explored.counters(explored.states.len()),
-    }))
+    })
 }
 
 /// A strategy that is as good as the best one; `None` if too little is seen for that. The upper
@@ -297,8 +297,8 @@ fn words_of(feature: &Feature) -> Vec<u32> {
     }
 }
 
-/// Leaves out of the whole state what nothing reads any more at any decision: its value is not kept.
-/// One clock stays where there was one, for the controller is asked as one that sees time.
+/// Leaves out of the whole state what nothing reads any more at any decision: its value is not
+/// kept. One clock stays where there was one, for the controller is asked as one that sees time.
 fn leave_out(
     explored: &mut Explored<'_>,
     observation: &mut Observation,

@@ -132,9 +132,10 @@ impl Chooser<'_> {
                 let slack = ALIKE * least.abs().max(1.0);
                 let regret = (self.total(choice) - least).max(0.0);
                 let is_alike = regret <= slack && places.len() > 1;
-                let regret = match choice == policy || is_alike {
-                    true => 0.0,
-                    false => regret.max(WORSE * least.abs().max(1.0)),
+                let regret = if choice == policy || is_alike {
+                    0.0
+                } else {
+                    regret.max(WORSE * least.abs().max(1.0))
                 };
                 let label = self.process.labels[choice];
                 match regrets.iter_mut().find(|one| one.1 == label) {

@@ -14,9 +14,7 @@ use rustc_hash::FxBuildHasher;
 
 use crate::analysis::{Influence, LiveVariables};
 use crate::exec::arithmetic::{double_of_words, double_words};
-use crate::ir::{
-    Aim, FunctionId, Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape,
-};
+use crate::ir::{Aim, Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape};
 use crate::learning::whole_state::functions;
 use crate::stochastic::Stage;
 

@@ -15,6 +15,7 @@ use super::outcomes::{Context, Entries};
 use super::unfolded::{Found, Lottery, NotFinite, Rivals, Unfolded, known};
 use super::{Next, Race};
 use crate::ir::{Aim, Urgency};
+use crate::stochastic::advice::Advice;
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::failure::Failure;
 use crate::stochastic::program::Program;
@@ -176,9 +177,9 @@ impl Race<'_> {
         let mut decides = None;
         let mut by_chance: Lottery = Vec::new();
         for &winner in winners {
-            if !self.find_outputs(program, winner)?
-                && !(self.hurry() && self.find_outputs(program, winner)?)
-            {
+            let is_able = self.find_outputs(program, winner)?
+                || self.hurry() && self.find_outputs(program, winner)?;
+            if !is_able {
                 return Ok(Err(NotFinite::Rounded(self.stand(winner))));
             }
             let entries = self.entries(program);
@@ -219,12 +220,11 @@ impl Race<'_> {
         let mut known: Option<(u32, Entries)> = None;
         for &entry in &moves {
             let process = program.instance(entry).process;
-            let entries = match known.take_if(|known| known.0 == process) {
-                Some((_, entries)) => entries,
-                None => {
-                    self.find_outputs(program, process as usize)?;
-                    self.entries(program)
-                }
+            let entries = if let Some((_, entries)) = known.take_if(|known| known.0 == process) {
+                entries
+            } else {
+                self.find_outputs(program, process as usize)?;
+                self.entries(program)
             };
             let is_it = |legs: &&[u32]| program.instance(legs[0]).entry == entry;
             let legs = entries.iter().find(is_it);
@@ -235,7 +235,7 @@ impl Race<'_> {
             found.choices.push((Some(entry), found.outcomes.len()));
             known = Some((process, entries));
         }
-        let waits = self.advice.as_ref().is_none_or(|one| one.waits());
+        let waits = self.advice.as_ref().is_none_or(Advice::waits);
         if let Some(control) = &mut self.control {
             control.moves = moves;
         }
