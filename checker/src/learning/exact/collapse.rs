@@ -28,7 +28,7 @@ pub(super) struct Local {
     pub(super) targets: Vec<u32>,
     pub(super) chances: Vec<f64>,
     /// By choice: whether it cannot leave the component.
-    stays: Vec<bool>,
+    pub(super) stays: Vec<bool>,
     /// By choice: that of the process.
     pub(super) of_process: Vec<u32>,
     /// The least lower bound behind it.

@@ -21,6 +21,10 @@ use crate::cancellation;
 
 /// So many sweeps, and the bounds are as near as they come.
 const MOST_SWEEPS: usize = 100_000;
+/// From above, bounds meet within so many sweeps, or it is tried from below.
+const SWEEPS_FROM_ABOVE: usize = 2_000;
+/// A policy that leaves a component is looked for so many times.
+const PASSES: usize = 200;
 /// So many guesses of upper bounds, and there are none.
 const MOST_GUESSES: usize = 12;
 /// After a guess that was wrong, lower bounds must rise so many times less.
@@ -37,6 +41,15 @@ pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
         // None of its states has a strategy that ends.
         return Ok(());
     };
+    if let Some((lower, upper, policy)) = local.from_above(precision) {
+        members.give(
+            cyclic.process,
+            &local,
+            (&lower, &upper, &policy),
+            cyclic.solution,
+        );
+        return Ok(());
+    }
     let mut lower = local.start();
     // Where costs cancel out, the bounds can be no nearer than their sums are rounded.
     let costs = local.costs.iter().map(|one| one.abs()).fold(0.0, f64::max);
@@ -65,6 +78,85 @@ pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
 }
 
 impl Local {
+    /// The bounds and the policy, where each choice costs something: value iteration from above is
+    /// faster there, for lower bounds rise by a cost at a time.
+    ///
+    /// If one look lowers no upper bound by more than a part of the least cost, all of them are lower
+    /// bounds once they are less by that part: a look at these gains as much as it loses.
+    fn from_above(&self, precision: f64) -> Option<(Vec<f64>, Vec<f64>, Vec<u32>)> {
+        let least = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
+        if least <= 0.0 {
+            return None;
+        }
+        let policy = self.nearest()?;
+        let moves = self.moves_of(&policy, SWEEPS_FROM_ABOVE)?;
+        let base = self.least_behind;
+        let constant = vec![base; self.nodes()];
+        let above = |node: usize| {
+            let choice = policy[node] as usize;
+            self.upper_behind[choice] + self.inside(choice, &constant) - base
+        };
+        let excess = (0..self.nodes()).map(above).fold(0.0, f64::max);
+        let mut upper: Vec<f64> = moves
+            .iter()
+            .map(|moves| base + excess / STEP * moves)
+            .collect();
+        for _ in 0..SWEEPS_FROM_ABOVE {
+            let best = |node: usize, behind: &[f64], values: &[f64]| {
+                let choices = self.choices(node);
+                let totals = choices.map(|choice| behind[choice] + self.inside(choice, values));
+                totals.fold(f64::INFINITY, f64::min)
+            };
+            for node in 0..self.nodes() {
+                upper[node] = upper[node].min(best(node, &self.upper_behind, &upper));
+            }
+            let fall = |node: usize| upper[node] - best(node, &self.lower_behind, &upper);
+            let falls = (0..self.nodes()).map(fall).fold(0.0, f64::max);
+            cancellation::work(2 * self.targets.len());
+            let part = falls / least;
+            if part <= precision {
+                let less = |&value: &f64| base + (1.0 - part) * (value - base);
+                let lower = upper.iter().map(less).collect();
+                let policy = self.best_by(&self.upper_behind, &upper);
+                return Some((lower, upper, policy));
+            }
+        }
+        None
+    }
+
+    /// A policy that comes nearer to a way out with each choice, by chance; `None` if that takes
+    /// long to find.
+    fn nearest(&self) -> Option<Vec<u32>> {
+        let mut policy = vec![u32::MAX; self.nodes()];
+        let mut rest = self.nodes();
+        for pass in 0..PASSES {
+            for place in 0..self.nodes() {
+                let node = if pass % 2 == 0 {
+                    place
+                } else {
+                    self.nodes() - 1 - place
+                };
+                if policy[node] != u32::MAX {
+                    continue;
+                }
+                let mut choices = self.choices(node);
+                let leads = |choice: &usize| {
+                    let mut targets = self.targets[self.ways(*choice)].iter();
+                    !self.stays[*choice] || targets.any(|&to| policy[to as usize] != u32::MAX)
+                };
+                if let Some(choice) = choices.find(leads) {
+                    policy[node] = choice as u32;
+                    rest -= 1;
+                }
+            }
+            cancellation::work(self.targets.len());
+            if rest == 0 {
+                return Some(policy);
+            }
+        }
+        None
+    }
+
     /// Values that one look at them does not lower.
     fn start(&self) -> Vec<f64> {
         let least = self.least_behind;
@@ -109,12 +201,18 @@ impl Local {
 
     /// The best choices by lower bounds.
     fn best(&self, values: &[f64]) -> Vec<u32> {
+        self.best_by(&self.lower_behind, values)
+    }
+
+    /// The best choices by what lies behind the component, and the values of its nodes.
+    fn best_by(&self, behind: &[f64], values: &[f64]) -> Vec<u32> {
+        let total = |choice: usize| behind[choice] + self.inside(choice, values);
         let best = |node: usize| {
             let mut choices = self.choices(node);
             let first = choices.next().expect("every node has a choice");
-            let (mut best, mut least) = (first, self.total(first, values));
+            let (mut best, mut least) = (first, total(first));
             for choice in choices {
-                let total = self.total(choice, values);
+                let total = total(choice);
                 if total < least {
                     (best, least) = (choice, total);
                 }
