@@ -41,7 +41,7 @@ pub(super) fn solve(mut cyclic: Cyclic<'_>) -> Result<(), Unsolved> {
         // None of its states has a strategy that ends.
         return Ok(());
     };
-    if let Some((lower, upper, policy)) = local.from_above(precision) {
+    if let Some((lower, upper, policy)) = local.bounds_from_above(precision) {
         members.give(
             cyclic.process,
             &local,
@@ -83,7 +83,7 @@ impl Local {
     ///
     /// If one look lowers no upper bound by more than a part of the least cost, all of them are lower
     /// bounds once they are less by that part: a look at these gains as much as it loses.
-    fn from_above(&self, precision: f64) -> Option<(Vec<f64>, Vec<f64>, Vec<u32>)> {
+    fn bounds_from_above(&self, precision: f64) -> Option<(Vec<f64>, Vec<f64>, Vec<u32>)> {
         let least = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
         if least <= 0.0 {
             return None;
