@@ -13,8 +13,18 @@ use crate::ir::{
 /// An integer that can have more values is seen in intervals.
 const MOST_VALUES: i64 = 33;
 
-/// The observation of the whole state of a network in the stochastic reading, for a query.
+/// The observation of the whole state of a network in the stochastic reading, for a query. Where
+/// the goal has to be reached in time, clocks that show how much has passed are part of it.
 pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
+    found(network, asked, asked.aim == Aim::Probability)
+}
+
+/// The same, but clocks that nothing but the bound of the run depends on are left out.
+pub(super) fn whole_state_without_time(network: &Network, asked: &Optimum) -> Observation {
+    found(network, asked, false)
+}
+
+fn found(network: &Network, asked: &Optimum, is_timed: bool) -> Observation {
     let number = match asked.aim {
         Aim::Expected(number) => Some(number),
         Aim::Time | Aim::Probability => None,
@@ -23,7 +33,7 @@ pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
         network,
         influence: Influence::new(network, functions(asked), number),
         bound: asked.bound.limit,
-        is_timed: asked.aim == Aim::Probability,
+        is_timed,
         written: written(network),
         observation: Observation::default(),
     };

@@ -17,19 +17,19 @@ from ntagen.errors import InputError
 SHOP = """
 int[0,2] parts = 2;
 int[0,5] left = 5;
-int cost;
+double cost;
 process Shop() {
   state Choose, Done;
   branchpoint Slow, Fast;
   urgent Choose;
   init Choose;
-  trans Choose -> Slow { guard parts > 0 && left > 0; assign left--, cost += 1; },
-        Choose -> Fast { guard parts > 0 && left > 0; assign left--, cost += 3; },
+  trans Choose -> Slow { guard parts > 0 && left > 0; assign left--, cost = cost + random(2.0); },
+        Choose -> Fast { guard parts > 0 && left > 0; assign left--, cost = cost + 3; },
         Slow -> Choose { assign parts--; probability 1; },
         Slow -> Choose { probability 1; },
         Fast -> Choose { assign parts--; probability 4; },
         Fast -> Choose { probability 1; },
-        Choose -u-> Done { guard parts == 0 || left == 0; assign cost += 10 * parts; };
+        Choose -u-> Done { guard parts == 0 || left == 0; assign cost = cost + 10 * parts; };
 }
 system Shop;
 """

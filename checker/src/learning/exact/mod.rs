@@ -28,7 +28,7 @@ use self::solution::{Solution, Unsolved};
 use self::solve::solve;
 use self::states::Counting;
 use super::strategy::LearnedStrategy;
-use super::whole_state::whole_state;
+use super::whole_state::whole_state_without_time;
 use crate::exec::arithmetic::double_of_words;
 use crate::ir::{Feature, Network, Observation, Optimum, RunLimit, Seen};
 use crate::search::limits::{Counters, StopReason};
@@ -105,7 +105,7 @@ pub fn solve_exactly(
     if let Some(features) = &asked.features {
         return solve_for(behaviour, asked, features.clone(), None, look);
     }
-    let observation = whole_state(network, asked);
+    let observation = whole_state_without_time(network, asked);
     let mut with_time = observation.clone();
     let found = solve_for(behaviour, asked, observation, None, look)?;
     // How much time is left is part of the whole state, too, if a clock shows it.
