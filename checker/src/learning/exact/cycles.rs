@@ -81,8 +81,8 @@ impl Local {
     /// The bounds and the policy, where each choice costs something: value iteration from above is
     /// faster there, for lower bounds rise by a cost at a time.
     ///
-    /// If one look lowers no upper bound by more than a part of the least cost, all of them are lower
-    /// bounds once they are less by that part: a look at these gains as much as it loses.
+    /// If one look lowers no upper bound by more than a part of the least cost, all of them are
+    /// lower bounds once they are less by that part: a look at these gains as much as it loses.
     fn bounds_from_above(&self, precision: f64) -> Option<(Vec<f64>, Vec<f64>, Vec<u32>)> {
         let least = self.costs.iter().copied().fold(f64::INFINITY, f64::min);
         if least <= 0.0 {
