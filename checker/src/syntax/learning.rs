@@ -26,7 +26,7 @@ impl Parser<'_> {
         }
         let bound = self.run_bound();
         let features = self.features();
-        let goal = self.goal();
+        let goal = self.goal(is_expected);
         let end = self.since(span);
         if is_expected && price.is_none() {
             let message = "this has no expression, so each unit of time costs 1";
@@ -62,10 +62,14 @@ impl Parser<'_> {
     }
 
     /// `: <> p`, if it is there.
-    fn goal(&mut self) -> Option<super::ast::Expr> {
+    fn goal(&mut self, may_lack: bool) -> Option<super::ast::Expr> {
         let span = self.here();
         if !self.eat(TokenKind::Colon) {
-            if self.at_end() || self.at_word("under") || self.at_word("imitate") {
+            let is_over = self.at_end() || self.at_word("under") || self.at_word("imitate");
+            if is_over && !may_lack {
+                return None;
+            }
+            if is_over {
                 let message = "this has no goal, so a run ends at its bound only";
                 let diagnostic = Diagnostic::new(codes::OPTIMUM_WITHOUT_GOAL, span, message);
                 self.report(diagnostic.help("write `: <> p` behind the bound"));

@@ -101,7 +101,8 @@ def test_options_of_the_model_count(folder: Path, capsys: pytest.CaptureFixture[
     formula = QUERY.replace("parts, left", "").replace("<", "&lt;").replace(">", "&gt;")
     ends = '<source ref="id0"/><target ref="id1"/>'
     edges = "".join(
-        f'<transition>{ends}<label kind="assignment">cost = {cost} + 0 * random(1.0)</label></transition>'
+        f'<transition>{ends}<label kind="assignment">cost = {cost} + 0 * random(1.0)</label>'
+        "</transition>"
         for cost in (5, 2)
     )
     model = f"""<?xml version="1.0" encoding="utf-8"?>

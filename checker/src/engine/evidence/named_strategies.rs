@@ -196,7 +196,7 @@ impl LoadedModel {
                 let learned = self.read_learned(&file, meaning);
                 learned.map(|learned| Loaded::Learned(Arc::new(learned)))
             }
-            None => self.read_zones(&file, features),
+            None => self.read_zones(&file),
         });
         let loaded = match read {
             Ok(read) => read.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?,
@@ -232,16 +232,9 @@ impl LoadedModel {
         })
     }
 
-    /// Reads the file of a strategy in zones, for which a query names no features.
-    fn read_zones(&self, file: &Json, features: Option<&FeatureTexts>) -> Result<Loaded, Mismatch> {
+    /// Reads the file of a strategy in zones. It sees the whole state, whatever features are named.
+    fn read_zones(&self, file: &Json) -> Result<Loaded, Mismatch> {
         let (query, strategy) = strategy_json::read_parsed(self.network(), file)?;
-        if features.is_some() {
-            return Err(Mismatch {
-                place: String::new(),
-                message: String::from("this strategy was not learned, and sees the whole state"),
-                help: Some("write loadStrategy(\"…\") without features"),
-            });
-        }
         Ok(Loaded::InZones {
             query,
             strategy: Arc::new(strategy),
