@@ -185,6 +185,15 @@ impl LimitWatch {
         result.map_err(|Cut| (self.stop(), self.shared.seen().counters))
     }
 
+    /// Whether a limit is reached after so many runs.
+    pub(super) fn ends_runs(&mut self, runs: u64) -> bool {
+        let counters = Counters {
+            explored: runs,
+            ..Counters::default()
+        };
+        self.look(&counters).is_some()
+    }
+
     /// The seconds since it began.
     pub(super) fn seconds(&self) -> f64 {
         self.shared.start.elapsed().as_secs_f64()

@@ -34,6 +34,14 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         self.refuse_contradiction(query, &options.precision)?;
         let control = match &query.kind {
+            QueryKind::Optimum(_) if prepared.learned.is_some() => {
+                return Err(self.refusal(
+                    codes::UNSUPPORTED_QUERY,
+                    query.span,
+                    "a best strategy within a learned one is not supported",
+                    "ask under the strategy that the learned one refines, or without `under`",
+                ));
+            }
             QueryKind::Statistical(_)
             | QueryKind::Optimum(_)
             | QueryKind::SaveStrategy { .. }

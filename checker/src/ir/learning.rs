@@ -16,8 +16,6 @@ pub struct Optimum {
     pub goal: Option<Path>,
     /// What the strategy sees; `None` is the whole state.
     pub features: Option<Observation>,
-    /// The strategy from which moves are drawn while the best one is learned.
-    pub imitate: Option<String>,
 }
 
 /// What a best strategy is best for.
@@ -38,6 +36,16 @@ pub struct Observation {
     pub discrete: Vec<Feature>,
     /// Of these in which intervals they lie.
     pub continuous: Vec<Feature>,
+}
+
+impl Aim {
+    /// The function that leaves the number whose mean is asked for, if it is one.
+    pub fn number(self) -> Option<FunctionId> {
+        match self {
+            Aim::Expected(number) => Some(number),
+            Aim::Time | Aim::Probability => None,
+        }
+    }
 }
 
 impl Observation {

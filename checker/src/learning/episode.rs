@@ -28,6 +28,4 @@ pub(super) struct Episode {
     pub(super) choices: Vec<u32>,
     /// The cost of the whole run.
     pub(super) cost: f64,
-    /// How many moves the run had.
-    pub(super) moves: u64,
 }

@@ -7,7 +7,7 @@ use super::observation::Sight;
 use super::partition::{Cell, DRAW, Partition, WAIT};
 use crate::analysis::LiveVariables;
 use crate::ir::{Aim, Observation, Seen};
-use crate::stochastic::{Chooser, Chosen, Failure, Guidance, Moment, RunId, StateView};
+use crate::stochastic::{Chooser, Chosen, Failure, Guidance, Moment, StateView};
 
 /// How an explorer decides.
 #[derive(Clone, Debug)]
@@ -111,7 +111,7 @@ impl Explorer {
     }
 
     /// The decisions of the run that has ended after this time with this value.
-    pub(super) fn ended(&mut self, value: f64, time: f64, moves: u64) -> Episode {
+    pub(super) fn ended(&mut self, value: f64, time: f64) -> Episode {
         let mut episode = std::mem::take(&mut self.episode);
         let cost = self.sign * value;
         if let Some(last) = episode.steps.last_mut() {
@@ -119,17 +119,12 @@ impl Explorer {
             last.time = time - self.since;
         }
         episode.cost = cost;
-        episode.moves = moves;
         episode
     }
 
     /// What the run is worth until now.
     fn worth(&self, state: &mut StateView<'_>, time: f64) -> Result<f64, Failure> {
-        let value = match self.aim {
-            Aim::Probability => 0.0,
-            Aim::Time => time,
-            Aim::Expected(function) => state.real(function)?,
-        };
+        let value = state.worth(self.aim, time)?;
         if value.is_finite() {
             Ok(self.sign * value)
         } else {
@@ -166,7 +161,7 @@ impl Explorer {
 }
 
 impl Chooser for Explorer {
-    fn begin(&mut self, _: RunId) {
+    fn begin(&mut self) {
         self.episode = Episode::default();
         self.worth = 0.0;
         self.since = 0.0;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::ir::{Aim, Asked, Optimum};
 use crate::stochastic::statistics::{Expectation, Interval, Method, clopper_pearson};
-use crate::stochastic::{Behaviour, Estimate, Failure, RunId, Runner, runs_by};
+use crate::stochastic::{Behaviour, Estimate, Failure, Precision, RunId, Runner, runs_by};
 
 /// Makes these runs, and says what they are worth; `None` if it was ended before the second one.
 ///
@@ -13,12 +13,16 @@ use crate::stochastic::{Behaviour, Estimate, Failure, RunId, Runner, runs_by};
 pub fn judge(
     behaviour: Behaviour<'_>,
     asked: &Optimum,
-    seed: u64,
+    precision: &Precision,
     runs: Range<u64>,
-    threads: usize,
-    alpha: f64,
     ends: impl FnMut(u64) -> bool,
 ) -> Result<Option<Estimate>, Failure> {
+    let Precision {
+        seed,
+        threads,
+        alpha,
+        ..
+    } = *precision;
     let mut values = Expectation::default();
     let run = |runner: &mut Runner<'_>, run| {
         let outcome = runner.observe(RunId { seed, run }, &asked.bound, Asked::End(asked))?;

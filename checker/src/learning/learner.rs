@@ -22,6 +22,7 @@ use super::refinement::{Rule, refine};
 use super::whole_state::functions;
 use crate::analysis::LiveVariables;
 use crate::ir::{Asked, Observation, Optimum};
+use crate::stochastic::statistics::Expectation;
 use crate::stochastic::{Behaviour, Failure, RunId, Runner, runs_by};
 
 /// Numbers of runs that learning never uses: those that judge the strategy of an iteration.
@@ -117,7 +118,8 @@ pub fn learn(
 
 /// What is dead where, of what the whole state has.
 fn live_in(behaviour: Behaviour<'_>, asked: &Optimum) -> Option<LiveVariables> {
-    LiveVariables::new(behaviour.network, functions(asked), false)
+    let functions = functions(asked).into_iter().chain(asked.aim.number());
+    LiveVariables::new(behaviour.network, functions, false)
 }
 
 struct Learner<'a> {
@@ -286,7 +288,7 @@ impl Learner<'_> {
             if !outcome.value.is_finite() {
                 return Err(Failure::NoNumber);
             }
-            Ok(explorer(runner).ended(outcome.value, outcome.time, outcome.moves))
+            Ok(explorer(runner).ended(outcome.value, outcome.time))
         };
         let before = self.progress;
         let made = runs_by(
@@ -314,13 +316,13 @@ fn explorer<'r>(runner: &'r mut Runner<'_>) -> &'r mut Explorer {
 
 /// The mean value of runs; `sign` is that of their costs.
 fn mean_of(episodes: &[Episode], sign: f64) -> Mean {
-    let count = episodes.len() as f64;
-    let mean = episodes.iter().map(|one| one.cost).sum::<f64>() / count;
-    let squares = episodes.iter().map(|one| (one.cost - mean).powi(2));
-    let variance = squares.sum::<f64>() / (count - 1.0).max(1.0);
+    let mut costs = Expectation::default();
+    for episode in episodes {
+        costs.push(episode.cost);
+    }
     Mean {
-        value: sign * mean,
-        error: (variance / count).sqrt(),
-        runs: episodes.len() as u64,
+        value: sign * costs.mean(),
+        error: costs.error(),
+        runs: costs.count(),
     }
 }

@@ -15,6 +15,7 @@ mod partition;
 mod process;
 mod refinement;
 mod strategy;
+mod tree;
 mod whole_state;
 
 pub use exact::{Exact, ExactAnswer, Inexact, solve_exactly};
@@ -22,7 +23,6 @@ pub use judging::{Comparison, compared, judge};
 pub use learner::{Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};
 pub use partition::Partition;
-pub use strategy::{
-    Appraisal, Branch, Followed, LearnedStrategy, Regressor, order, values, words, worth,
-};
+pub use strategy::{Appraisal, Followed, LearnedStrategy, Regressor, order, values, words};
+pub use tree::Node;
 pub use whole_state::whole_state;

@@ -12,30 +12,14 @@ use std::hash::{BuildHasher as _, Hash as _, Hasher as _};
 use hashbrown::HashTable;
 use rustc_hash::FxBuildHasher;
 
+use super::tree::{self, Node};
+
 /// The number of the action to wait. All others are numbers of entries of moves.
 pub(super) const WAIT: u32 = u32::MAX;
 
 /// What stands for an action where a delay was drawn at random. It is not the controller's choice,
 /// and says nothing of what it costs to wait.
 pub(super) const DRAW: u32 = u32::MAX - 1;
-
-/// A node of a tree.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Node {
-    /// The cell with this number.
-    Cell(u32),
-    /// Two parts.
-    Cut {
-        /// The feature that is compared.
-        feature: u32,
-        /// The number it is compared with.
-        bound: f64,
-        /// The node for values up to the bound.
-        low: u32,
-        /// The node for the others.
-        high: u32,
-    },
-}
 
 /// What is known of an action in a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +59,8 @@ pub struct Partition {
     /// The words of the observations, one after the other.
     keys: Vec<i32>,
     width: usize,
-    /// By observation: its tree; the first node is the root.
-    trees: Vec<Vec<Node>>,
+    /// By observation: its tree; the leaves are numbers of cells.
+    trees: Vec<Vec<Node<u32>>>,
     /// All cells.
     pub cells: Vec<Cell>,
 }
@@ -106,7 +90,7 @@ impl Partition {
         let hash_of = |&one: &u32| hash(&keys[one as usize * width..][..width]);
         self.table.insert_unique(hash(key), number, hash_of);
         self.keys.extend_from_slice(key);
-        self.trees.push(vec![Node::Cell(self.cells.len() as u32)]);
+        self.trees.push(vec![Node::Leaf(self.cells.len() as u32)]);
         self.cells.push(Cell {
             observation: number,
             node: 0,
@@ -126,49 +110,18 @@ impl Partition {
     }
 
     /// The tree of an observation.
-    pub fn tree(&self, observation: u32) -> &[Node] {
+    pub fn tree(&self, observation: u32) -> &[Node<u32>] {
         &self.trees[observation as usize]
     }
 
     /// The cell of a point.
     pub fn cell(&self, observation: u32, point: &[f64]) -> u32 {
-        let tree = &self.trees[observation as usize];
-        let mut node = tree[0];
-        loop {
-            match node {
-                Node::Cell(cell) => return cell,
-                Node::Cut {
-                    feature,
-                    bound,
-                    low,
-                    high,
-                } => {
-                    let is_low = point[feature as usize] <= bound;
-                    node = tree[if is_low { low } else { high } as usize];
-                }
-            }
-        }
+        tree::leaf(self.tree(observation), point)
     }
 
     /// In how long a point that moves with these rates is in another cell; infinity if never.
     pub fn exit(&self, observation: u32, point: &[f64], rates: &[f64]) -> f64 {
-        let tree = &self.trees[observation as usize];
-        let (mut node, mut exit) = (tree[0], f64::INFINITY);
-        while let Node::Cut {
-            feature,
-            bound,
-            low,
-            high,
-        } = node
-        {
-            let (value, rate) = (point[feature as usize], rates[feature as usize]);
-            let is_low = value <= bound;
-            if rate != 0.0 && (rate > 0.0) == is_low {
-                exit = exit.min(beyond(bound, value, rate));
-            }
-            node = tree[if is_low { low } else { high } as usize];
-        }
-        exit
+        tree::exit(self.tree(observation), point, rates)
     }
 
     /// Cuts a cell in two. Both parts know what the whole knew.
@@ -177,7 +130,7 @@ impl Partition {
         let whole = &mut self.cells[cell as usize];
         let tree = &mut self.trees[whole.observation as usize];
         let low = tree.len() as u32;
-        tree.extend([Node::Cell(cell), Node::Cell(other)]);
+        tree.extend([Node::Leaf(cell), Node::Leaf(other)]);
         tree[whole.node as usize] = Node::Cut {
             feature,
             bound,
@@ -192,16 +145,6 @@ impl Partition {
         self.cells.push(part);
         other
     }
-}
-
-/// Where a bound is crossed counts as crossed so much later, relative to the numbers at hand: a
-/// decision must not depend on how a number was rounded.
-const BEYOND: f64 = 1e-11;
-
-/// In how long a value that changes at a rate is surely beyond a bound.
-pub(super) fn beyond(bound: f64, value: f64, rate: f64) -> f64 {
-    let slack = BEYOND * bound.abs().max(value.abs()).max(1.0);
-    ((bound - value) / rate).max(0.0) + slack / rate.abs()
 }
 
 fn hash(key: &[i32]) -> u64 {

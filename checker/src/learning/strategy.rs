@@ -10,38 +10,19 @@ use std::sync::Arc;
 use rustc_hash::FxHashMap;
 
 use super::observation::Sight;
-use super::partition::{Node, Partition, WAIT, beyond};
+use super::partition::{Partition, WAIT};
+use super::tree::{self, Node};
 use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::ir::{Observation, Part, Seen};
-use crate::stochastic::{
-    Chooser, Chosen, ControllerMove, Failure, Guidance, Moment, RunId, StateView,
-};
-
-/// A node of a tree; the first of a list is the root.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Branch {
-    /// What the action is worth.
-    Worth(f64),
-    /// Two parts.
-    Cut {
-        /// The feature that is compared.
-        feature: u32,
-        /// The number it is compared with.
-        bound: f64,
-        /// The node for values up to the bound.
-        low: u32,
-        /// The node for the others.
-        high: u32,
-    },
-}
+use crate::stochastic::{Chooser, Chosen, ControllerMove, Failure, Guidance, Moment, StateView};
 
 /// What an action is worth where the exact values are known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Appraisal {
     /// The action: the place of a move, or behind the last one for waiting.
     pub action: u32,
-    /// The tree.
-    pub tree: Vec<Branch>,
+    /// The tree, whose leaves say what it is worth.
+    pub tree: Vec<Node<f64>>,
 }
 
 /// What is known where the exact values are these.
@@ -92,10 +73,7 @@ impl LearnedStrategy {
             (!appraisals.is_empty()).then_some(Regressor { key, appraisals })
         });
         let mut regressors: Vec<Regressor> = numbers.collect();
-        regressors.sort_by_cached_key(|one| {
-            let values = values(observation, &one.key).into_iter();
-            values.map(in_total_order).collect::<Vec<i64>>()
-        });
+        regressors.sort_by_cached_key(|one| ranks(observation, &one.key).collect::<Vec<i64>>());
         LearnedStrategy {
             is_greatest,
             observation: Arc::clone(observation),
@@ -109,7 +87,7 @@ impl LearnedStrategy {
         let trees = self.regressors.iter().flat_map(|one| &one.appraisals);
         trees
             .flat_map(|one| &one.tree)
-            .filter(|node| matches!(node, Branch::Worth(_)))
+            .filter(|node| matches!(node, Node::Leaf(_)))
             .count()
     }
 
@@ -139,10 +117,12 @@ impl LearnedStrategy {
 
 /// How exact values are ordered: by the first number that differs.
 pub fn order(observation: &Observation, one: &[i32], other: &[i32]) -> Ordering {
-    let pairs = numbers(observation, one).zip(numbers(observation, other));
-    let mut orders = pairs.map(|(one, other)| one.total_cmp(&other));
-    let unlike = orders.find(|order| order.is_ne());
-    unlike.unwrap_or(Ordering::Equal)
+    ranks(observation, one).cmp(ranks(observation, other))
+}
+
+/// Numbers in whose order exact values are.
+fn ranks<'o>(observation: &'o Observation, key: &'o [i32]) -> impl Iterator<Item = i64> + 'o {
+    numbers(observation, key).map(in_total_order)
 }
 
 /// The words that exact values are; `None` if some feature cannot have its value.
@@ -210,7 +190,7 @@ pub(super) struct Rated {
 
 fn simplified(partition: &Partition, observation: u32, node: u32) -> Ranked {
     match partition.tree(observation)[node as usize] {
-        Node::Cell(cell) => {
+        Node::Leaf(cell) => {
             let known = partition.cells[cell as usize].known.iter();
             let rated = known.map(|one| Rated {
                 action: one.action,
@@ -313,29 +293,29 @@ fn collect<'t>(tree: &'t Ranked, see: &mut impl FnMut(&'t [Rated])) {
 }
 
 /// Adds the tree of one action; returns its root.
-fn grow(tree: &Ranked, action: u32, sign: f64, unknown: f64, nodes: &mut Vec<Branch>) -> u32 {
+fn grow(tree: &Ranked, action: u32, sign: f64, unknown: f64, nodes: &mut Vec<Node<f64>>) -> u32 {
     let place = nodes.len();
     match tree {
         Ranked::Cell(cell) => {
             let rated = cell.iter().find(|one| one.action == action);
             let cost = rated.map_or(unknown, |one| one.cost);
             // No zero has a sign, so that the text of a file is the same again.
-            nodes.push(Branch::Worth(sign * cost + 0.0));
+            nodes.push(Node::Leaf(sign * cost + 0.0));
         }
         Ranked::Cut {
             feature,
             bound,
             parts,
         } => {
-            nodes.push(Branch::Worth(0.0));
+            nodes.push(Node::Leaf(0.0));
             let low = grow(&parts[0], action, sign, unknown, nodes);
             let high = grow(&parts[1], action, sign, unknown, nodes);
             nodes[place] = match (nodes[low as usize], nodes[high as usize]) {
-                (Branch::Worth(one), Branch::Worth(other)) if one.to_bits() == other.to_bits() => {
+                (Node::Leaf(one), Node::Leaf(other)) if one.to_bits() == other.to_bits() => {
                     nodes.truncate(place + 1);
-                    Branch::Worth(one)
+                    Node::Leaf(one)
                 }
-                _ => Branch::Cut {
+                _ => Node::Cut {
                     feature: *feature,
                     bound: *bound,
                     low,
@@ -345,45 +325,6 @@ fn grow(tree: &Ranked, action: u32, sign: f64, unknown: f64, nodes: &mut Vec<Bra
         }
     }
     place as u32
-}
-
-/// What an action is worth at a point.
-pub fn worth(tree: &[Branch], point: &[f64]) -> f64 {
-    let mut node = tree[0];
-    loop {
-        match node {
-            Branch::Worth(worth) => return worth,
-            Branch::Cut {
-                feature,
-                bound,
-                low,
-                high,
-            } => {
-                let is_low = point[feature as usize] <= bound;
-                node = tree[if is_low { low } else { high } as usize];
-            }
-        }
-    }
-}
-
-/// In how long a moving point is in another leaf.
-fn exit(tree: &[Branch], point: &[f64], rates: &[f64]) -> f64 {
-    let (mut node, mut exit) = (tree[0], f64::INFINITY);
-    while let Branch::Cut {
-        feature,
-        bound,
-        low,
-        high,
-    } = node
-    {
-        let (value, rate) = (point[feature as usize], rates[feature as usize]);
-        let is_low = value <= bound;
-        if rate != 0.0 && (rate > 0.0) == is_low {
-            exit = exit.min(beyond(bound, value, rate));
-        }
-        node = tree[if is_low { low } else { high } as usize];
-    }
-    exit
 }
 
 /// A strategy, prepared to be followed in random runs of a model.
@@ -437,8 +378,6 @@ struct Follower {
 }
 
 impl Chooser for Follower {
-    fn begin(&mut self, _: RunId) {}
-
     fn sees_time(&self) -> bool {
         self.inner.strategy.observation.has_clocks()
     }
@@ -468,7 +407,7 @@ impl Chooser for Follower {
         while best(&options, &point, strategy.is_greatest).is_none_or(|best| best == place) {
             let exits = options
                 .iter()
-                .map(|one| exit(one.tree, &point, &sight.rates));
+                .map(|one| tree::exit(one.tree, &point, &sight.rates));
             waited += exits.fold(f64::INFINITY, f64::min);
             if waited.is_infinite() || !moment.is_straight {
                 break;
@@ -485,7 +424,7 @@ impl Chooser for Follower {
 struct Choice<'t> {
     /// The place of the move among those that are possible; behind them to wait.
     place: usize,
-    tree: &'t [Branch],
+    tree: &'t [Node<f64>],
 }
 
 impl Inner {
@@ -513,7 +452,7 @@ fn best(options: &[Choice<'_>], point: &[f64], is_greatest: bool) -> Option<usiz
     let sign = if is_greatest { -1.0 } else { 1.0 };
     let mut best: Option<(f64, usize)> = None;
     for Choice { place, tree } in options {
-        let cost = sign * worth(tree, point);
+        let cost = sign * tree::leaf(tree, point);
         if best.is_none_or(|(least, _)| cost < least) {
             best = Some((cost, *place));
         }

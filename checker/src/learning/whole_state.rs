@@ -6,6 +6,7 @@
 //! ([`Influence`]).
 
 use crate::analysis::Influence;
+use crate::exec::arithmetic::double_of_words;
 use crate::ir::{
     Aim, Feature, FunctionId, Network, Observation, Optimum, Path, ProcessId, RunLimit, Seen, Shape,
 };
@@ -14,41 +15,58 @@ use crate::ir::{
 const MOST_VALUES: i64 = 33;
 
 /// The observation of the whole state of a network in the stochastic reading, for a query. Where
-/// the goal has to be reached in time, clocks that show how much has passed are part of it.
+/// the goal has to be reached in time, a clock that shows how much has passed is part of it.
 pub fn whole_state(network: &Network, asked: &Optimum) -> Observation {
-    found(network, asked, asked.aim == Aim::Probability)
+    let mut observation = whole_state_without_time(network, asked);
+    let clock = clock_of_time(asked, network).filter(|_| asked.aim == Aim::Probability);
+    let clock = clock.filter(|clock| !observation.continuous.contains(clock));
+    observation.continuous.extend(clock);
+    observation
 }
 
-/// The same, but clocks that nothing but the bound of the run depends on are left out.
+/// The same, but a clock that nothing but the bound of the run depends on is left out.
 pub(super) fn whole_state_without_time(network: &Network, asked: &Optimum) -> Observation {
-    found(network, asked, false)
-}
-
-fn found(network: &Network, asked: &Optimum, is_timed: bool) -> Observation {
-    let number = match asked.aim {
-        Aim::Expected(number) => Some(number),
-        Aim::Time | Aim::Probability => None,
-    };
     let mut finder = Finder {
         network,
-        influence: Influence::new(network, functions(asked), number),
+        influence: Influence::new(network, functions(asked), asked.aim.number()),
         bound: asked.bound.limit,
-        is_timed,
-        written: written(network),
+        written: network.written_words(),
         observation: Observation::default(),
     };
     for (number, process) in (0..).zip(&network.processes) {
         if process.locations.len() > 1 {
-            finder.observation.discrete.push(Feature {
-                text: format!("{}.location", process.name),
-                seen: Seen::Location(ProcessId(number)),
-            });
+            let text = format!("{}.location", process.name);
+            finder.see(true, text, Seen::Location(ProcessId(number)));
         }
     }
     for variable in &network.layout.variables {
         finder.add(&variable.name, variable.offset, &variable.shape);
     }
     finder.observation
+}
+
+/// A clock that always shows how long the run has lasted, where time bounds it.
+pub(super) fn clock_of_time(asked: &Optimum, network: &Network) -> Option<Feature> {
+    if asked.bound.limit != RunLimit::Time {
+        return None;
+    }
+    let written = network.written_words();
+    let mut variables = network.layout.variables.iter();
+    let found = variables.find(|variable| {
+        let clock = variable.offset;
+        let locations = &mut network.locations();
+        network.chances.clocks.binary_search(&clock).is_ok()
+            && !written[clock as usize]
+            && double_of_words(
+                network.initial[clock as usize],
+                network.initial[clock as usize + 1],
+            ) == 0.0
+            && !locations.any(|one| one.chances.rated_clocks.contains(&clock))
+    })?;
+    Some(Feature {
+        text: found.name.clone(),
+        seen: Seen::Clock(found.offset),
+    })
 }
 
 /// The functions by which a query decides when a run ends.
@@ -59,54 +77,38 @@ pub(super) fn functions(asked: &Optimum) -> Vec<FunctionId> {
     }
 }
 
-/// By word: whether some edge may change it.
-fn written(network: &Network) -> Vec<bool> {
-    let mut written = vec![false; network.layout.words as usize];
-    let around = [&network.before_update, &network.after_update];
-    let branches = network.edges().flat_map(|edge| {
-        let branches = edge.branches.iter().map(|branch| &branch.update);
-        branches.chain([&edge.update])
-    });
-    for update in branches.chain(around.into_iter().flatten()) {
-        for &(first, count) in &update.writes {
-            written[first as usize..(first + count) as usize].fill(true);
-        }
-    }
-    written
-}
-
 struct Finder<'n> {
     network: &'n Network,
     influence: Influence,
     bound: RunLimit,
-    /// Whether the goal has to be reached in time.
-    is_timed: bool,
     written: Vec<bool>,
     observation: Observation,
 }
 
 impl Finder<'_> {
+    fn see(&mut self, is_exact: bool, text: String, seen: Seen) {
+        let features = if is_exact {
+            &mut self.observation.discrete
+        } else {
+            &mut self.observation.continuous
+        };
+        features.push(Feature { text, seen });
+    }
+
+    /// Whether what lies at a word may make a difference.
+    fn counts(&self, offset: u32) -> bool {
+        self.bound == RunLimit::Clock(offset) || self.influence.differs(offset)
+    }
+
     fn add(&mut self, name: &str, offset: u32, shape: &Shape) {
         let text = name.to_owned();
-        let is_one = matches!(
-            shape,
-            Shape::Integer { .. } | Shape::Bool | Shape::Double | Shape::Scalar { .. }
-        );
-        let is_clock = self.network.chances.clocks.binary_search(&offset).is_ok();
-        let is_bound = match self.bound {
-            RunLimit::Clock(clock) => clock == offset,
-            // How much time is left decides whether the goal is still reached.
-            RunLimit::Time => is_clock && self.is_timed && !self.written[offset as usize],
-            RunLimit::Moves => false,
-        };
-        if (is_one || is_clock) && !is_bound && !self.influence.differs(offset) {
+        if self.network.chances.clocks.binary_search(&offset).is_ok() {
+            if self.counts(offset) {
+                self.see(false, text, Seen::Clock(offset));
+            }
             return;
         }
-        if is_clock {
-            let seen = Seen::Clock(offset);
-            self.observation.continuous.push(Feature { text, seen });
-            return;
-        }
+        let is_seen = self.counts(offset) && self.written[offset as usize];
         match shape {
             Shape::Array {
                 part,
@@ -126,25 +128,12 @@ impl Finder<'_> {
                     offset += shape.words();
                 }
             }
-            _ if !self.written[offset as usize] => {}
-            Shape::Double => {
-                let seen = Seen::Double(offset);
-                self.observation.continuous.push(Feature { text, seen });
-            }
-            Shape::Bool | Shape::Scalar { .. } => {
-                let seen = Seen::Integer(offset);
-                self.observation.discrete.push(Feature { text, seen });
-            }
+            _ if !is_seen => {}
+            Shape::Double => self.see(false, text, Seen::Double(offset)),
+            Shape::Bool | Shape::Scalar { .. } => self.see(true, text, Seen::Integer(offset)),
             Shape::Integer { low, high } => {
-                let feature = Feature {
-                    text,
-                    seen: Seen::Integer(offset),
-                };
-                if i64::from(*high) - i64::from(*low) < MOST_VALUES {
-                    self.observation.discrete.push(feature);
-                } else {
-                    self.observation.continuous.push(feature);
-                }
+                let values = i64::from(*high) - i64::from(*low);
+                self.see(values < MOST_VALUES, text, Seen::Integer(offset));
             }
         }
     }

@@ -12,12 +12,7 @@ use crate::syntax::ast;
 
 impl Checker<'_> {
     /// Checks and lowers a query for the best strategy.
-    pub(super) fn optimum(
-        &mut self,
-        asked: &ast::Optimum,
-        imitate: Option<&ast::Name>,
-        span: Span,
-    ) -> Option<Optimum> {
+    pub(super) fn optimum(&mut self, asked: &ast::Optimum, span: Span) -> Option<Optimum> {
         self.refuse_priorities(span)?;
         let bound = self.run_bound(&asked.bound);
         let aim = match &asked.measured {
@@ -55,7 +50,6 @@ impl Checker<'_> {
             bound: bound?,
             goal: goal?,
             features: features?,
-            imitate: imitate.map(|name| name.text.clone()),
         })
     }
 

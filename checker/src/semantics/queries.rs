@@ -43,14 +43,12 @@ impl Checker<'_> {
         for name in query.under.iter().chain(&query.imitate) {
             self.known_strategy(name, strategies);
         }
-        if let Some(name) = &query.imitate
-            && !matches!(query.kind, ast::QueryKind::Optimum(_))
-        {
+        if let Some(name) = &query.imitate {
             self.error(
                 codes::QUERY_UNSUPPORTED,
                 name.span,
-                "only a strategy that is learned can imitate another one",
-                "write `under` for what the controller follows",
+                "no strategy is imitated: `imitate` is not supported",
+                "leave it out, or write `under` for what the controller has to follow",
             );
         }
         let kind = self.query_kind(query, strategies)?;
@@ -141,7 +139,7 @@ impl Checker<'_> {
                 Some(QueryKind::Statistical(Box::new(asked)))
             }
             ast::QueryKind::Optimum(asked) => {
-                let optimum = self.optimum(asked, query.imitate.as_ref(), query.span)?;
+                let optimum = self.optimum(asked, query.span)?;
                 Some(QueryKind::Optimum(Box::new(optimum)))
             }
             ast::QueryKind::Shield(_) => self.refused(

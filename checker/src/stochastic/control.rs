@@ -19,10 +19,9 @@ use std::any::Any;
 
 use crate::exec::arithmetic::double_of_words;
 use crate::exec::{Context, Executor};
-use crate::ir::{FunctionId, LocationId, Network, Part, ProcessId, STREAM_WORDS, Stream};
+use crate::ir::{Aim, FunctionId, LocationId, Network, Part, ProcessId, STREAM_WORDS, Stream};
 
 use super::failure::Failure;
-use super::run_id::RunId;
 
 /// A state as whoever decides sees it.
 pub struct StateView<'s> {
@@ -44,6 +43,15 @@ impl StateView<'_> {
         };
         self.executor.call(function, &[], &mut context)?;
         Ok(self.double(self.network.chances.result))
+    }
+
+    /// What a run is worth that has lasted so long, by what its state says.
+    pub fn worth(&mut self, aim: Aim, time: f64) -> Result<f64, Failure> {
+        match aim {
+            Aim::Probability => Ok(0.0),
+            Aim::Time => Ok(time),
+            Aim::Expected(number) => self.real(number),
+        }
     }
 
     /// The double at a word.
@@ -91,8 +99,6 @@ pub struct Moment<'m> {
     pub moves: &'m [u32],
     /// Whether it may wait.
     pub may_wait: bool,
-    /// Whether the delay before was drawn, and not chosen.
-    pub is_drawn: bool,
     /// Whether all clocks keep their rates as time passes.
     pub is_straight: bool,
     /// How long the run has lasted.
@@ -114,7 +120,7 @@ pub enum Chosen {
 /// Decides for the controller, run by run.
 pub trait Chooser: Any + Send {
     /// A run begins.
-    fn begin(&mut self, run: RunId);
+    fn begin(&mut self) {}
 
     /// Something has happened in the run.
     fn renew(&mut self) {}

@@ -8,8 +8,7 @@ use super::observer::{aim_of, watched};
 use super::program::Program;
 use super::race::{Drawn, Found, NotFinite, Race, Unfolded, known};
 use super::run::rest;
-use super::run_id::RunId;
-use crate::ir::{Aim, Optimum, RunLimit};
+use crate::ir::{Optimum, RunLimit};
 
 /// A state of a run, beside its words.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -177,13 +176,8 @@ impl<'a> Unfolder<'a> {
     /// # Errors
     /// The code failed.
     pub fn worth(&mut self, asked: &Optimum, words: &[i32]) -> Result<f64, Failure> {
-        match asked.aim {
-            Aim::Expected(number) => {
-                self.race.machine.restore(words);
-                self.race.machine.real(number, &[])
-            }
-            Aim::Time | Aim::Probability => Ok(0.0),
-        }
+        self.race.machine.restore(words);
+        self.view().worth(asked.aim, 0.0)
     }
 
     /// The last state as whoever decides sees it, after the delay.
@@ -210,8 +204,6 @@ impl Guidance for Nobody {
 }
 
 impl Chooser for Nobody {
-    fn begin(&mut self, _: RunId) {}
-
     fn sees_time(&self) -> bool {
         self.0
     }

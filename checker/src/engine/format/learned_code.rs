@@ -10,7 +10,7 @@ use serde_json::json;
 
 use crate::cancellation;
 use crate::ir::{Network, Seen};
-use crate::learning::{Branch, LearnedStrategy, values};
+use crate::learning::{LearnedStrategy, Node, values};
 
 use super::strategy_c::{comment, quoted, starts, table, wrapped};
 use super::{learned_actions, learned_json};
@@ -76,11 +76,11 @@ impl Nodes {
         nodes
     }
 
-    fn add(&mut self, tree: &[Branch], node: u32) {
+    fn add(&mut self, tree: &[Node<f64>], node: u32) {
         let place = self.numbers.len();
         let (feature, number, parts) = match tree[node as usize] {
-            Branch::Worth(worth) => (0, worth, None),
-            Branch::Cut {
+            Node::Leaf(worth) => (0, worth, None),
+            Node::Cut {
                 feature,
                 bound,
                 low,

@@ -16,7 +16,7 @@ use super::json_reader::{At, Mismatch, SEE_FORMAT, WRITE_ONE};
 use super::learned_actions::{self, Finder, Unmatched, WAIT};
 use crate::cancellation;
 use crate::ir::{Feature, FeatureTexts, Network, Observation, Part, ProcessId, Seen};
-use crate::learning::{Appraisal, Branch, LearnedStrategy, Regressor, order, values, words};
+use crate::learning::{Appraisal, LearnedStrategy, Node, Regressor, order, values, words};
 
 /// The `type` of such a file.
 pub const TYPE: &str = "state->regressor";
@@ -123,11 +123,11 @@ fn short(value: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-fn write_tree(tree: &[Branch], node: u32, text: &mut String) {
+fn write_tree(tree: &[Node<f64>], node: u32, text: &mut String) {
     // Writing to a string cannot fail.
     let _ = match tree[node as usize] {
-        Branch::Worth(worth) => write!(text, "{worth:?}"),
-        Branch::Cut {
+        Node::Leaf(worth) => write!(text, "{worth:?}"),
+        Node::Cut {
             feature,
             bound,
             low,
@@ -146,11 +146,11 @@ fn write_tree(tree: &[Branch], node: u32, text: &mut String) {
 pub fn depth(strategy: &LearnedStrategy) -> usize {
     let regressors = strategy.regressors.iter();
     let trees = regressors.flat_map(|one| &one.appraisals);
-    let depth = |tree: &[Branch]| {
+    let depth = |tree: &[Node<f64>]| {
         // A node stands behind the one that leads to it.
         let mut depths = vec![1; tree.len()];
         for (node, branch) in tree.iter().enumerate() {
-            if let Branch::Cut { low, high, .. } = *branch {
+            if let Node::Cut { low, high, .. } = *branch {
                 depths[low as usize] = depths[node] + 1;
                 depths[high as usize] = depths[node] + 1;
             }
@@ -486,7 +486,7 @@ struct Wrong {
 }
 
 /// Adds a tree to the nodes; gives its place. A leaf without end is the text "inf".
-fn grow(tree: &Json, points: usize, nodes: &mut Vec<Branch>) -> Result<u32, Wrong> {
+fn grow(tree: &Json, points: usize, nodes: &mut Vec<Node<f64>>) -> Result<u32, Wrong> {
     cancellation::work(UNITS_FOR_NODE);
     let wrong = |place: &str, message: String| Wrong {
         place: place.to_owned(),
@@ -496,14 +496,14 @@ fn grow(tree: &Json, points: usize, nodes: &mut Vec<Branch>) -> Result<u32, Wron
     let given = match tree {
         Json::Object(given) => given,
         Json::String(text) if text.trim() == "inf" => {
-            nodes.push(Branch::Worth(f64::INFINITY));
+            nodes.push(Node::Leaf(f64::INFINITY));
             return Ok(place as u32);
         }
         leaf => {
             let worth = leaf.as_f64().filter(|worth| worth.is_finite());
             let worth = worth.ok_or_else(|| wrong("", format!("{leaf} is no number")))?;
             // No zero has a sign.
-            nodes.push(Branch::Worth(worth + 0.0));
+            nodes.push(Node::Leaf(worth + 0.0));
             return Ok(place as u32);
         }
     };
@@ -519,13 +519,13 @@ fn grow(tree: &Json, points: usize, nodes: &mut Vec<Branch>) -> Result<u32, Wron
     };
     let bound = field("bound")?.as_f64().filter(|bound| bound.is_finite());
     let bound = bound.ok_or_else(|| wrong(".bound", String::from("this is no number")))?;
-    nodes.push(Branch::Worth(0.0));
+    nodes.push(Node::Leaf(0.0));
     let mut part = |name: &str| {
         let grown = grow(field(name)?, points, nodes);
         grown.map_err(|one| wrong(&format!(".{name}{}", one.place), one.message))
     };
     let (low, high) = (part("low")?, part("high")?);
-    nodes[place] = Branch::Cut {
+    nodes[place] = Node::Cut {
         feature: feature as u32,
         bound: bound + 0.0,
         low,
@@ -539,14 +539,14 @@ fn replace_infinite(appraisals: &mut [Appraisal], is_greatest: bool) {
     let sign = if is_greatest { -1.0 } else { 1.0 };
     let costs = appraisals.iter().flat_map(|one| &one.tree);
     let costs = costs.filter_map(|node| match node {
-        Branch::Worth(worth) if worth.is_finite() => Some(sign * worth),
+        Node::Leaf(worth) if worth.is_finite() => Some(sign * worth),
         _ => None,
     });
     let worst = costs.fold(0.0, f64::max);
     let worse = sign * (2.0 * worst + 1.0).min(f64::MAX);
     for node in appraisals.iter_mut().flat_map(|one| &mut one.tree) {
-        if *node == Branch::Worth(f64::INFINITY) {
-            *node = Branch::Worth(worse);
+        if *node == Node::Leaf(f64::INFINITY) {
+            *node = Node::Leaf(worse);
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Query, QueryKind, Statistical};
-use crate::search::limits::{Counters, Watch as _};
+use crate::search::limits::Counters;
 use crate::semantics::Reading;
 use crate::stochastic::{Behaviour, Estimate, Failure, Precision, estimate_jointly};
 use crate::syntax::ast::QueryText;
@@ -180,18 +180,10 @@ fn estimates_of(
     });
     let asked: Vec<(&Statistical, Precision)> = asked.collect();
     let behaviour = Behaviour {
-        guidance: None,
         fixed_step: asked[0].1.discretisation,
         ..behaviour
     };
-    let ends = |runs| {
-        let counters = Counters {
-            explored: runs,
-            ..Counters::default()
-        };
-        watch.look(&counters).is_some()
-    };
-    estimate_jointly(behaviour, &asked, ends)
+    estimate_jointly(behaviour, &asked, |runs| watch.ends_runs(runs))
 }
 
 /// The queries by the runs that they can share, in order.

@@ -9,12 +9,12 @@ use super::watched_runs::SHOW_EVERY;
 use crate::engine::answer::{Answer, Optimised, Verdict};
 use crate::engine::limits::LimitWatch;
 use crate::engine::loaded_model::{ANALYSED, LoadedModel, NamedStrategy, PreparedQuery};
-use crate::engine::options::RunsSoFar;
+use crate::engine::options::{RunObserver, RunsSoFar};
 use crate::engine::query_form::unnamed;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Network, Optimum, Query};
 use crate::learning::{
-    Comparison, Exact, ExactAnswer, Followed, Inexact, Learned, LearnedStrategy, Learning, Mean,
+    Comparison, Exact, ExactAnswer, Followed, Inexact, LearnedStrategy, Learning, Mean, Progress,
     compared, judge, learn, solve_exactly, whole_state,
 };
 use crate::search::limits::{Counters, StopReason, Watch as _};
@@ -81,103 +81,103 @@ impl LoadedModel {
     }
 }
 
-/// Finds the best strategy; `None` if a limit came first.
+/// The best strategy with the answer that tells of it; `None` if a limit came first.
+type Found = Option<(Answer, Arc<LearnedStrategy>)>;
+
+/// Finds the best strategy.
 fn found(
     behaviour: Behaviour<'_>,
     prepared: &PreparedQuery,
     asked: &Optimum,
     watch: &mut LimitWatch,
-) -> Result<Option<(Answer, Arc<LearnedStrategy>)>, Failure> {
-    let inexact = match solve_exactly(behaviour, asked, &mut |counters| watch.look(counters))? {
-        ExactAnswer::Best(best) => return Ok(Some(exact(best))),
-        ExactAnswer::Unbounded => return Err(Failure::NoBest),
-        ExactAnswer::NeverEnds => return Err(Failure::NeverEnds),
-        ExactAnswer::Left(Inexact::Limit(StopReason::Time | StopReason::Interrupted)) => {
-            return Ok(None);
+) -> Result<Found, Failure> {
+    match solve_exactly(behaviour, asked, &mut |counters| watch.look(counters))? {
+        ExactAnswer::Best(best) => Ok(Some(exact(best))),
+        ExactAnswer::Unbounded => Err(Failure::NoBest),
+        ExactAnswer::NeverEnds => Err(Failure::NeverEnds),
+        ExactAnswer::Left(Inexact::Limit(StopReason::Time | StopReason::Interrupted)) => Ok(None),
+        ExactAnswer::Left(reason) => {
+            let reason = not_exact(behaviour.network, reason);
+            let mut found = learned(behaviour, prepared, asked, watch)?;
+            if let Some((answer, _)) = &mut found {
+                let learned = answer.message.take().unwrap_or_default();
+                answer.remark(format!("not computed exactly: {reason}"));
+                answer.remark(learned);
+            }
+            Ok(found)
         }
-        ExactAnswer::Left(reason) => reason,
-    };
+    }
+}
+
+/// Learns the best strategy.
+fn learned(
+    behaviour: Behaviour<'_>,
+    prepared: &PreparedQuery,
+    asked: &Optimum,
+    watch: &mut LimitWatch,
+) -> Result<Found, Failure> {
     let options = &prepared.options;
-    let observation = match &asked.features {
-        Some(features) => Arc::new(features.clone()),
-        None => Arc::new(whole_state(behaviour.network, asked)),
-    };
+    let features = asked.features.clone();
+    let features = features.unwrap_or_else(|| whole_state(behaviour.network, asked));
+    let observation = Arc::new(features);
     let precision = precision_of(behaviour, options);
     let moves = Runner::of(behaviour).moves_of_controller();
-    let mut shown = Instant::now();
     let learning = Learning {
         seed: precision.seed,
         threads: precision.threads,
         width: observation.words(),
         ..options.learning.clone()
     };
-    let Learned {
-        partition,
-        progress,
-        resets,
-        iterations_in_last_reset,
-        is_complete,
-    } = learn(behaviour, asked, &observation, &learning, |progress| {
-        if let (Some(observer), Some(best)) = (&options.run_observer, progress.best)
-            && shown.elapsed() >= SHOW_EVERY
-        {
-            shown = Instant::now();
-            (observer.0)(&so_far(progress.runs, best));
-        }
-        is_due(watch, progress.runs)
+    let mut show = progress_shown(options.run_observer.as_ref());
+    let learned = learn(behaviour, asked, &observation, &learning, |progress| {
+        show(progress);
+        watch.ends_runs(progress.runs)
     })?;
-    let Some(best) = progress.best else {
+    let Some(judged) = learned.progress.best else {
         return Ok(None);
     };
-    let strategy = LearnedStrategy::new(&partition, &observation, &moves, asked.is_greatest);
+    let strategy =
+        LearnedStrategy::new(&learned.partition, &observation, &moves, asked.is_greatest);
     let strategy = Arc::new(strategy);
     let followed = Followed::new(&strategy, &moves);
     let under = Behaviour {
         guidance: Some(&followed),
         ..behaviour
     };
-    let steps = progress.steps_of_run;
-    let fitting = (FRESH_STEPS / steps).clamp(FRESH_RUNS.start, FRESH_RUNS.end) as u64;
-    let count = precision.runs.or(asked.bound.runs).unwrap_or(fitting);
-    let mut values = |behaviour, first: u64| {
-        judge(
-            behaviour,
-            asked,
-            precision.seed,
-            first..first + count,
-            precision.threads,
-            precision.alpha,
-            |runs| is_due(watch, runs),
-        )
+    let count = precision.runs.or(asked.bound.runs);
+    let runs = FRESH..FRESH + count.unwrap_or_else(|| fresh_runs(&learned.progress));
+    let mut value_under = |behaviour| {
+        let runs = runs.clone();
+        judge(behaviour, asked, &precision, runs, |runs| {
+            watch.ends_runs(runs)
+        })
     };
-    let value = values(under, FRESH)?;
-    let uniform = values(behaviour, FRESH)?;
+    let (value, uniform) = (value_under(under)?, value_under(behaviour)?);
     let mut answer = Answer::new(Verdict::Satisfied, Counters::default());
-    answer.estimate.clone_from(&value);
-    answer.evidence.learned = Some(Arc::clone(&strategy));
     let comparison = value.as_ref().zip(uniform.as_ref());
     let comparison = comparison.map(|(value, uniform)| compared(value, uniform, asked.is_greatest));
-    let inexact = not_exact(behaviour.network, inexact);
-    answer.remark(format!("not computed exactly: {inexact}"));
-    answer.remark(remark(
-        progress.runs,
-        progress.iterations,
-        uniform.as_ref(),
-        comparison,
-    ));
+    answer.estimate = value;
+    answer.evidence.learned = Some(Arc::clone(&strategy));
+    answer.remark(remark(&learned.progress, uniform.as_ref().zip(comparison)));
     answer.optimised = Some(Optimised {
-        runs: progress.runs,
-        iterations: progress.iterations,
-        iterations_in_last_reset,
-        resets,
-        judged: best,
+        runs: learned.progress.runs,
+        iterations: learned.progress.iterations,
+        iterations_in_last_reset: learned.iterations_in_last_reset,
+        resets: learned.resets,
+        judged,
         comparison,
         uniform,
-        is_complete,
-        observation: Arc::clone(&observation),
+        is_complete: learned.is_complete,
         leaves: strategy.leaves() as u64,
+        observation,
     });
     Ok(Some((answer, strategy)))
+}
+
+/// How many runs say what a strategy is worth, if nobody says it.
+fn fresh_runs(progress: &Progress) -> u64 {
+    let fitting = FRESH_STEPS / progress.steps_of_run;
+    fitting.clamp(FRESH_RUNS.start, FRESH_RUNS.end) as u64
 }
 
 /// The answer that was computed.
@@ -247,13 +247,17 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
     }
 }
 
-/// Whether a limit was reached.
-fn is_due(watch: &mut LimitWatch, runs: u64) -> bool {
-    let counters = Counters {
-        explored: runs,
-        ..Counters::default()
-    };
-    watch.look(&counters).is_some()
+/// Shows now and then how far learning is.
+fn progress_shown(observer: Option<&RunObserver>) -> impl FnMut(&Progress) {
+    let mut shown = Instant::now();
+    move |progress| {
+        if let (Some(observer), Some(best)) = (observer, progress.best)
+            && shown.elapsed() >= SHOW_EVERY
+        {
+            shown = Instant::now();
+            (observer.0)(&so_far(progress.runs, best));
+        }
+    }
 }
 
 /// What is shown while a strategy is learned: the value of the best one until now.
@@ -269,15 +273,14 @@ fn so_far(runs: u64, best: Mean) -> RunsSoFar {
     }
 }
 
-/// What the numbers do not say themselves.
-fn remark(
-    runs: u64,
-    iterations: u64,
-    uniform: Option<&Estimate>,
-    comparison: Option<Comparison>,
-) -> String {
+/// What the numbers do not say themselves; the uniform choice with how the strategy compares with
+/// it.
+fn remark(progress: &Progress, uniform: Option<(&Estimate, Comparison)>) -> String {
+    let Progress {
+        runs, iterations, ..
+    } = progress;
     let learned = format!("learned from {runs} runs in {iterations} iterations");
-    let Some((uniform, comparison)) = uniform.zip(comparison) else {
+    let Some((Estimate { lower, upper, .. }, comparison)) = uniform else {
         return learned;
     };
     let how = match comparison {
@@ -285,6 +288,5 @@ fn remark(
         Comparison::Worse => "worse than",
         Comparison::Alike => "not better than",
     };
-    let Estimate { lower, upper, .. } = uniform;
     format!("{learned}; {how} the uniform choice, which gives [{lower:.6}, {upper:.6}]")
 }

@@ -7,7 +7,6 @@ use std::time::{Duration, Instant};
 use crate::engine::limits::LimitWatch;
 use crate::engine::options::{RunObserver, RunsSoFar};
 use crate::ir::Statistical;
-use crate::search::limits::{Counters, Watch as _};
 use crate::stochastic::statistics::{Expectation, Interval, clopper_pearson};
 use crate::stochastic::{RunWatch, Samples, Shown, ValuesOfRuns};
 
@@ -102,10 +101,6 @@ impl RunWatch for WatchedRuns<'_> {
             self.shown = Instant::now();
             (observer.0)(&self.so_far(runs));
         }
-        let counters = Counters {
-            explored: runs,
-            ..Counters::default()
-        };
-        self.limits.look(&counters).is_some()
+        self.limits.ends_runs(runs)
     }
 }

@@ -28,9 +28,8 @@ use self::solution::{Solution, Unsolved};
 use self::solve::solve;
 use self::states::Counting;
 use super::strategy::LearnedStrategy;
-use super::whole_state::whole_state_without_time;
-use crate::exec::arithmetic::double_of_words;
-use crate::ir::{Feature, Network, Observation, Optimum, RunLimit, Seen};
+use super::whole_state::{clock_of_time, whole_state_without_time};
+use crate::ir::{Feature, Observation, Optimum, RunLimit, Seen};
 use crate::search::limits::{Counters, StopReason};
 use crate::stochastic::{Behaviour, Failure, NotFinite, Runner, Unfolder};
 
@@ -117,30 +116,6 @@ pub fn solve_exactly(
         return solve_for(behaviour, asked, with_time, Some(&clock), look);
     }
     Ok(found)
-}
-
-/// A clock that always shows how long the run has lasted, where time bounds it.
-fn clock_of_time(asked: &Optimum, network: &Network) -> Option<Feature> {
-    if asked.bound.limit != RunLimit::Time {
-        return None;
-    }
-    let written = network.written_words();
-    let mut variables = network.layout.variables.iter();
-    let found = variables.find(|variable| {
-        let clock = variable.offset;
-        let locations = &mut network.locations();
-        network.chances.clocks.binary_search(&clock).is_ok()
-            && !written[clock as usize]
-            && double_of_words(
-                network.initial[clock as usize],
-                network.initial[clock as usize + 1],
-            ) == 0.0
-            && !locations.any(|one| one.chances.rated_clocks.contains(&clock))
-    })?;
-    Some(Feature {
-        text: found.name.clone(),
-        seen: Seen::Clock(found.offset),
-    })
 }
 
 /// Answers it for a controller that sees this, and a feature in any case.

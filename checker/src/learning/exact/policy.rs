@@ -121,9 +121,9 @@ impl Chooser<'_> {
         })
     }
 
-    /// One order of the actions that is best at all of these decisions, if there is one.
-    fn leaf(&mut self, places: &[u32]) -> Option<Vec<Rated>> {
-        // By action: by how much it is worse than the best one, at most.
+    /// By action: by how much it is worse than the best one at these decisions, at most; the best
+    /// actions first.
+    fn regrets(&self, places: &[u32]) -> Vec<(f64, u32)> {
         let mut regrets: Vec<(f64, u32)> = Vec::new();
         for &place in places {
             let policy = self.policy(place);
@@ -145,6 +145,12 @@ impl Chooser<'_> {
             }
         }
         regrets.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
+        regrets
+    }
+
+    /// One order of the actions that is best at all of these decisions, if there is one.
+    fn leaf(&mut self, places: &[u32]) -> Option<Vec<Rated>> {
+        let regrets = self.regrets(places);
         let rank = |label: u32| regrets.iter().position(|one| one.1 == label);
         let mut taken = Vec::with_capacity(places.len());
         for &place in places {

@@ -14,7 +14,7 @@ use rustc_hash::FxBuildHasher;
 
 use crate::analysis::{Influence, LiveVariables};
 use crate::exec::arithmetic::{double_of_words, double_words};
-use crate::ir::{Aim, Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape};
+use crate::ir::{Network, Observation, Optimum, RunLimit, STREAM_WORDS, Seen, Shape};
 use crate::learning::whole_state::functions;
 use crate::stochastic::Stage;
 
@@ -46,11 +46,7 @@ impl<'n> Counting<'n> {
             Seen::Computed(function) => Some(function),
             _ => None,
         }));
-        let number = match asked.aim {
-            Aim::Expected(number) => Some(number),
-            Aim::Time | Aim::Probability => None,
-        };
-        let influence = Influence::new(network, functions.iter().copied(), number);
+        let influence = Influence::new(network, functions.iter().copied(), asked.aim.number());
         let mut kept = kept.to_vec();
         if let RunLimit::Clock(clock) = asked.bound.limit {
             kept.extend([clock, clock + 1]);
@@ -75,7 +71,11 @@ impl<'n> Counting<'n> {
         let live = if is_refined {
             None
         } else {
-            LiveVariables::new(network, functions.into_iter().chain(number), false)
+            LiveVariables::new(
+                network,
+                functions.into_iter().chain(asked.aim.number()),
+                false,
+            )
         };
         Counting {
             network,

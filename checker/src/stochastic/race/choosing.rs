@@ -90,7 +90,6 @@ impl Race<'_> {
         let moment = Moment {
             moves: &moves,
             may_wait,
-            is_drawn: control.is_drawing(),
             is_straight,
             time,
         };

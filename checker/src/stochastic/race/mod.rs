@@ -178,7 +178,7 @@ impl<'a> Race<'a> {
         self.time = 0.0;
         self.moves = 0;
         if let Some(control) = &mut self.control {
-            control.chooser.begin(RunId { seed, run });
+            control.chooser.begin();
         }
         self.resume(program)
     }

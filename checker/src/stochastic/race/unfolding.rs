@@ -23,11 +23,7 @@ use crate::stochastic::program::Program;
 impl Race<'_> {
     /// What the state says of the value.
     pub(in crate::stochastic) fn worth(&mut self, aim: Aim) -> Result<f64, Failure> {
-        match aim {
-            Aim::Probability => Ok(0.0),
-            Aim::Time => Ok(self.time),
-            Aim::Expected(number) => self.machine.real(number, &[]),
-        }
+        self.machine.view_of_state().worth(aim, self.time)
     }
 
     /// Goes to a state of which all is asked that may come next; without it if that is not finite.

@@ -41,6 +41,12 @@ impl Expectation {
         self.mean
     }
 
+    /// The standard error of their mean; 0 for fewer than two values.
+    pub fn error(&self) -> f64 {
+        let freedom = self.count.saturating_sub(1).max(1) as f64;
+        (self.squares / freedom / self.count.max(1) as f64).sqrt()
+    }
+
     /// Student's interval of the logarithm of the mean of values that are not negative; `None` for
     /// fewer than two values, and if all are 0.
     pub fn student_of_logarithm(&self, alpha: f64) -> Option<Interval> {
@@ -58,11 +64,10 @@ impl Expectation {
             return None;
         }
         let freedom = (self.count - 1) as f64;
-        let error = (self.squares / freedom / self.count as f64).sqrt();
         let quantile = StudentsT::new(0.0, 1.0, freedom)
             .ok()?
             .inverse_cdf(1.0 - alpha / 2.0);
-        let half = quantile * error;
+        let half = quantile * self.error();
         Some(Interval {
             lower: self.mean - half,
             upper: self.mean + half,
