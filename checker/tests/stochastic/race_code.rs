@@ -3,12 +3,15 @@
 //!
 //! `NETWORKS=500 cargo test --release --test stochastic race_code::` tries more random networks.
 
+use checker::engine::{CodeEngine, Options};
 use checker::exec::{Executor, Interpreter, Jit};
 use checker::ir::{Asked, Network};
+use checker::learning::Learning;
 use checker::stochastic::{
     Behaviour, Chooser, Chosen, Failure, Guidance, Moment, RunId, Runner, StateView,
 };
 
+use crate::checks;
 use crate::networks::generate::{Family, network};
 use crate::random::Random;
 use crate::{StatisticalQuery, load};
@@ -212,12 +215,68 @@ fn who_decides_is_asked_the_same() {
                     written += runs;
                 }
             }
-            println!("{family:?}: {written} runs of {models} models");
             assert!(
                 models * 4 >= networks && written * 2 >= models * RUNS,
                 "{family:?}: {written} runs of {models} models"
             );
         }
+    }
+}
+
+/// A courier who may wait for a bus, whose coming he sees by a clock, or walk; on the way he
+/// decides in a committed location, where somebody else can move, too.
+const COURIER: &str = "
+    double cost;
+    clock time;
+    int[0, 9] detours;
+    broadcast chan come;
+    process Bus() {
+        clock x;
+        state Away { x <= 20 }, Here { x <= 3 };
+        init Away;
+        trans Away -u-> Here { sync come!; assign x = 0; },
+              Here -u-> Away { assign x = 0; };
+    }
+    process Courier() {
+        clock since;
+        state Waits { since <= 18 }, Asks, Rides { since <= 5 }, Walks { since <= 12 }, Home;
+        commit Asks;
+        init Waits;
+        trans Waits -u-> Asks { sync come?; },
+              Waits -> Walks { assign cost = cost + since, since = 0; },
+              Asks -> Rides { assign cost = cost + since + 1, since = 0; },
+              Asks -> Walks { assign cost = cost + since, since = 0; },
+              Walks -u-> Walks { guard detours < 9 && since >= 1; assign detours++; },
+              Walks -u-> Home { guard since >= 6; assign cost = cost + since + detours; },
+              Rides -u-> Home { guard since >= 5; assign cost = cost + since; };
+    }
+    Runner = Courier();
+    system Bus, Runner;";
+
+#[test]
+fn the_same_is_learned_from_code() {
+    for query in [
+        "strategy S = minE(cost)[<=60]: <> Runner.Home",
+        "strategy S = minE(cost)[<=60]{}->{Runner.since}: <> Runner.Home",
+        "strategy S = maxPr[<=11]: <> Runner.Home",
+        "strategy S = minE(time)[#<=12]: <> Runner.Home",
+    ] {
+        let learned = [CodeEngine::Jit, CodeEngine::Interpreter].map(|code| {
+            let options = Options {
+                code,
+                learning: Learning {
+                    iterations: 2,
+                    ..Learning::default()
+                },
+                ..Options::default()
+            };
+            let model = &mut checks::load(COURIER);
+            let answer = checks::try_ask(model, query, &options)
+                .unwrap_or_else(|refused| panic!("{query}\n{}", refused.rendered.join("\n")));
+            let strategy = answer.evidence.learned.expect("a strategy is learned");
+            (answer.estimate, strategy.regressors.clone())
+        });
+        assert_eq!(learned[0], learned[1], "{query}");
     }
 }
 

@@ -59,7 +59,7 @@ pub(super) fn knows_decisions(program: &Program<'_>) -> bool {
         let mut spots = program.spots_of(process as usize).iter();
         spots.any(|spot| spot.urgency == Urgency::Committed)
     };
-    // Who is not committed moves with somebody who is: whether that is so is not looked at.
+    // Where somebody is committed, a sender who is not can move if somebody who is receives.
     let joins_committed = |instance: &Instance<'_>| {
         let channels = instance.edge.sync.map_or(0..0, |sync| sync.channels());
         let mut receivers = channels.flat_map(|channel| program.receivers(channel));
@@ -76,16 +76,16 @@ pub(super) fn knows_decisions(program: &Program<'_>) -> bool {
     let knows_urgency = |instance: &Instance<'_>| {
         !instance.may_be_urgent || !matches!(instance.channel, Channel::Computed(..))
     };
-    (0..network.processes.len()).all(|process| {
-        let mut spots = program.spots_of(process).iter();
-        spots.all(|spot| {
-            let outputs = program.range(spot.outputs);
-            let mut own = outputs.iter().filter(|one| one.edge.controllable);
-            let is_committed = spot.urgency == Urgency::Committed;
-            own.all(|one| {
-                has_first(one) && knows_urgency(one) && (is_committed || !joins_committed(one))
-            }) && legs_are_neighbours(outputs)
-        })
+    let all_spots = || (0..network.processes.len()).flat_map(|one| program.spots_of(one));
+    let asks_committed =
+        all_spots().any(|spot| spot.is_controllable && spot.urgency == Urgency::Committed);
+    all_spots().all(|spot| {
+        let outputs = program.range(spot.outputs);
+        let mut own = outputs.iter().filter(|one| one.edge.controllable);
+        let joins = spot.urgency != Urgency::Committed && outputs.iter().any(joins_committed);
+        own.all(|one| has_first(one) && knows_urgency(one))
+            && legs_are_neighbours(outputs)
+            && !(asks_committed && joins)
     })
 }
 
@@ -219,8 +219,7 @@ impl<'a> RaceWriter<'_, 'a> {
                         if legs[0].edge.controllable {
                             self.note_move(w, decisions, &legs[0], is_enabled);
                         } else {
-                            let counts =
-                                w.arithmetic(IntegerOperator::And, is_enabled, is_ready);
+                            let counts = w.arithmetic(IntegerOperator::And, is_enabled, is_ready);
                             let any = w.arithmetic(IntegerOperator::Or, others.get(), counts);
                             w.set(&others, any);
                         }
@@ -283,7 +282,12 @@ impl<'a> RaceWriter<'_, 'a> {
         w.when(is_enabled, |w| {
             let count = w.load(decisions.move_count);
             let place = w.integer(place);
-            w.store_at(decisions.moves, count, decisions.entries.len() as u32, place);
+            w.store_at(
+                decisions.moves,
+                count,
+                decisions.entries.len() as u32,
+                place,
+            );
             let count = w.plus(count, 1);
             w.store(decisions.move_count, count);
             if is_urgent {

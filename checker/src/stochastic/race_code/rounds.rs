@@ -312,8 +312,7 @@ impl RaceWriter<'_, '_> {
             let asks = asks.map(|possible_moves| (w.block(), possible_moves));
             next.extend(asks.map(|(block, _)| block));
             w.switch(result, next, wrong);
-            if let (Some((block, possible_moves)), Some(decisions)) =
-                (asks, &self.layout.decisions)
+            if let (Some((block, possible_moves)), Some(decisions)) = (asks, &self.layout.decisions)
             {
                 w.at(block);
                 self.ask(w, possible_moves, decisions, process);

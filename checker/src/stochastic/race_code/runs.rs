@@ -278,7 +278,11 @@ impl RaceCode {
             let before = self.double(self.layout.time);
             let share = (most_moves - moves as f64).min(f64::from(MOVES_OF_A_PLAN)) as u32;
             if share == 0 {
-                break if self.is_reached(program)? { REACHED } else { IS_OVER };
+                break if self.is_reached(program)? {
+                    REACHED
+                } else {
+                    IS_OVER
+                };
             }
             let result = self.moves(program, share, control.as_deref_mut())?;
             let made = share - self.words[self.layout.moves_left as usize] as u32;
@@ -367,17 +371,14 @@ impl RaceCode {
     }
 
     /// Asks who decides for the controller; returns how the code goes on.
-    fn decided(
-        &mut self,
-        program: &Program<'_>,
-        may: i32,
-        control: &mut Control,
-    ) -> Option<i32> {
+    fn decided(&mut self, program: &Program<'_>, may: i32, control: &mut Control) -> Option<i32> {
         let decisions = self.layout.decisions.as_ref()?;
         let count = self.words[decisions.move_count as usize] as usize;
         let first = decisions.moves as usize;
         let places = &self.words[first..first + count];
-        let entries = places.iter().map(|&place| decisions.entries[place as usize]);
+        let entries = places
+            .iter()
+            .map(|&place| decisions.entries[place as usize]);
         control.moves.clear();
         control.moves.extend(entries);
         let word = self.layout.time as usize;
@@ -432,12 +433,7 @@ impl RaceCode {
     }
 
     /// The number that a function leaves so much later, if nothing happens until then.
-    fn number(
-        &mut self,
-        program: &Program<'_>,
-        function: FunctionId,
-        ahead: f64,
-    ) -> Option<f64> {
+    fn number(&mut self, program: &Program<'_>, function: FunctionId, ahead: f64) -> Option<f64> {
         for &clock in &program.network.chances.clocks {
             let value = self.double(clock) + self.double(clock + 2) * ahead;
             self.set_double(clock, value);
