@@ -522,3 +522,28 @@ def test_features_that_no_tree_asks_for_do_no_harm(tmp_path: Path) -> None:
     trees = {"(0)": {"P.A->P.B": 1, "P.A->P.C": 9, "WAIT": cut(4, 0, 5, var=1)}}
     with_trees(model, query, trees, tmp_path)
     assert is_satisfied(model, "A[] P.B imply x == 4 under S")
+
+
+LEAVE = """
+clock x; double cost;
+process Guest() {{
+  state Inside {{ x <= 5 * {unit} }}, Done;
+  urgent Done;
+  init Inside;
+  trans Inside -> Done {{ assign cost = x / {unit}.0 + 4 * exp(-x / {unit}.0); }};
+}}
+system Guest;
+"""
+
+
+def test_cuts_are_integers_where_the_unit_of_time_is_small() -> None:
+    model = load(LEAVE.format(unit=1000))
+    learn = "minE(cost)[<=6000] {} -> {x}: <> Guest.Done"
+    model.check(f"strategy S = {learn}", seed=1, max_iterations=3)
+    assert is_satisfied(model, "A<> Guest.Done under S")
+    # The best moment is ln 4 thousand. A guest who leaves between these pays at most 1 % more.
+    assert is_satisfied(model, "A[] Guest.Done imply x >= 1176 && x <= 1613 under S")
+    coarse = load(LEAVE.format(unit=1))
+    coarse.check("strategy S = minE(cost)[<=6] {} -> {x}: <> Guest.Done", seed=1, max_iterations=2)
+    with pytest.raises(RejectedError, match="zones have integers only"):
+        coarse.check("A<> Guest.Done under S")
