@@ -13,7 +13,6 @@
 
 use rustc_hash::FxHashMap;
 
-use super::Broken;
 use super::cells::cells;
 use super::scene::Scene;
 use super::sight::SymbolicSight;
@@ -21,8 +20,30 @@ use crate::game::strategy::Decision;
 use crate::game::strategy::closed_loop::ClosedLoop;
 use crate::ir::{Network, Part};
 use crate::learning::strategy::{LearnedStrategy, Regressor};
-use crate::network::Symbolic;
+use crate::network::{self, Symbolic};
+use crate::stochastic;
 use crate::zones::{ClockSet, Federation, Zone, instants};
+
+/// Why the decisions of a state are not known.
+#[derive(Clone, Copy, Debug)]
+pub enum Broken {
+    /// A move of the state fails.
+    Move(network::Failure),
+    /// What the strategy sees of it has no value.
+    Feature(stochastic::Failure),
+}
+
+impl From<network::Failure> for Broken {
+    fn from(failure: network::Failure) -> Broken {
+        Broken::Move(failure)
+    }
+}
+
+impl From<stochastic::Failure> for Broken {
+    fn from(failure: stochastic::Failure) -> Broken {
+        Broken::Feature(failure)
+    }
+}
 
 /// Finds the decisions of discrete states.
 pub(super) struct Deciding<'a> {

@@ -16,43 +16,18 @@ mod sight;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+pub use deciding::Broken;
 use deciding::Deciding;
 use sight::SymbolicSight;
+pub use sight::{NotInZones, StochasticReading};
 
 use super::strategy::LearnedStrategy;
-use crate::exec::Executor;
 use crate::game::Player;
 use crate::game::strategy::closed_loop::{self, ClosedLoop, Joined};
 use crate::game::strategy::{Selection, Start, Strategy, StrategyState};
-use crate::ir::{ClockAtom, ClockId, FixedConstraint, Network};
-use crate::network::{self, Allowed, Restriction, Symbolic};
+use crate::ir::{ClockAtom, ClockId, FixedConstraint};
+use crate::network::{Allowed, Restriction, Symbolic};
 use crate::search::StateStore;
-use crate::stochastic;
-
-/// Why a learned strategy has no meaning in zones.
-#[derive(Clone, Debug, PartialEq)]
-pub enum NotInZones {
-    /// The two readings of the model do not correspond.
-    Readings,
-    /// It sees this, which symbolic states do not have.
-    Feature(String),
-    /// It compares a clock with a number that zones do not have.
-    Cut {
-        /// The clock.
-        text: String,
-        /// The number.
-        bound: f64,
-    },
-}
-
-/// Why the decisions of a state are not known.
-#[derive(Clone, Copy, Debug)]
-pub enum Broken {
-    /// A move of the state fails.
-    Move(network::Failure),
-    /// What the strategy sees of it has no value.
-    Feature(stochastic::Failure),
-}
 
 /// A learned strategy as a restriction, which grows as it is asked. Threads share it.
 pub struct InZones<'a> {
@@ -75,27 +50,6 @@ struct Found {
     state: StrategyState,
     /// `None` is everything.
     allowed: Option<Arc<Allowed>>,
-}
-
-/// The stochastic reading of a model, in which strategies are learned.
-#[derive(Clone, Copy)]
-pub struct StochasticReading<'a> {
-    /// Its network.
-    pub network: &'a Network,
-    /// Runs its code.
-    pub executor: &'a dyn Executor,
-}
-
-impl From<network::Failure> for Broken {
-    fn from(failure: network::Failure) -> Broken {
-        Broken::Move(failure)
-    }
-}
-
-impl From<stochastic::Failure> for Broken {
-    fn from(failure: stochastic::Failure) -> Broken {
-        Broken::Feature(failure)
-    }
 }
 
 impl<'a> InZones<'a> {

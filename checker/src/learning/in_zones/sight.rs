@@ -4,8 +4,8 @@
 //! copied into a state of that one, and the features are read there. Features that depend on
 //! anything else have no value in zones, clocks but for those that are compared alone.
 
-use super::{NotInZones, StochasticReading};
 use crate::analysis::function_reads::read_words;
+use crate::exec::Executor;
 use crate::ir::{Feature, Network, Seen};
 use crate::learning::observation::{self, Sight};
 use crate::learning::strategy::LearnedStrategy;
@@ -15,6 +15,31 @@ use crate::zones::Bound;
 
 /// Features that read more words are not seen in zones.
 const MOST_READ_WORDS: usize = 1 << 16;
+
+/// Why a learned strategy has no meaning in zones.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NotInZones {
+    /// The two readings of the model do not correspond.
+    Readings,
+    /// It sees this, which symbolic states do not have.
+    Feature(String),
+    /// It compares a clock with a number that zones do not have.
+    Cut {
+        /// The clock.
+        text: String,
+        /// The number.
+        bound: f64,
+    },
+}
+
+/// The stochastic reading of a model, in which strategies are learned.
+#[derive(Clone, Copy)]
+pub struct StochasticReading<'a> {
+    /// Its network.
+    pub network: &'a Network,
+    /// Runs its code.
+    pub executor: &'a dyn Executor,
+}
 
 /// Sees states of the symbolic reading.
 pub(super) struct SymbolicSight<'a> {
