@@ -547,3 +547,33 @@ def test_cuts_are_integers_where_the_unit_of_time_is_small() -> None:
     coarse.check("strategy S = minE(cost)[<=6] {} -> {x}: <> Guest.Done", seed=1, max_iterations=2)
     with pytest.raises(RejectedError, match="zones have integers only"):
         coarse.check("A<> Guest.Done under S")
+
+
+LATE = """
+clock x, age; double cost;
+process Guest() {
+  state Inside { x <= 5000 }, Done, Bad;
+  init Inside;
+  trans Inside -> Done { assign cost = 5 - x / 1000.0, x = 0; },
+        Inside -u-> Bad { guard x >= 2000; assign cost = 0; };
+}
+system Guest;
+"""
+
+
+def test_clocks_that_are_seen_and_a_safe_strategy_both_restrict() -> None:
+    model = load(LATE)
+    learn = "minE(cost)[<=6000] {} -> {x}: <> Guest.Done || Guest.Bad"
+    assert is_satisfied(model, "strategy Safe = control: A[] !Guest.Bad")
+    for name, under in ("Free", ""), ("Within", " under Safe"):
+        model.check(f"strategy {name} = {learn}{under}", seed=1, max_iterations=3)
+    assert is_satisfied(model, "E<> Guest.Bad under Free")
+    assert is_satisfied(model, "A[] !Guest.Bad under Within")
+    assert is_satisfied(model, "A<> Guest.Done under Within")
+    # Who leaves early is safe, but pays for it: x is the time since then, and `age` the whole.
+    assert is_satisfied(model, "E<> Guest.Done && age == x under Safe")
+    assert is_satisfied(model, "A[] Guest.Done imply age - x >= 1000 under Within")
+    assert not is_satisfied(model, "A[] Guest.Done imply age - x >= 1000 under Safe")
+    bad = model.check("Pr[<=6000](<> Guest.Bad) under Within", runs=500, seed=1)
+    assert bad.estimate is not None
+    assert bad.estimate.value == 0
