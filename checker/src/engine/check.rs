@@ -19,8 +19,9 @@ use crate::network::Failure;
 use crate::semantics::Reading;
 use crate::syntax::ast::QueryText;
 
-/// The strategy that the controller stays within, and the learned one that it follows.
-type FollowedStrategies = (Option<Arc<Under>>, Option<Arc<LearnedStrategy>>);
+/// The strategy that the controller stays within, and the learned one that it follows; or the
+/// answer if a limit came before they were known.
+type FollowedStrategies = Result<(Option<Arc<Under>>, Option<Arc<LearnedStrategy>>), Box<Answer>>;
 
 impl LoadedModel {
     /// Answers a query.
@@ -56,7 +57,16 @@ impl LoadedModel {
         let level = self.level(&query, options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (under, learned) = self.followed(&query, options)?;
+        let (under, learned) = match self.followed(&query, options)? {
+            Ok(followed) => followed,
+            Err(answer) => {
+                return Ok(Answer {
+                    warnings,
+                    load_seconds: self.load_seconds,
+                    ..*answer
+                });
+            }
+        };
         let prepared = PreparedQuery {
             query,
             options: options.left_since(start),
@@ -82,17 +92,26 @@ impl LoadedModel {
         options: &Options,
     ) -> Result<FollowedStrategies, Rejection> {
         let Some(name) = &query.under else {
-            return Ok((None, None));
+            return Ok(Ok((None, None)));
         };
         if let Some(named) = self.strategy(name)
             && let Some(learned) = &named.learned
         {
-            return Ok((named.within.clone(), Some(Arc::clone(learned))));
+            let (within, learned) = (named.within.clone(), Arc::clone(learned));
+            let is_symbolic = !matches!(
+                query.kind,
+                QueryKind::Statistical(_) | QueryKind::Optimum(_)
+            );
+            if !is_symbolic {
+                return Ok(Ok((within, Some(learned))));
+            }
+            let in_zones = self.learned_in_zones(name, &learned, query, options)?;
+            return Ok(in_zones.map(|under| (Some(under), None)));
         }
         let strategy = self.permitted_by(name, query.span, options)?.strategy;
         let query = self.strategy(name).map(|one| one.query.clone());
         let query = query.unwrap_or_default();
-        Ok((Some(Arc::new(Under { query, strategy })), None))
+        Ok(Ok((Some(Arc::new(Under { query, strategy })), None)))
     }
 
     /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer

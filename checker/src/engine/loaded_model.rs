@@ -407,6 +407,8 @@ pub struct NamedStrategy {
     pub learned: Option<Arc<LearnedStrategy>>,
     /// The strategy that a learned one refines.
     pub(crate) within: Option<Arc<Under>>,
+    /// The decisions of a learned strategy in zones, once a symbolic query under it was asked.
+    pub(crate) in_zones: Option<Arc<Under>>,
 }
 
 /// A compiled query with all that it is answered by.
@@ -443,6 +445,7 @@ impl NamedStrategy {
             permitted: None,
             learned: None,
             within: None,
+            in_zones: None,
         }
     }
 }
