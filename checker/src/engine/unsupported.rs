@@ -44,6 +44,7 @@ impl LoadedModel {
             }
             QueryKind::Statistical(_)
             | QueryKind::Optimum(_)
+            | QueryKind::Shield(_)
             | QueryKind::SaveStrategy { .. }
             | QueryKind::LoadStrategy { .. } => return Ok(()),
             _ if prepared.learned.is_some() => {
@@ -52,6 +53,14 @@ impl LoadedModel {
                     query.span,
                     "symbolic queries under a learned strategy are not supported",
                     "ask Pr, E or simulate under it",
+                ));
+            }
+            _ if prepared.shield.is_some() => {
+                return Err(self.refusal(
+                    codes::UNSUPPORTED_QUERY,
+                    query.span,
+                    "symbolic queries under a shield are not supported",
+                    "ask Pr, E, simulate, minE, maxE, minPr or maxPr under it",
                 ));
             }
             QueryKind::Control(control) => Some(control),

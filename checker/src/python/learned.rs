@@ -14,6 +14,10 @@ use crate::engine::format::learned_json;
 use crate::engine::query_form::unnamed;
 use crate::learning;
 
+/// The languages of code by their names.
+pub(super) const LANGUAGES: [(&str, Language); 2] =
+    [("c", Language::C), ("python", Language::Python)];
+
 /// A learned strategy.
 #[pyclass(frozen, module = "ntagen._checker")]
 pub(super) struct LearnedStrategy {
@@ -104,8 +108,7 @@ impl LearnedStrategy {
 
     /// The strategy as a function in "c" or "python", whose names begin so.
     fn code(slf: &Bound<'_, Self>, language: &str, name: String) -> PyResult<String> {
-        let known = [("c", Language::C), ("python", Language::Python)];
-        let language = choice("language", language, &known)?;
+        let language = choice("language", language, &LANGUAGES)?;
         written(slf, move |own, model| {
             model.learned_code(&own.inner, language, &name, &own.query)
         })

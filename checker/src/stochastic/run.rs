@@ -97,7 +97,9 @@ impl<'a> Runner<'a> {
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
-        let is_free = behaviour.restriction.is_none() && behaviour.guidance.is_none();
+        let is_free = behaviour.restriction.is_none()
+            && behaviour.guidance.is_none()
+            && behaviour.fence.is_none();
         let stages = is_free.then(|| Stages::new(behaviour.executor));
         Runner::with(Arc::new(program), behaviour, stages)
     }

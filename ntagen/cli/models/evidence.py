@@ -176,6 +176,9 @@ def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str]
     if isinstance(learned := answer.strategy, LearnedStrategy):
         defines = None if query.form is None else query.form.defines
         return [learned.file_text(suffix, defines or "strategy")]
+    if answer.is_shield and suffix in (".c", ".py"):
+        name = (query.form and query.form.defines) or "shield"
+        return [answer.shield_code("c" if suffix == ".c" else "python", name)]
     if suffix == ".c":
         controller = answer.controller_c()
         return None if controller is None else [controller]

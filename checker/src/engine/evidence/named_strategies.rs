@@ -20,7 +20,7 @@ use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
 use crate::engine::format::json_reader::Mismatch;
-use crate::engine::format::{learned_json, strategy_json};
+use crate::engine::format::{learned_json, shield_json, strategy_json};
 use crate::engine::limits::{LimitWatch, ended_text, stop_text};
 use crate::engine::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::Options;
@@ -30,10 +30,12 @@ use crate::ir::{FeatureTexts, Query};
 use crate::learning::LearnedStrategy;
 use crate::search::limits::Counters;
 use crate::semantics::Reading;
+use crate::shield::Shield;
 
 /// What the file of a strategy has.
 enum Loaded {
     Learned(Arc<LearnedStrategy>),
+    Shield(Arc<Shield>),
     InZones {
         query: String,
         strategy: Arc<Strategy>,
@@ -119,17 +121,20 @@ impl LoadedModel {
         span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let learned = self.strategy(name).and_then(|one| one.learned.clone());
-        let known = match learned {
-            Some(_) => None,
-            None => Some(self.existing_strategy(name, span, options)?),
+        let named = self.strategy(name);
+        let learned = named.and_then(|one| one.learned.clone());
+        let shield = named.and_then(|one| one.shield.clone());
+        let known = match (&learned, &shield) {
+            (None, None) => Some(self.existing_strategy(name, span, options)?),
+            _ => None,
         };
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let mut watch = LimitWatch::new(options.limits.clone());
-        let written = watch.bound(|_| match (&known, &learned) {
-            (Some(strategy), _) => Ok(strategy_json::text(self.network(), strategy, query)),
-            (None, Some(learned)) => self.learned_text(learned),
-            (None, None) => unreachable!("there is a strategy, or an error"),
+        let written = watch.bound(|_| match (&known, &learned, &shield) {
+            (Some(strategy), _, _) => Ok(strategy_json::text(self.network(), strategy, query)),
+            (None, Some(learned), _) => self.learned_text(learned),
+            (None, None, Some(shield)) => Ok(self.shield_text(shield, query)),
+            (None, None, None) => unreachable!("there is a strategy, or an error"),
         });
         let path = self.strategy_path(file, options);
         let text = match written {
@@ -191,12 +196,22 @@ impl LoadedModel {
             Ok(meaning) => meaning,
             Err(mismatch) => return Err(self.mismatched(span, &from, &mismatch)),
         };
-        let read = watch.bound(|_| match &meaning {
-            Some(meaning) => {
+        let is_shield = shield_json::is_one(&file);
+        let of_shield = is_shield.then(|| self.shield_meaning(&file, span, options));
+        let of_shield = match of_shield.transpose()?.transpose() {
+            Ok(meaning) => meaning,
+            Err(mismatch) => return Err(self.mismatched(span, &from, &mismatch)),
+        };
+        let read = watch.bound(|_| match (&meaning, &of_shield) {
+            (Some(meaning), _) => {
                 let learned = self.read_learned(&file, meaning);
                 learned.map(|learned| Loaded::Learned(Arc::new(learned)))
             }
-            None => self.read_zones(&file),
+            (None, Some(meaning)) => {
+                let shield = self.read_shield(&file, meaning);
+                shield.map(|shield| Loaded::Shield(Arc::new(shield)))
+            }
+            (None, None) => self.read_zones(&file),
         });
         let loaded = match read {
             Ok(read) => read.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?,
@@ -210,6 +225,16 @@ impl LoadedModel {
                 let what = format!("{} leaves", learned.leaves());
                 let named = NamedStrategy {
                     learned: Some(learned),
+                    ..NamedStrategy::new(name.to_owned(), text, None)
+                };
+                (what, named)
+            }
+            Loaded::Shield(shield) => {
+                evidence.shield = Some(Arc::clone(&shield));
+                let text = unnamed(&query.text).to_owned();
+                let what = format!("{} safe cells", shield.safe_cells());
+                let named = NamedStrategy {
+                    shield: Some(shield),
                     ..NamedStrategy::new(name.to_owned(), text, None)
                 };
                 (what, named)
