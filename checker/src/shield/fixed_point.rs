@@ -129,7 +129,9 @@ mod tests {
         CellSteps {
             keeps: true,
             choices: vec![(1 << leads.len()) - 1],
-            leads: numbered.map(|(place, cells)| (place, cells.to_vec())).collect(),
+            leads: numbered
+                .map(|(place, cells)| (place, cells.to_vec()))
+                .collect(),
             ..CellSteps::default()
         }
     }
@@ -145,7 +147,12 @@ mod tests {
     #[test]
     fn what_leads_to_an_unsafe_cell_is_not_allowed() {
         let bad = CellSteps::default();
-        let cells = [cell(&[&[1], &[3]]), cell(&[&[2], &[3]]), cell(&[&[0], &[1, 3]]), bad];
+        let cells = [
+            cell(&[&[1], &[3]]),
+            cell(&[&[2], &[3]]),
+            cell(&[&[0], &[1, 3]]),
+            bad,
+        ];
         assert_eq!(solved(&cells, 0b11), [0b01, 0b01, 0b01, 0]);
     }
 

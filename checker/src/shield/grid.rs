@@ -145,3 +145,68 @@ fn place_of(axis: &Axis, value: f64) -> Option<u32> {
     let is_inside = 0.0 <= place && place < f64::from(axis.cells);
     is_inside.then_some(place as u32)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ir::Feature;
+
+    fn axis(seen: Seen, low: f64, high: f64, cells: u32) -> Axis {
+        let text = String::from("x");
+        Axis {
+            feature: Feature { text, seen },
+            low,
+            high,
+            cells,
+        }
+    }
+
+    fn places(grid: &Grid, values: &[f64]) -> Vec<Option<u32>> {
+        let axes = grid.axes.iter().zip(values);
+        axes.map(|(axis, &value)| place_of(axis, value)).collect()
+    }
+
+    #[test]
+    fn samples_lie_in_their_cells() {
+        let grid = Grid {
+            axes: vec![
+                axis(Seen::Integer(0), -2.0, 3.0, 6),
+                axis(Seen::Double(1), -13.0, 13.0, 8),
+                axis(Seen::Clock(3), 0.5, 4.5, 5),
+            ],
+        };
+        assert_eq!((grid.cells(), grid.samples(4)), (240, 16));
+        for cell in 0..240 {
+            let wanted = [cell / 40, cell / 5 % 8, cell % 5].map(Some);
+            for number in 0..16 {
+                let values = grid.sample(cell, 4, number);
+                // Where cells meet, rounding may put the lower end into the cell before.
+                let inside: Vec<f64> = values.iter().map(|value| value + 1e-9).collect();
+                assert_eq!(places(&grid, &inside), wanted, "{cell} {number}");
+            }
+        }
+    }
+
+    #[test]
+    fn cells_are_half_open() {
+        let axis = axis(Seen::Double(0), 0.0, 10.0, 4);
+        let found = [-0.1, 0.0, 2.4, 2.5, 9.9, 10.0, f64::NAN].map(|one| place_of(&axis, one));
+        assert_eq!(
+            found,
+            [None, Some(0), Some(0), Some(1), Some(3), None, None]
+        );
+    }
+
+    #[test]
+    fn samples_outside_are_as_far_away_as_the_grid_is_long() {
+        let grid = Grid {
+            axes: vec![
+                axis(Seen::Integer(0), 1.0, 2.0, 2),
+                axis(Seen::Double(1), 10.0, 20.0, 7),
+            ],
+        };
+        let all = (0..grid.samples_outside()).filter_map(|number| grid.sample_outside(number));
+        let all: Vec<Vec<f64>> = all.collect();
+        assert_eq!(all, [[1.0, 0.0], [2.0, 0.0], [1.0, 30.0], [2.0, 30.0]]);
+    }
+}

@@ -10,7 +10,7 @@
 //!   sample of the cell enabled.
 //! * All is determined by the seed: the numbers of cells are those of the runs from them.
 //!
-//! Source: A. H. Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", AISoLA 2023;
+//! Source: A. H. Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", `AISoLA` 2023;
 //! "Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025.
 
 mod fixed_point;

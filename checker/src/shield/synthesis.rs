@@ -121,7 +121,7 @@ pub fn shield(
 
 /// What the samples of all cells came to.
 enum Sampled {
-    All(Found),
+    All(Box<Found>),
     Left(LeftCell),
     Cut(Option<StopReason>),
 }
@@ -155,7 +155,7 @@ fn sampled(
     let stop = stop.or_else(|| look(&found.counters()));
     Ok(match found.left.take() {
         Some(left) => Sampled::Left(left),
-        None if is_whole && stop.is_none() => Sampled::All(found),
+        None if is_whole && stop.is_none() => Sampled::All(Box::new(found)),
         None => Sampled::Cut(stop),
     })
 }

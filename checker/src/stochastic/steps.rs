@@ -83,7 +83,9 @@ impl Runner<'_> {
         race.machine.set_stream(stream);
         change(race.machine.view_of_state().words);
         (race.time, race.moves) = (0.0, 0);
-        race.resume(&self.program)
+        race.resume(&self.program)?;
+        race.plan_flows_last(&self.program);
+        Ok(())
     }
 
     /// The state.

@@ -218,15 +218,17 @@ fn remark(facts: &Facts, holds: bool, estimate: Option<&Estimate>) -> String {
         stuck,
     } = facts;
     let share = 100.0 * *safe_cells as f64 / *cells as f64;
-    let mut text = format!(
-        "{safe_cells} of {cells} cells are safe ({share:.4} %), {seen_cells} have a sample with a \
-         choice; {unseen_pairs} pairs of a cell and a move were never seen"
-    );
+    let mut parts = vec![
+        format!("{safe_cells} of {cells} cells are safe ({share:.4} %)"),
+        format!("{seen_cells} have a sample with a choice"),
+        format!("{unseen_pairs} pairs of a cell and a move were never seen"),
+    ];
     if *stuck > 0 {
-        text += &format!("; {stuck} runs were stuck, which counts as unsafe");
+        parts.push(format!("{stuck} runs were stuck, which counts as unsafe"));
     }
     if !holds {
-        text += "; runs begin in a cell that is not safe, or break the condition before a choice";
+        let why = "runs begin in a cell that is not safe, or break the condition before a choice";
+        parts.push(why.to_owned());
     }
     if let Some(Estimate {
         satisfied_runs: Some(broken),
@@ -236,10 +238,10 @@ fn remark(facts: &Facts, holds: bool, estimate: Option<&Estimate>) -> String {
         ..
     }) = estimate
     {
-        text += &format!(
-            "; of {runs} fresh runs with {CHOICES} choices {broken} broke the condition: \
+        parts.push(format!(
+            "of {runs} fresh runs with {CHOICES} choices {broken} broke the condition: \
              [{lower:.6}, {upper:.6}]"
-        );
+        ));
     }
-    text
+    parts.join("; ")
 }

@@ -1,8 +1,8 @@
 """The published cases of shields, as they are asked of models here.
 
 Sources: Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", AISoLA 2023, and
-"Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025. Of 10,000 runs under
-their shields none was unsafe. Grids here are coarser than theirs where that is enough.
+"Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025. Of 10,000 runs
+under their shields none was unsafe. Grids here are coarser than theirs where that is enough.
 """
 
 from __future__ import annotations
