@@ -8,7 +8,7 @@
 //!   what must be kept, and each came to a choice in a safe cell or to none at all.
 //! * So where no sample of a cell has a choice all is allowed; the same goes for a move that no
 //!   sample of the cell enabled.
-//! * All is determined by the seed: the numbers of cells are those of the runs from them.
+//! * All is determined by the seed: the number of a cell says which random numbers its runs draw.
 //!
 //! Source: A. H. Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", `AISoLA` 2023;
 //! "Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025.

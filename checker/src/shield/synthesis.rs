@@ -15,8 +15,10 @@ use crate::stochastic::{
     Behaviour, ControllerMove, Failure, RunId, Runner, Scouts, StepEnd, runs_by,
 };
 
-/// The numbers of the runs that begin at the beginning; cells have lesser ones.
+/// The numbers of the runs that begin at the beginning, and of those from the first cell: no query
+/// for runs under the shield makes them again.
 const BEGINNING: u64 = 1 << 40;
+const CELLS: u64 = 1 << 42;
 /// How many there are at least.
 const BEGINNINGS: u64 = 100;
 /// What it takes to look at a sample: see [`cancellation::work`].
@@ -141,7 +143,8 @@ fn sampled(
         runners,
         0..cells,
         |runner, cell| {
-            runner.begin_steps(RunId { seed, run: cell })?;
+            let run = CELLS + cell;
+            runner.begin_steps(RunId { seed, run })?;
             sampler.look(runner, cell as u32)
         },
         |steps| found.borrow_mut().add(steps),

@@ -59,6 +59,7 @@ def test_what_counts_outside_is_an_option(capsys: pytest.CaptureFixture[str], nu
     ("name", "wanted"),
     [
         ("s.json", '"format":"ntagen-shield"'),
+        ("s", '"format":"ntagen-shield"'),
         ("s.c", "uint64_t S_allowed("),
         ("s.py", "def allowed("),
     ],

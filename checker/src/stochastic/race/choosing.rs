@@ -134,7 +134,8 @@ impl Race<'_> {
         entry: u32,
     ) -> Result<(), Failure> {
         let chosen = self.output_of(program, entry)?;
-        self.make(program, chosen)
+        let process = program.instance(chosen).process as usize;
+        self.make(program, process, chosen)
     }
 
     /// The output by which a move is made: of legs that are edges, one by weight.

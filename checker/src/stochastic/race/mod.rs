@@ -436,12 +436,12 @@ impl<'a> Race<'a> {
             };
             chosen = decided;
         }
-        self.make(program, chosen)
+        self.make(program, process, chosen)
     }
 
-    /// Lets the process of an output that is enabled move by it, if the strategy does not wait.
-    fn make(&mut self, program: &Program<'_>, chosen: u32) -> Result<(), Failure> {
-        let process = program.instance(chosen).process as usize;
+    /// Makes a move with an output that is enabled, if the strategy does not wait, now that the
+    /// delay of a process is over.
+    fn make(&mut self, program: &Program<'_>, process: usize, chosen: u32) -> Result<(), Failure> {
         self.movers.clear();
         self.movers.push((chosen, 0));
         let sender = program.instance(chosen);
