@@ -67,7 +67,7 @@ def test_what_is_learned_under_a_shield_is_safe_and_cheaper() -> None:
     model.check(WALK.query, threads=2, **WALK.options)
     cheap = "strategy Cheap = minE(cost)[#<=100] {} -> {x, t}: <> Walker.End"
     free = model.check(cheap, threads=2)
-    assert model.check(f"{WALK.broken} under Cheap").value > 0.5
+    assert model.check(f"{WALK.broken} under Cheap").value > 0.1
     shielded = model.check(f"{cheap} under S", threads=2)
     under = model.check(f"{WALK.broken} under Cheap").estimate
     assert under is not None

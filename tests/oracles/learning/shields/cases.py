@@ -78,7 +78,7 @@ CASES = (
     Shielding(
         "pump",
         "volume >= 4.9 && volume < 25.1",
-        "part[0,99], pumping[0,1], volume[4.9,25.1]:101",
-        options={"shield_repeats": 20},
+        "part[0,99], pumping[0,1], rest[0,10], volume[4.9,25.1]:101",
+        options={"shield_repeats": 3},
     ),
 )
