@@ -69,7 +69,16 @@ impl LoadedModel {
             under,
             learned,
             shield,
-        } = self.followed(&query, options)?;
+        } = match self.followed(&query, options)? {
+            Ok(followed) => followed,
+            Err(answer) => {
+                return Ok(Answer {
+                    warnings,
+                    load_seconds: self.load_seconds,
+                    ..*answer
+                });
+            }
+        };
         let prepared = PreparedQuery {
             query,
             options: options.left_since(start),
@@ -94,26 +103,38 @@ impl LoadedModel {
         &mut self,
         query: &Query,
         options: &Options,
-    ) -> Result<FollowedStrategies, Rejection> {
+    ) -> Result<Result<FollowedStrategies, Box<Answer>>, Rejection> {
         let Some(name) = &query.under else {
-            return Ok(FollowedStrategies::default());
+            return Ok(Ok(FollowedStrategies::default()));
         };
         if let Some(named) = self.strategy(name)
             && (named.learned.is_some() || named.shield.is_some())
         {
-            return Ok(FollowedStrategies {
+            let is_symbolic = !matches!(
+                query.kind,
+                QueryKind::Statistical(_) | QueryKind::Optimum(_)
+            );
+            if let (true, Some(learned), None) = (is_symbolic, &named.learned, &named.shield) {
+                let learned = Arc::clone(learned);
+                let in_zones = self.learned_in_zones(name, &learned, query, options)?;
+                return Ok(in_zones.map(|under| FollowedStrategies {
+                    under: Some(under),
+                    ..FollowedStrategies::default()
+                }));
+            }
+            return Ok(Ok(FollowedStrategies {
                 under: named.within.clone(),
                 learned: named.learned.clone(),
                 shield: named.shield.clone(),
-            });
+            }));
         }
         let strategy = self.permitted_by(name, query.span, options)?.strategy;
         let query = self.strategy(name).map(|one| one.query.clone());
         let query = query.unwrap_or_default();
-        Ok(FollowedStrategies {
+        Ok(Ok(FollowedStrategies {
             under: Some(Arc::new(Under { query, strategy })),
             ..FollowedStrategies::default()
-        })
+        }))
     }
 
     /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer

@@ -412,6 +412,8 @@ pub struct NamedStrategy {
     pub(crate) within: Option<Arc<Under>>,
     /// The shield, if it is one; or the one that a learned strategy refines.
     pub(crate) shield: Option<Arc<Shield>>,
+    /// The decisions of a learned strategy in zones, once a symbolic query under it was asked.
+    pub(crate) in_zones: Option<Arc<Under>>,
 }
 
 /// A compiled query with all that it is answered by.
@@ -451,6 +453,7 @@ impl NamedStrategy {
             learned: None,
             within: None,
             shield: None,
+            in_zones: None,
         }
     }
 }

@@ -47,14 +47,6 @@ impl LoadedModel {
             | QueryKind::Shield(_)
             | QueryKind::SaveStrategy { .. }
             | QueryKind::LoadStrategy { .. } => return Ok(()),
-            _ if prepared.learned.is_some() => {
-                return Err(self.refusal(
-                    codes::UNSUPPORTED_QUERY,
-                    query.span,
-                    "symbolic queries under a learned strategy are not supported",
-                    "ask Pr, E or simulate under it",
-                ));
-            }
             _ if prepared.shield.is_some() => {
                 return Err(self.refusal(
                     codes::UNSUPPORTED_QUERY,

@@ -8,6 +8,7 @@ use rustc_hash::FxHashMap;
 use super::episode::Episode;
 use super::partition::{DRAW, Partition, WAIT};
 use super::process::{Process, Sample};
+use super::tree;
 
 /// The stand after which nothing costs any more.
 const END: u32 = 0;
@@ -27,6 +28,8 @@ struct Memory {
     point: u32,
     moves: bool,
     is_last: bool,
+    /// A node of the tree of the observation that its point lies below, not far from the leaf.
+    node: u32,
 }
 
 /// Remembered decisions.
@@ -39,6 +42,8 @@ pub(super) struct Experience {
     /// The sets of possible actions, one after the other.
     sets: Vec<Box<[u32]>>,
     set_numbers: FxHashMap<Box<[u32]>, u32>,
+    /// The number that was asked for last, which is often asked for again.
+    last_set: u32,
 }
 
 impl Experience {
@@ -73,6 +78,7 @@ impl Experience {
                 point: self.points.len() as u32,
                 moves: step.moves,
                 is_last: number + 1 == episode.steps.len(),
+                node: 0,
             });
             self.points
                 .extend_from_slice(&episode.points[point..point + numbers]);
@@ -84,7 +90,12 @@ impl Experience {
 
     /// The number of a set of possible actions.
     fn set(&mut self, possible: &[u32]) -> u32 {
+        let last = self.sets.get(self.last_set as usize);
+        if last.is_some_and(|last| last.iter().eq(possible)) {
+            return self.last_set;
+        }
         if let Some(&known) = self.set_numbers.get(possible) {
+            self.last_set = known;
             return known;
         }
         let new = self.sets.len() as u32;
@@ -110,8 +121,16 @@ impl Experience {
         }
     }
 
-    /// What a partition makes of all decisions.
-    pub(super) fn process(&self, partition: &Partition) -> Process {
+    /// What a partition makes of all decisions: the same one as before, or one that was cut
+    /// further.
+    pub(super) fn process(&mut self, partition: &Partition) -> Process {
+        let points = &self.points;
+        let cells = self.memories.iter_mut().map(|memory| {
+            let point = &points[memory.point as usize..][..self.dimension];
+            let tree = partition.tree(memory.observation);
+            tree::leaf_below(tree, &mut memory.node, point)
+        });
+        let cells: Vec<u32> = cells.collect();
         let mut builder = Builder {
             partition,
             samples: Vec::with_capacity(self.memories.len()),
@@ -131,17 +150,12 @@ impl Experience {
             let numbers = &self.points[memory.point as usize..];
             here.extend_from_slice(&numbers[..self.dimension]);
             let next = self.memories.get(number + 1).filter(|_| !memory.is_last);
-            let next = next.map_or(END, |next| {
-                let point = &self.points[next.point as usize..][..self.dimension];
-                let cell = partition.cell(next.observation, point);
-                builder.stand(cell, next.set)
-            });
+            let next = next.map_or(END, |next| builder.stand(cells[number + 1], next.set));
             if memory.moves {
                 let rates = &numbers[self.dimension..2 * self.dimension];
                 builder.add_wait(memory, &mut here, rates, next);
             } else {
-                let cell = partition.cell(memory.observation, &here);
-                let slot = builder.slot(cell, memory.action);
+                let slot = builder.slot(cells[number], memory.action);
                 builder.add(slot, next, memory.cost, &here, memory.at);
             }
         }

@@ -20,9 +20,13 @@ pub enum Node<L> {
 
 /// The leaf of a point.
 pub(super) fn leaf<L: Copy>(tree: &[Node<L>], point: &[f64]) -> L {
-    let mut node = tree[0];
+    leaf_below(tree, &mut 0, point)
+}
+
+/// The leaf of a point that lies below a node, which is set to that of the leaf.
+pub(super) fn leaf_below<L: Copy>(tree: &[Node<L>], node: &mut u32, point: &[f64]) -> L {
     loop {
-        match node {
+        match tree[*node as usize] {
             Node::Leaf(leaf) => return leaf,
             Node::Cut {
                 feature,
@@ -31,7 +35,7 @@ pub(super) fn leaf<L: Copy>(tree: &[Node<L>], point: &[f64]) -> L {
                 high,
             } => {
                 let is_low = point[feature as usize] <= bound;
-                node = tree[if is_low { low } else { high } as usize];
+                *node = if is_low { low } else { high };
             }
         }
     }

@@ -194,6 +194,11 @@ impl Control {
         }
     }
 
+    /// Whether who decides sees clocks.
+    pub(super) fn sees_time(&self) -> bool {
+        self.sees_time
+    }
+
     /// Something has happened: it is asked anew.
     pub(super) fn renew(&mut self) {
         self.chooser.renew();

@@ -49,6 +49,7 @@ pub use collector::estimate;
 pub use comparison::compare;
 pub use constants::{MOVES_WITHOUT_RISE, ZENO_MOVES, ZENO_TIME};
 pub use control::{Chooser, Chosen, ControllerMove, Fence, Guidance, Moment, StateView};
+pub use correspondence::Correspondence;
 pub use estimate::{Simulated, simulate};
 pub use failure::{Failure, Stand};
 pub use in_order::runs_by;

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
-use super::control::{Chooser, ControllerMove};
+use super::control::{Chooser, Control, ControllerMove};
 use super::entry::entry;
 use super::failure::Failure;
 use super::machine::Machine;
@@ -97,11 +97,11 @@ impl<'a> Runner<'a> {
     /// solved by Euler's method.
     pub fn of(behaviour: Behaviour<'a>) -> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
-        let is_free = behaviour.restriction.is_none()
-            && behaviour.guidance.is_none()
-            && behaviour.fence.is_none();
-        let stages = is_free.then(|| Stages::new(behaviour.executor));
-        Runner::with(Arc::new(program), behaviour, stages)
+        let mut runner = Runner::with(Arc::new(program), behaviour, None);
+        let sees_time = runner.race.control.as_ref().map(Control::sees_time);
+        let is_free = behaviour.restriction.is_none() && behaviour.fence.is_none();
+        runner.stages = is_free.then(|| Stages::new(behaviour.executor, sees_time));
+        runner
     }
 
     fn with(
@@ -136,7 +136,8 @@ impl<'a> Runner<'a> {
     fn written(&mut self, id: RunId, bound: &RunBound, asked: Asked<'_>) -> Option<Outcome> {
         let stages = self.stages.as_mut().filter(|_| RaceCode::knows(bound))?;
         let watched = Watched::of(asked)?;
-        stages.run(&self.program, self.executor, watched, id, bound.value)
+        let control = self.race.control.as_mut();
+        stages.run(&self.program, self.executor, watched, id, bound, control)
     }
 
     /// Who decides for the controller, if it is one of this type.

@@ -3,10 +3,15 @@
 //!
 //! `NETWORKS=500 cargo test --release --test stochastic race_code::` tries more random networks.
 
+use checker::engine::{CodeEngine, Options};
 use checker::exec::{Executor, Interpreter, Jit};
-use checker::ir::Asked;
-use checker::stochastic::{Failure, RunId, Runner};
+use checker::ir::{Asked, Network};
+use checker::learning::Learning;
+use checker::stochastic::{
+    Behaviour, Chooser, Chosen, Failure, Guidance, Moment, RunId, Runner, StateView,
+};
 
+use crate::checks;
 use crate::networks::generate::{Family, network};
 use crate::random::Random;
 use crate::{StatisticalQuery, load};
@@ -16,6 +21,83 @@ const RUNS: u64 = 60;
 
 /// The result of a run, its time and its moves, doubles as bits.
 type Shown = [u64; 3];
+
+/// Decides at random, and keeps what it was asked.
+struct Wanderer {
+    sees_time: bool,
+    asked: Vec<Question>,
+    /// Whether something has happened since it was asked.
+    is_renewed: bool,
+}
+
+/// What was asked: which moves are possible, whether to wait is, when that was, and whether
+/// something had happened before.
+type Question = (Vec<u32>, bool, u64, bool);
+
+impl Chooser for Wanderer {
+    fn begin(&mut self) {
+        self.asked.clear();
+        self.is_renewed = false;
+    }
+
+    fn renew(&mut self) {
+        self.is_renewed = true;
+    }
+
+    fn sees_time(&self) -> bool {
+        self.sees_time
+    }
+
+    fn choose(&mut self, state: &mut StateView<'_>, moment: Moment<'_>) -> Result<Chosen, Failure> {
+        let time = moment.time.to_bits();
+        let moves = moment.moves.to_vec();
+        let is_renewed = std::mem::take(&mut self.is_renewed);
+        self.asked.push((moves, moment.may_wait, time, is_renewed));
+        let count = moment.moves.len() as u32;
+        let mut stream = state.stream();
+        let drawn = stream.below(count + 2) as usize;
+        Ok(if !moment.may_wait || drawn < count as usize {
+            Chosen::Move(drawn % count as usize)
+        } else if stream.below(2) == 0 {
+            Chosen::Draw
+        } else {
+            Chosen::Wait(3.0 * stream.uniform())
+        })
+    }
+}
+
+/// Who decides: none, or somebody who sees clocks or does not.
+#[derive(Clone, Copy)]
+enum Decides {
+    Nobody,
+    Wanderer { sees_time: bool },
+}
+
+impl Guidance for Decides {
+    fn chooser(&self) -> Box<dyn Chooser> {
+        let Decides::Wanderer { sees_time } = *self else {
+            unreachable!("nobody decides")
+        };
+        Box::new(Wanderer {
+            sees_time,
+            asked: Vec::new(),
+            is_renewed: false,
+        })
+    }
+}
+
+impl Decides {
+    fn runner<'a>(&'a self, network: &'a Network, executor: &'a dyn Executor) -> Runner<'a> {
+        let behaviour = Behaviour::new(network, executor);
+        match self {
+            Decides::Nobody => Runner::of(behaviour),
+            Decides::Wanderer { .. } => Runner::of(Behaviour {
+                guidance: Some(self),
+                ..behaviour
+            }),
+        }
+    }
+}
 
 fn asked(query: &StatisticalQuery) -> Asked<'_> {
     let asked = query.kind.asked();
@@ -29,6 +111,12 @@ fn end(runner: &mut Runner<'_>, query: &StatisticalQuery, run: u64) -> Result<Sh
     Ok([value, time, outcome.moves])
 }
 
+/// What who decides was asked in the run that has ended.
+fn questions<'r>(runner: &'r mut Runner<'_>) -> Option<&'r [Question]> {
+    let wanderer: &mut Wanderer = runner.chooser()?;
+    Some(&wanderer.asked)
+}
+
 /// Writes the runs of a query as code; returns whether there is code.
 fn write(runner: &mut Runner<'_>, query: &StatisticalQuery) -> bool {
     runner.write_runs(query.kind.bound(), asked(query))
@@ -36,12 +124,17 @@ fn write(runner: &mut Runner<'_>, query: &StatisticalQuery) -> bool {
 
 /// Compares runs; returns how many were made by code, or `None` if there is none.
 fn compare(model: &str, query: &str, runs: u64) -> Option<u64> {
+    compare_under(model, query, runs, Decides::Nobody)
+}
+
+/// The same where somebody decides.
+fn compare_under(model: &str, query: &str, runs: u64, decides: Decides) -> Option<u64> {
     let (network, query) = load(model, query).unwrap_or_else(|message| panic!("{message}"));
     let interpreter = Interpreter::new(&network.functions, &network.constants);
     let jit = Jit::new(&network.functions, &network.constants).expect("it can be compiled");
     let executors: [&dyn Executor; 2] = [&interpreter, &jit];
-    let mut known = Runner::new(&network, &interpreter);
-    let mut written = executors.map(|executor| Runner::new(&network, executor));
+    let mut known = decides.runner(&network, &interpreter);
+    let mut written = executors.map(|executor| decides.runner(&network, executor));
     if !written.iter_mut().all(|runner| write(runner, &query)) {
         return None;
     }
@@ -49,6 +142,12 @@ fn compare(model: &str, query: &str, runs: u64) -> Option<u64> {
         let expected = end(&mut known, &query, run);
         for (number, runner) in written.iter_mut().enumerate() {
             let found = end(runner, &query, run);
+            assert_eq!(
+                questions(runner),
+                questions(&mut known),
+                "run {run}, executor {number}\n{}\n{model}",
+                query.text
+            );
             assert_eq!(
                 format!("{found:?}"),
                 format!("{expected:?}"),
@@ -85,6 +184,99 @@ fn random_networks_make_the_same_runs() {
             models * 4 >= networks && written * 2 >= models * RUNS,
             "{family:?}: {written} runs of {models} models"
         );
+    }
+}
+
+/// The same model in which the environment owns every second edge.
+fn shared(model: &str) -> String {
+    let mut parts = model.split(" -> ");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for (number, part) in parts.enumerate() {
+        text += if number % 2 == 0 { " -> " } else { " -u-> " };
+        text += part;
+    }
+    text
+}
+
+#[test]
+fn who_decides_is_asked_the_same() {
+    let networks = std::env::var("NETWORKS")
+        .map_or(12, |number| number.parse::<u64>().expect("it is a number"));
+    for family in [Family::Exponential, Family::Timed, Family::Ticking] {
+        for sees_time in [false, true] {
+            let mut random = Random(0xdec1de);
+            let (mut written, mut models) = (0, 0);
+            for _ in 0..networks {
+                let (net, query) = network(&mut random, family);
+                let model = shared(&net.text());
+                let decides = Decides::Wanderer { sees_time };
+                if let Some(runs) = compare_under(&model, &query.text(), RUNS, decides) {
+                    models += 1;
+                    written += runs;
+                }
+            }
+            assert!(
+                models * 4 >= networks && written * 2 >= models * RUNS,
+                "{family:?}: {written} runs of {models} models"
+            );
+        }
+    }
+}
+
+/// A courier who may wait for a bus, whose coming he sees by a clock, or walk; on the way he
+/// decides in a committed location, where somebody else can move, too.
+const COURIER: &str = "
+    double cost;
+    clock time;
+    int[0, 9] detours;
+    broadcast chan come;
+    process Bus() {
+        clock x;
+        state Away { x <= 20 }, Here { x <= 3 };
+        init Away;
+        trans Away -u-> Here { sync come!; assign x = 0; },
+              Here -u-> Away { assign x = 0; };
+    }
+    process Courier() {
+        clock since;
+        state Waits { since <= 18 }, Asks, Rides { since <= 5 }, Walks { since <= 12 }, Home;
+        commit Asks;
+        init Waits;
+        trans Waits -u-> Asks { sync come?; },
+              Waits -> Walks { assign cost = cost + since, since = 0; },
+              Asks -> Rides { assign cost = cost + since + 1, since = 0; },
+              Asks -> Walks { assign cost = cost + since, since = 0; },
+              Walks -u-> Walks { guard detours < 9 && since >= 1; assign detours++; },
+              Walks -u-> Home { guard since >= 6; assign cost = cost + since + detours; },
+              Rides -u-> Home { guard since >= 5; assign cost = cost + since; };
+    }
+    Runner = Courier();
+    system Bus, Runner;";
+
+#[test]
+fn the_same_is_learned_from_code() {
+    for query in [
+        "strategy S = minE(cost)[<=60]: <> Runner.Home",
+        "strategy S = minE(cost)[<=60]{}->{Runner.since}: <> Runner.Home",
+        "strategy S = maxPr[<=11]: <> Runner.Home",
+        "strategy S = minE(time)[#<=12]: <> Runner.Home",
+    ] {
+        let learned = [CodeEngine::Jit, CodeEngine::Interpreter].map(|code| {
+            let options = Options {
+                code,
+                learning: Learning {
+                    iterations: 2,
+                    ..Learning::default()
+                },
+                ..Options::default()
+            };
+            let model = &mut checks::load(COURIER);
+            let answer = checks::try_ask(model, query, &options)
+                .unwrap_or_else(|refused| panic!("{query}\n{}", refused.rendered.join("\n")));
+            let strategy = answer.evidence.learned.expect("a strategy is learned");
+            (answer.estimate, strategy.regressors.clone())
+        });
+        assert_eq!(learned[0], learned[1], "{query}");
     }
 }
 
@@ -313,5 +505,4 @@ fn what_the_code_does_not_know_is_left_to_the_race() {
     assert_eq!(compare(&model, "Pr[<=4](<> x * x >= 2)", 1), None);
     assert_eq!(compare(&model, "E[<=4; 9](max: x)", 1), None);
     assert_eq!(compare(&model, "Pr[x<=4](<> n == 9)", 1), None);
-    assert_eq!(compare(&model, "Pr[#<=4](<> n == 9)", 1), None);
 }

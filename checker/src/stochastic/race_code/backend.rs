@@ -11,7 +11,7 @@ use crate::ir::{
 use crate::stochastic::condition::Condition;
 use crate::stochastic::failure::{Failure, Stand};
 use crate::stochastic::program::{Program, Spot};
-use crate::stochastic::rules::{Backend, Flow};
+use crate::stochastic::rules::{Backend, Flow, Held};
 
 impl Backend for Writer<'_> {
     type Integer = Register;
@@ -249,9 +249,9 @@ impl Backend for Writer<'_> {
             self.store_double(word, attempt);
         }
         if let Some(word) = self.layout.stays[process] {
-            // Who moves in time need not be watched.
-            let stay = stay.filter(|_| is_late);
-            if stay.is_some() {
+            // Who moves in time need not be watched, unless it matters to who decides.
+            let stay = stay.filter(|_| is_late || self.layout.decisions.is_some());
+            if stay.is_some() && is_late {
                 self.store_integer(self.layout.has_stays, 1);
             }
             let stay = stay.unwrap_or_else(|| self.real(f64::INFINITY));
@@ -285,6 +285,22 @@ impl Backend for Writer<'_> {
         }
         let is_uniform = self.integer(rate.is_none().into());
         Ok(self.call_for_double(self.layout.in_windows, vec![is_uniform]))
+    }
+
+    fn knows_decisions(&self, spot: &Spot) -> bool {
+        spot.is_controllable && self.layout.decisions.is_some()
+    }
+
+    fn held(&mut self) -> Held<Self> {
+        let decisions = self.layout.decisions.as_ref().expect("somebody decides");
+        Held {
+            time: self.load_double(decisions.hold),
+            draws: if decisions.sees_time {
+                self.load(decisions.draws)
+            } else {
+                self.integer(1)
+            },
+        }
     }
 
     fn holds(&mut self, _: Condition, _: &[i32]) -> Flow<Self, Register> {

@@ -48,13 +48,42 @@ pub(super) struct Layout {
     pub(super) in_windows: FunctionId,
     /// The clocks whose rates are set, with the double that keeps what a rate was.
     pub(super) rates: Vec<(u32, u32)>,
+    /// Where the code keeps what the controller does, if somebody decides for it.
+    pub(super) decisions: Option<Decisions>,
     /// All words, those of the state included.
     pub(super) words: u32,
 }
 
+/// The words for what the controller does.
+#[derive(Debug)]
+pub(super) struct Decisions {
+    /// Whether it is asked at once, or delays are drawn.
+    pub(super) sees_time: bool,
+    /// For how long it waits: a double.
+    pub(super) hold: u32,
+    /// Whether delays are drawn for its moves.
+    pub(super) draws: u32,
+    /// How the code goes on when it is called again: see [`super::decisions`].
+    pub(super) resume: u32,
+    /// The process whose delay is over.
+    pub(super) winner: u32,
+    /// The moves that are possible: their number, and their places among `entries`.
+    pub(super) move_count: u32,
+    pub(super) moves: u32,
+    /// Whether one of them is on an urgent channel.
+    pub(super) urgent: u32,
+    /// All moves of the controller, by their numbers, ascending.
+    pub(super) entries: Vec<u32>,
+}
+
 impl Layout {
     /// The words of a race whose locations set the rates of these clocks.
-    pub(super) fn of(program: &Program<'_>, rated: &[(u32, u32)]) -> Layout {
+    /// `sees_time` says of who decides for the controller, if anybody does, whether it sees clocks.
+    pub(super) fn of(
+        program: &Program<'_>,
+        rated: &[(u32, u32)],
+        sees_time: Option<bool>,
+    ) -> Layout {
         let network = program.network;
         let mut words = network.initial.len() as u32;
         let mut take = |count: u32| {
@@ -106,6 +135,21 @@ impl Layout {
             result: network.chances.result,
             in_windows: FunctionId(network.functions.len() as u32),
             rates: rated.iter().map(|&(_, clock)| (clock, take(2))).collect(),
+            decisions: sees_time.map(|sees_time| {
+                let entries = program.outputs_of_controller().map(|(number, _)| number);
+                let entries: Vec<u32> = entries.collect();
+                Decisions {
+                    sees_time,
+                    hold: take(2),
+                    draws: take(1),
+                    resume: take(1),
+                    winner: take(1),
+                    move_count: take(1),
+                    moves: take(entries.len() as u32),
+                    urgent: take(1),
+                    entries,
+                }
+            }),
             words,
         }
     }

@@ -11,6 +11,7 @@
 //!   product of senders and receivers: beyond a limit there is no code.
 
 mod backend;
+mod decisions;
 mod inline;
 mod layout;
 mod moves;

@@ -25,6 +25,16 @@ pub(super) const MOVED: i32 = 1;
 /// or somebody is, so that those who have moved do not plan yet.
 pub(super) const PUT_OFF: i32 = 2;
 
+/// What it returns if the controller is asked first.
+pub(super) const ASKED_FIRST: i32 = 3;
+
+/// Where a round goes on behind a move: see [`MOVED`] and [`PUT_OFF`].
+#[derive(Clone, Copy)]
+pub(super) struct Ways {
+    pub(super) moved: BlockId,
+    pub(super) put_off: BlockId,
+}
+
 /// Something that is sent on one of some channels; the register says which.
 struct Sent {
     channel: Register,
@@ -78,11 +88,11 @@ impl<'a> RaceWriter<'_, 'a> {
             if !spot.is_plain {
                 let Ok(()) = rules::require(w, self.program, only.guard, &only.values, missed);
             }
-            self.carry_out(w, only, ids);
+            self.let_take(w, only, ids);
         } else {
-            let chosen = self.choose(w, outputs, missed);
+            let chosen = self.choose(w, outputs.iter(), missed);
             let Ok(()) = w.cases(chosen, outputs.len(), |w, number| {
-                self.carry_out(w, &outputs[number], ids);
+                self.let_take(w, &outputs[number], ids);
                 Ok(())
             });
         }
@@ -94,14 +104,26 @@ impl<'a> RaceWriter<'_, 'a> {
         writer.finish()
     }
 
+    /// Lets a process take an output, unless the controller is asked first.
+    fn let_take(&self, w: &mut Writer<'_>, sender: &Instance<'a>, ids: &Ids) {
+        if sender.edge.controllable && self.layout.decisions.is_some() {
+            let asked = w.integer(ASKED_FIRST);
+            return w.return_value(Some(asked));
+        }
+        self.carry_out(w, sender, ids);
+    }
+
     /// Chooses one of the instances that are enabled, and returns its number; goes elsewhere if
     /// there are none.
-    fn choose(
+    pub(super) fn choose<'i>(
         &self,
         w: &mut Writer<'_>,
-        instances: &[Instance<'a>],
+        instances: impl Iterator<Item = &'i Instance<'a>>,
         otherwise: BlockId,
-    ) -> Register {
+    ) -> Register
+    where
+        'a: 'i,
+    {
         let candidates = (0..).zip(instances).map(|(number, instance)| {
             let flag = (instance.guard != Condition::Always).then(|| {
                 let Ok(flag) = rules::is_any_enabled(w, self.program, slice::from_ref(instance));
@@ -120,7 +142,7 @@ impl<'a> RaceWriter<'_, 'a> {
     }
 
     /// Lets a process take an output with all who receive, and returns.
-    fn carry_out(&self, w: &mut Writer<'_>, sender: &Instance<'a>, ids: &Ids) {
+    pub(super) fn carry_out(&self, w: &mut Writer<'_>, sender: &Instance<'a>, ids: &Ids) {
         let channels = sender.edge.sync.map_or(0..0, Sync::channels);
         let channel = match sender.channel {
             Channel::None => return self.carry_out_on(w, sender, None, ids),
@@ -184,6 +206,9 @@ impl<'a> RaceWriter<'_, 'a> {
             branch,
             receivers,
         };
+        if let Some(decisions) = &self.layout.decisions {
+            self.renew_decisions(w, decisions);
+        }
         if self.may_commit(&movers) {
             let committed = w.load(self.layout.committed);
             w.when(committed, |w| self.put_plans_off(w, &movers, ids));
@@ -220,7 +245,10 @@ impl<'a> RaceWriter<'_, 'a> {
         if self.renewal_of_rates.is_some() || self.leaves_committed(movers.sender) {
             return (0..self.network().processes.len() as u32).collect();
         }
-        self.concerned_by(movers)
+        let deciders = self.deciders.iter().map(|decider| decider.process);
+        let mut marked = self.concerned_by(movers);
+        marked.extend(deciders);
+        marked
     }
 
     /// Whose plans may depend on what the movers have changed.

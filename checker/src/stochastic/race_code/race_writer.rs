@@ -4,6 +4,7 @@ use super::layout::Layout;
 use super::writer::Writer;
 use crate::ir::{FunctionId, Network, RegisterType};
 use crate::stochastic::program::Program;
+use crate::stochastic::readers::Reader;
 
 /// The functions that let a process plan.
 pub(super) struct Plans {
@@ -19,6 +20,10 @@ pub(super) struct Ids {
     /// By location: what lets it move from there, if it can.
     pub(super) moves: Vec<Vec<Option<FunctionId>>>,
     pub(super) abilities: Vec<Option<FunctionId>>,
+    /// What notes the possible moves of the controller, if somebody decides for it.
+    pub(super) possible_moves: Option<FunctionId>,
+    /// What carries out its moves.
+    pub(super) chosen_moves: Vec<FunctionId>,
     /// What gives up unless its invariant holds, if it has any.
     pub(super) invariants: Vec<Option<FunctionId>>,
 }
@@ -38,6 +43,8 @@ pub(super) struct RaceWriter<'p, 'a> {
     pub(super) renewal_of_rates: Option<FunctionId>,
     /// The processes that can be in committed locations.
     pub(super) committing: Vec<usize>,
+    /// Where the controller can move, if somebody decides for it.
+    pub(super) deciders: Vec<Reader>,
 }
 
 impl<'a> RaceWriter<'_, 'a> {

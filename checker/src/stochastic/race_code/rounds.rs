@@ -1,5 +1,6 @@
 //! Code for a run, move by move, as `stochastic/race/mod.rs` and `stochastic/run.rs` say it.
 
+use super::moves::Ways;
 use super::race_writer::{Ids, RaceWriter};
 use super::watching::{GOES_ON, IS_OVER, Watched};
 use super::writer::Writer;
@@ -11,13 +12,15 @@ use crate::stochastic::rules::{self, Backend};
 
 /// What all parts of a round share.
 #[derive(Clone, Copy)]
-struct Round<'r> {
+pub(super) struct Round<'r> {
     ids: &'r Ids,
     watched: &'r Watched,
     /// The cell of the winner, and the delay before it moves.
     cell: Register,
     delay: Register,
-    begin: BlockId,
+    pub(super) begin: BlockId,
+    /// Nobody has moved, after all.
+    pub(super) missed: BlockId,
     /// Somebody must leave a committed location.
     settling: BlockId,
     /// Nobody must.
@@ -28,6 +31,8 @@ struct Round<'r> {
     moving: BlockId,
     /// The run ends at its bound, after the delay.
     over: BlockId,
+    /// The controller makes the move that was decided.
+    pub(super) chosen: BlockId,
 }
 
 /// Who wins, in registers.
@@ -72,22 +77,34 @@ impl RaceWriter<'_, '_> {
         let layout = self.layout;
         let mut writer = self.writer("moves of a run", 0, Some(RegisterType::Integer));
         let w = &mut writer;
-        self.begin_run(w, ids);
-        let begin = w.block();
-        w.jump(begin);
-        w.at(begin);
+        let (start, begin) = (w.block(), w.block());
+        let missed = match layout.decisions {
+            Some(_) => w.block(),
+            None => begin,
+        };
         let round = Round {
             ids,
             watched,
             cell: w.integer(0),
             delay: w.real(0.0),
             begin,
+            missed,
             settling: w.block(),
             racing: w.block(),
             free: w.block(),
             moving: w.block(),
             over: w.block(),
+            chosen: w.block(),
         };
+        if let Some(decisions) = &layout.decisions {
+            self.resume(w, round, decisions, start);
+        } else {
+            w.jump(start);
+        }
+        w.at(start);
+        self.begin_run(w, ids);
+        w.jump(begin);
+        w.at(begin);
         if self.committing.is_empty() {
             w.jump(round.racing);
         } else {
@@ -203,9 +220,17 @@ impl RaceWriter<'_, '_> {
     /// says whether somebody is in a committed location now.
     fn let_winner_move(&self, w: &mut Writer<'_>, round: Round<'_>) {
         w.count_round();
-        let (moved, put_off, go_on) = (w.block(), w.block(), w.block());
-        self.let_move(w, round, moved, put_off);
-        for (block, next) in [(moved, round.racing), (put_off, round.settling)] {
+        let go_on = w.block();
+        let ways = Ways {
+            moved: w.block(),
+            put_off: w.block(),
+        };
+        self.let_move(w, round, ways);
+        if let Some(decisions) = &self.layout.decisions {
+            w.at(round.chosen);
+            self.let_chosen_move(w, round.ids, decisions, ways);
+        }
+        for (block, next) in [(ways.moved, round.racing), (ways.put_off, round.settling)] {
             w.at(block);
             let left = w.load(self.layout.moves_left);
             let minus_one = w.integer(-1);
@@ -253,7 +278,7 @@ impl RaceWriter<'_, '_> {
 
     /// Lets the winner move from where it is, as its cell says; goes where what the function of the
     /// move returns leads.
-    fn let_move(&self, w: &mut Writer<'_>, round: Round<'_>, moved: BlockId, put_off: BlockId) {
+    fn let_move(&self, w: &mut Writer<'_>, round: Round<'_>, ways: Ways) {
         let wrong = w.block();
         let cells = round
             .ids
@@ -279,10 +304,19 @@ impl RaceWriter<'_, '_> {
                 // Somebody else may have to move.
                 wrong
             } else {
-                round.begin
+                round.missed
             };
             // In the order of what the function returns.
-            w.switch(result, vec![missed, moved, put_off], wrong);
+            let mut next = vec![missed, ways.moved, ways.put_off];
+            let asks = round.ids.possible_moves.filter(|_| spot.is_controllable);
+            let asks = asks.map(|possible_moves| (w.block(), possible_moves));
+            next.extend(asks.map(|(block, _)| block));
+            w.switch(result, next, wrong);
+            if let (Some((block, possible_moves)), Some(decisions)) = (asks, &self.layout.decisions)
+            {
+                w.at(block);
+                self.ask(w, possible_moves, decisions, process);
+            }
         }
         w.at(wrong);
         w.give_up();
@@ -415,14 +449,23 @@ impl RaceWriter<'_, '_> {
                 let rest = w.subtract(attempt, delay);
                 w.store_double(word, rest);
             }
-            let has_stays = w.load(self.layout.has_stays);
-            w.when(has_stays, |w| {
+            let subtract = |w: &mut Writer<'_>| {
                 for &word in self.layout.stays.iter().flatten() {
                     let stay = w.load_real(word);
                     let rest = w.subtract(stay, delay);
                     w.store_double(word, rest);
                 }
-            });
+            };
+            let Some(decisions) = &self.layout.decisions else {
+                let has_stays = w.load(self.layout.has_stays);
+                return w.when(has_stays, subtract);
+            };
+            subtract(w);
+            let hold = w.load_real(decisions.hold);
+            let rest = w.subtract(hold, delay);
+            let none = w.real(0.0);
+            let rest = w.greatest(rest, none);
+            w.store_double(decisions.hold, rest);
         });
     }
 

@@ -1,5 +1,6 @@
 //! The code of a race as a whole: whether there can be one, and runs that it makes.
 
+use super::decisions::{AS_AT_BEGIN, ASKED_AGAIN, ASKS, PASSES, deciders, knows_decisions};
 use super::inline::{inlined, size_of};
 use super::layout::Layout;
 use super::race_writer::{Ids, Plans, RaceWriter};
@@ -10,10 +11,11 @@ use crate::cancellation;
 use crate::exec::arithmetic::{double_of_words, double_words};
 use crate::exec::{Context, Executor};
 use crate::ir::{
-    Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
+    Aim, Function, FunctionId, LocationId, RunBound, RunLimit, STREAM_WORDS, Stream, Urgency,
 };
 use crate::stochastic::condition::Condition;
-use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_TIME};
+use crate::stochastic::constants::{MOVES_OF_A_PLAN, UNITS_FOR_MOVE, ZENO_MOVES, ZENO_TIME};
+use crate::stochastic::control::{Chosen, Control, Moment, StateView};
 use crate::stochastic::observer::Outcome;
 use crate::stochastic::program::{Program, Spot};
 use crate::stochastic::run_id::RunId;
@@ -29,6 +31,9 @@ const LARGE: usize = 1200;
 /// No function grows beyond this by what it takes in.
 const MOST_TAKEN_IN: usize = 6_000;
 
+/// The end of runs that moves bound: later than all that happens, but for what never does.
+const NEVER: f64 = f64::MAX / 2.0;
+
 /// The code of a race, written and not yet prepared to run.
 pub(super) struct WrittenRace {
     layout: Layout,
@@ -42,11 +47,17 @@ pub(super) struct WrittenRace {
 
 impl WrittenRace {
     /// Writes the race of a network; `None` if it has what the code does not know.
-    pub(super) fn of(program: &Program<'_>, watched: &Watched) -> Option<WrittenRace> {
+    /// `sees_time` says of who decides for the controller, if anybody does, whether it sees clocks.
+    pub(super) fn of(
+        program: &Program<'_>,
+        watched: &Watched,
+        sees_time: Option<bool>,
+    ) -> Option<WrittenRace> {
         let network = program.network;
         let rated = rated_clocks(program)?;
-        let layout = Layout::of(program, &rated);
-        if !watched.is_known(program) || !is_known(program) {
+        let layout = Layout::of(program, &rated, sees_time);
+        let knows_decisions = sees_time.is_none() || knows_decisions(program);
+        if !watched.is_known(program) || !is_known(program) || !knows_decisions {
             return None;
         }
         let is_committed = |spot: &Spot| spot.urgency == Urgency::Committed;
@@ -61,6 +72,7 @@ impl WrittenRace {
             layout: &layout,
             renewal_of_rates: (!rated.is_empty()).then_some(FunctionId(first + 1)),
             committing,
+            deciders: sees_time.map_or(Vec::new(), |_| deciders(program)),
         };
         functions.push(writer.windows());
         if !rated.is_empty() {
@@ -102,6 +114,8 @@ impl WrittenRace {
             plans,
             moves: Vec::new(),
             abilities: Vec::new(),
+            possible_moves: None,
+            chosen_moves: Vec::new(),
             invariants,
         };
         for process in processes {
@@ -118,6 +132,13 @@ impl WrittenRace {
                 None => None,
                 Some(_) => Some(add(writer.ability(process), SMALL)?),
             });
+        }
+        if let Some(decisions) = &layout.decisions {
+            ids.possible_moves = Some(add(writer.possible_moves(decisions), SMALL)?);
+            for &entry in &decisions.entries {
+                let id = add(writer.chosen_move(entry, &ids), SMALL)?;
+                ids.chosen_moves.push(id);
+            }
         }
         let rounds = add(writer.rounds(&ids, watched), LARGE)?;
         Some(WrittenRace {
@@ -212,12 +233,21 @@ pub(in crate::stochastic) struct RaceCode {
 impl RaceCode {
     /// Whether it makes runs with such a bound.
     pub(in crate::stochastic) fn knows(bound: &RunBound) -> bool {
-        bound.limit == RunLimit::Time && bound.value.is_finite()
+        match bound.limit {
+            RunLimit::Time => bound.value.is_finite(),
+            RunLimit::Moves => true,
+            RunLimit::Clock(_) => false,
+        }
     }
 
     fn double(&self, word: u32) -> f64 {
         let word = word as usize;
         double_of_words(self.words[word], self.words[word + 1])
+    }
+
+    fn set_double(&mut self, word: u32, value: f64) {
+        let word = word as usize;
+        self.words[word..word + 2].copy_from_slice(&double_words(value));
     }
 
     /// Makes a run; `None` if the race must make it.
@@ -226,41 +256,65 @@ impl RaceCode {
         program: &Program<'_>,
         executor: &dyn Executor,
         RunId { seed, run }: RunId,
-        bound: f64,
+        bound: &RunBound,
+        mut control: Option<&mut Control>,
     ) -> Option<Outcome> {
         self.words.copy_from_slice(&self.initial);
         let stream = program.network.chances.stream as usize;
         Stream::start(&mut self.words[stream..stream + STREAM_WORDS], seed, run);
-        let place = self.layout.bound as usize;
-        self.words[place..place + 2].copy_from_slice(&double_words(bound));
+        let is_by_moves = bound.limit == RunLimit::Moves;
+        let (time, most_moves) = if is_by_moves {
+            (NEVER, bound.value)
+        } else {
+            (bound.value, f64::INFINITY)
+        };
+        self.set_double(self.layout.bound, time);
+        if let Some(control) = &mut control {
+            control.chooser.begin();
+            control.renew();
+        }
         let mut moves = 0;
         let result = loop {
             let before = self.double(self.layout.time);
-            self.words[self.layout.moves_left as usize] = MOVES_OF_A_PLAN as i32;
-            let mut context = Context {
-                state: &mut self.words,
-                constraints: &mut Vec::new(),
-                assignments: &mut Vec::new(),
-            };
-            let result = self.executor.call(self.rounds, &[], &mut context).ok()?;
-            let left = self.words[self.layout.moves_left as usize] as u32;
-            let made = MOVES_OF_A_PLAN - left;
+            let share = (most_moves - moves as f64).min(f64::from(MOVES_OF_A_PLAN)) as u32;
+            if share == 0 {
+                break if self.is_reached(program)? {
+                    REACHED
+                } else {
+                    IS_OVER
+                };
+            }
+            let result = self.moves(program, share, control.as_deref_mut())?;
+            let made = share - self.words[self.layout.moves_left as usize] as u32;
             moves += u64::from(made);
             cancellation::work(UNITS_FOR_MOVE * made as usize);
+            if result == IS_OVER && is_by_moves {
+                // Nothing happens any more.
+                return None;
+            }
             if result != GOES_ON {
                 break result;
             }
-            if self.double(self.layout.time) - before < ZENO_TIME {
+            let is_short = self.double(self.layout.time) - before < ZENO_TIME;
+            if is_short && !is_by_moves {
                 return None;
             }
-            self.renew(program);
+            if share == MOVES_OF_A_PLAN {
+                self.renew(program);
+            }
         };
         if let Some(site) = self.executor.wraps().first() {
             executor.wraps().note(site);
         }
-        let time = self.double(self.layout.time) + self.double(self.layout.decided_after);
+        let ahead = self.double(self.layout.decided_after);
+        let time = self.double(self.layout.time) + ahead;
         Some(Outcome {
             value: match (result, self.watched) {
+                (REACHED | MISSED | IS_OVER, Watched::End(_, aim)) => match aim {
+                    Aim::Probability => f64::from(result == REACHED),
+                    Aim::Time => time,
+                    Aim::Expected(number) => self.number(program, number, ahead)?,
+                },
                 (REACHED, _) | (IS_OVER, Watched::Always(_)) => 1.0,
                 (IS_OVER, Watched::Extreme(_, sign)) => sign * self.double(self.layout.best),
                 (MISSED | IS_OVER, _) => 0.0,
@@ -268,8 +322,124 @@ impl RaceCode {
             },
             time,
             moves,
-            at: time,
+            at: if is_by_moves { moves as f64 } else { time },
         })
+    }
+
+    /// Makes at most so many moves, and asks who decides for the controller; returns how that
+    /// ended, or `None` if the run is given up.
+    fn moves(
+        &mut self,
+        program: &Program<'_>,
+        share: u32,
+        mut control: Option<&mut Control>,
+    ) -> Option<i32> {
+        self.words[self.layout.moves_left as usize] = share as i32;
+        let mut resume = AS_AT_BEGIN;
+        let mut left = share;
+        let mut waits = 0;
+        loop {
+            if let Some(decisions) = &self.layout.decisions {
+                self.words[decisions.resume as usize] = resume;
+            }
+            let result = self.call(self.rounds)?;
+            let has_moved = self.words[self.layout.moves_left as usize] as u32 != left;
+            if let Some(control) = control.as_mut().filter(|_| has_moved) {
+                control.renew();
+            }
+            if result < ASKS {
+                return Some(result);
+            }
+            left = self.words[self.layout.moves_left as usize] as u32;
+            waits += 1;
+            if waits > ZENO_MOVES {
+                return None;
+            }
+            cancellation::work(UNITS_FOR_MOVE);
+            resume = self.decided(program, result - ASKS, control.as_deref_mut()?)?;
+        }
+    }
+
+    /// Calls a function.
+    fn call(&mut self, function: FunctionId) -> Option<i32> {
+        let mut context = Context {
+            state: &mut self.words,
+            constraints: &mut Vec::new(),
+            assignments: &mut Vec::new(),
+        };
+        self.executor.call(function, &[], &mut context).ok()
+    }
+
+    /// Asks who decides for the controller; returns how the code goes on.
+    fn decided(&mut self, program: &Program<'_>, may: i32, control: &mut Control) -> Option<i32> {
+        let decisions = self.layout.decisions.as_ref()?;
+        let count = self.words[decisions.move_count as usize] as usize;
+        let first = decisions.moves as usize;
+        let places = &self.words[first..first + count];
+        let entries = places
+            .iter()
+            .map(|&place| decisions.entries[place as usize]);
+        control.moves.clear();
+        control.moves.extend(entries);
+        let word = self.layout.time as usize;
+        let moment = Moment {
+            moves: &control.moves,
+            may_wait: may != 0,
+            is_straight: true,
+            time: double_of_words(self.words[word], self.words[word + 1]),
+        };
+        let mut state = StateView {
+            words: &mut self.words,
+            executor: &*self.executor,
+            network: program.network,
+        };
+        let chosen = control.chooser.choose(&mut state, moment).ok()?;
+        let hold = match chosen {
+            Chosen::Move(place) => {
+                return Some(ASKED_AGAIN + 1 + self.words[first + place]);
+            }
+            Chosen::Wait(_) | Chosen::Draw if may & PASSES == 0 => return None,
+            Chosen::Draw => {
+                self.words[decisions.draws as usize] = 1;
+                None
+            }
+            Chosen::Wait(_) if !decisions.sees_time => Some(f64::INFINITY),
+            Chosen::Wait(_) if self.words[decisions.draws as usize] != 0 => Some(f64::INFINITY),
+            Chosen::Wait(time) => Some(time),
+        };
+        let winner = self.words[decisions.winner as usize] as usize;
+        let place = decisions.hold;
+        if let Some(hold) = hold {
+            self.set_double(place, hold);
+        }
+        let (word, bit) = self.layout.stale_bit(winner);
+        self.words[word as usize] |= bit;
+        Some(ASKED_AGAIN)
+    }
+
+    /// Whether the state has what a run with an end is to reach, or `None` if that is not known.
+    fn is_reached(&mut self, program: &Program<'_>) -> Option<bool> {
+        self.set_double(program.network.chances.ahead, 0.0);
+        let (Watched::End(goal, _) | Watched::Eventually(goal)) = self.watched else {
+            return None;
+        };
+        match goal {
+            Condition::Always => Some(true),
+            Condition::Never => Some(false),
+            Condition::Words(function) => Some(self.call(function)? != 0),
+            Condition::Timed(function) => Some(self.call(function)? & 1 != 0),
+            Condition::Compared(_) | Condition::Curved(_) => None,
+        }
+    }
+
+    /// The number that a function leaves so much later, if nothing happens until then.
+    fn number(&mut self, program: &Program<'_>, function: FunctionId, ahead: f64) -> Option<f64> {
+        for &clock in &program.network.chances.clocks {
+            let value = self.double(clock) + self.double(clock + 2) * ahead;
+            self.set_double(clock, value);
+        }
+        self.call(function)?;
+        Some(self.double(program.network.chances.result))
     }
 
     /// Lets those plan anew who wait for a clock, so that rounding does not add up.

@@ -6,6 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::runs::{RaceCode, WrittenRace};
 use super::watching::Watched;
 use crate::exec::Executor;
+use crate::ir::RunBound;
+use crate::stochastic::control::Control;
 use crate::stochastic::observer::Outcome;
 use crate::stochastic::program::Program;
 use crate::stochastic::run_id::RunId;
@@ -23,6 +25,8 @@ pub(in crate::stochastic) struct Stages {
     stage: Stage,
     /// What the code watches.
     watched: Option<Watched>,
+    /// Whether who decides for the controller sees clocks, if anybody does.
+    sees_time: Option<bool>,
     /// How many moves were made without code, by all threads.
     moves: Arc<AtomicU64>,
 }
@@ -39,7 +43,8 @@ enum Stage {
 }
 
 impl Stages {
-    pub(in crate::stochastic) fn new(executor: &dyn Executor) -> Stages {
+    /// `sees_time` says of who decides for the controller, if anybody does, whether it sees clocks.
+    pub(in crate::stochastic) fn new(executor: &dyn Executor, sees_time: Option<bool>) -> Stages {
         Stages {
             stage: if executor.compiles_runs() {
                 Stage::Waiting
@@ -47,6 +52,7 @@ impl Stages {
                 Stage::Without
             },
             watched: None,
+            sees_time,
             moves: Arc::default(),
         }
     }
@@ -55,7 +61,7 @@ impl Stages {
     pub(in crate::stochastic) fn of_another(&self, executor: &dyn Executor) -> Stages {
         Stages {
             moves: Arc::clone(&self.moves),
-            ..Stages::new(executor)
+            ..Stages::new(executor, self.sees_time)
         }
     }
 
@@ -68,7 +74,7 @@ impl Stages {
         watched: Watched,
     ) -> bool {
         self.watched = Some(watched);
-        let written = WrittenRace::of(program, &watched);
+        let written = WrittenRace::of(program, &watched, self.sees_time);
         self.stage = match written.and_then(|written| written.prepare(program, executor)) {
             None => Stage::Without,
             Some(code) => Stage::ready(code),
@@ -83,7 +89,8 @@ impl Stages {
         executor: &dyn Executor,
         watched: Watched,
         id: RunId,
-        bound: f64,
+        bound: &RunBound,
+        control: Option<&mut Control>,
     ) -> Option<Outcome> {
         self.go_on(program, executor, watched);
         if self.watched != Some(watched) {
@@ -98,7 +105,7 @@ impl Stages {
             return None;
         };
         *runs += 1;
-        let outcome = code.run(program, executor, id, bound);
+        let outcome = code.run(program, executor, id, bound, control);
         if outcome.is_none() {
             *given_up += 1;
             if *runs >= ENOUGH_RUNS && *given_up > *runs / FEW {
@@ -113,7 +120,7 @@ impl Stages {
         let moves = self.moves.load(Ordering::Relaxed);
         if matches!(self.stage, Stage::Waiting) && moves >= MOVES_BEFORE_WRITING {
             self.watched = Some(watched);
-            self.stage = match WrittenRace::of(program, &watched) {
+            self.stage = match WrittenRace::of(program, &watched, self.sees_time) {
                 None => Stage::Without,
                 Some(written) => Stage::Written(Box::new(written)),
             };

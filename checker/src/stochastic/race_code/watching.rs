@@ -3,7 +3,7 @@
 
 use super::race_writer::RaceWriter;
 use super::writer::Writer;
-use crate::ir::{Asked, BlockId, FunctionId, IntegerOperator, Path, Register, Relation};
+use crate::ir::{Aim, Asked, BlockId, FunctionId, IntegerOperator, Path, Register, Relation};
 use crate::stochastic::condition::Condition;
 use crate::stochastic::program::Program;
 use crate::stochastic::rules::{self, Backend};
@@ -17,6 +17,8 @@ pub(in crate::stochastic) enum Watched {
     Until(Condition, Condition),
     /// The greatest value of a function, times this sign.
     Extreme(FunctionId, f64),
+    /// What a run is worth that ends where this holds.
+    End(Condition, Aim),
 }
 
 impl Watched {
@@ -30,7 +32,15 @@ impl Watched {
             Asked::Path(Path::Until(keep, goal)) => {
                 Watched::Until(Condition::of(keep), Condition::of(goal))
             }
-            Asked::Path(Path::Formula(_)) | Asked::End(_) => return None,
+            Asked::End(optimum) => {
+                let goal = match &optimum.goal {
+                    None => Condition::Never,
+                    Some(Path::Eventually(goal)) => Condition::of(goal),
+                    Some(_) => return None,
+                };
+                Watched::End(goal, optimum.aim)
+            }
+            Asked::Path(Path::Formula(_)) => return None,
         })
     }
 
@@ -38,7 +48,9 @@ impl Watched {
     pub(super) fn is_known(&self, program: &Program<'_>) -> bool {
         let is_curved = |one: Condition| matches!(one, Condition::Curved(_));
         match *self {
-            Watched::Eventually(one) | Watched::Always(one) => !is_curved(one),
+            Watched::Eventually(one) | Watched::Always(one) | Watched::End(one, _) => {
+                !is_curved(one)
+            }
             Watched::Until(keep, goal) => !is_curved(keep) && !is_curved(goal),
             Watched::Extreme(value, _) => !program.is_timed(value),
         }
@@ -67,7 +79,9 @@ impl RaceWriter<'_, '_> {
     /// there is one.
     pub(super) fn watch(&self, w: &mut Writer<'_>, watched: &Watched, delay: Option<Register>) {
         match *watched {
-            Watched::Eventually(goal) => self.watch_for(w, Condition::Always, goal, delay),
+            Watched::Eventually(goal) | Watched::End(goal, _) => {
+                self.watch_for(w, Condition::Always, goal, delay)
+            }
             Watched::Always(keep) => self.watch_for(w, keep, Condition::Never, delay),
             Watched::Until(keep, goal) => self.watch_for(w, keep, goal, delay),
             Watched::Extreme(value, sign) => {

@@ -188,6 +188,20 @@ impl<'l> Writer<'l> {
         self.store(word, value);
     }
 
+    /// Writes into an array of so many words at a place.
+    pub(super) fn store_at(&mut self, word: u32, place: Register, length: u32, source: Register) {
+        let index = self.result(RegisterType::Integer, |target| Instruction::ScaleIndex {
+            target,
+            index: place,
+            first: 0,
+            length,
+            stride: 1,
+            site: NOWHERE,
+        });
+        let address = word_of_state(word, Some(index));
+        self.push(Instruction::StoreInteger { address, source });
+    }
+
     pub(super) fn load_double(&mut self, word: u32) -> Register {
         self.load_double_at(word, None)
     }

@@ -10,6 +10,12 @@ use crate::stochastic::program::{Program, Spot};
 /// What comes of a rule, if it does not end early.
 pub(in crate::stochastic) type Flow<B, T = ()> = Result<T, <B as Backend>::End>;
 
+/// For how long the controller waits, and whether a delay is drawn for its moves meanwhile.
+pub(in crate::stochastic) struct Held<B: Backend> {
+    pub(in crate::stochastic) time: B::Real,
+    pub(in crate::stochastic) draws: B::Integer,
+}
+
 /// What carries out rules: at once, or as code.
 pub(in crate::stochastic) trait Backend: Sized {
     type Integer: Copy;
@@ -241,6 +247,17 @@ pub(in crate::stochastic) trait Backend: Sized {
     /// Whether the rules know when the outputs of a process are enabled.
     fn knows_outputs(&mut self, _: &Program<'_>, _: &Spot) -> bool {
         true
+    }
+
+    /// Whether somebody decides about the controllable outputs of a process, and the rules know
+    /// when.
+    fn knows_decisions(&self, _: &Spot) -> bool {
+        false
+    }
+
+    /// For how long the controller waits, and whether delays are drawn for its moves.
+    fn held(&mut self) -> Held<Self> {
+        unreachable!("the rules do not know when anybody decides")
     }
 
     /// Whether one is enabled now that they do not know.

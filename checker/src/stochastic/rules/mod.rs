@@ -14,7 +14,7 @@ mod conditions;
 mod plans;
 mod windows;
 
-pub(super) use backend::{Backend, Flow};
+pub(super) use backend::{Backend, Flow, Held};
 pub(super) use choices::{Candidate, branch, compete, draw, one_of};
 pub(super) use conditions::{number, require, size, span};
 pub(super) use plans::{exponential_rate, is_any_enabled, plan, require_invariant, stay, tolerant};

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 
 use super::conditions::{Span, require, span};
-use super::{Backend, Flow, number};
+use super::{Backend, Flow, Held, number};
 use crate::ir::{Relation, Urgency};
 use crate::stochastic::condition::{Condition, Number};
 use crate::stochastic::constants::TOLERANCE;
@@ -59,6 +59,9 @@ pub(in crate::stochastic) fn plan<B: Backend>(
         spot,
         bound,
     };
+    if b.knows_decisions(spot) {
+        return planning.for_decisions(b);
+    }
     b.within(
         |b, never| {
             if spot.is_plain {
@@ -341,6 +344,73 @@ impl<R: Copy> Planning<'_, '_, R> {
         )
     }
 
+    /// Lets the process try to move when the controller is asked, or when the delay is over that is
+    /// drawn for outputs about which nobody decides.
+    fn for_decisions<B: Backend<Real = R>>(&self, b: &mut B) -> Flow<B> {
+        let moment = b.real_variable(f64::INFINITY);
+        let none = b.integer(0);
+        b.set_window_count(none);
+        for output in self.program.range(self.spot.outputs) {
+            b.attempt(|b, next| {
+                if output.edge.controllable {
+                    self.ask_in_window(b, output, &moment, next)
+                } else {
+                    self.add_window(b, output, &moment, next)
+                }
+            })?;
+        }
+        let windows = b.window_count();
+        b.when(windows, |b| self.draw_in_windows(b, &moment))?;
+        let stay = self.bound.map(|bound| bound.end);
+        b.set_plan(self.process, Some(moment.get()), stay, true);
+        Ok(())
+    }
+
+    /// Lets the moment come not later than the controller is asked about an output: as soon as it
+    /// is enabled, when the controller has waited as long as it wants, or when a delay is over that
+    /// is drawn for it.
+    fn ask_in_window<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        output: &Instance<'_>,
+        moment: &Cell<R>,
+        next: B::Exit,
+    ) -> Flow<B> {
+        let window = span(b, self.program, output.guard, &output.values, next)?;
+        let zero = b.real(0.0);
+        let low = window.low.unwrap_or(zero);
+        if window.low.is_some() {
+            self.require_in_time(b, low, next)?;
+        }
+        let Held { time, draws } = b.held();
+        let ask = |b: &mut B, at: R| {
+            let first = b.least(moment.get(), at);
+            b.set_real(moment, first);
+            Ok(())
+        };
+        let ask_at_end = |b: &mut B| {
+            let asked = match self.bound {
+                Some(bound) => b.least(time, bound.end),
+                None => time,
+            };
+            ask(b, asked)
+        };
+        b.choose(
+            draws,
+            |b| {
+                let is_over = b.compare_real_to(time, Relation::Equal, 0.0);
+                if output.may_be_urgent {
+                    return ask_at_end(b);
+                }
+                b.choose(is_over, |b| self.push_window(b, window, low), ask_at_end)
+            },
+            |b| {
+                let is_later = b.compare_real_to(low, Relation::Greater, 0.0);
+                b.choose(is_later, |b| ask(b, low), ask_at_end)
+            },
+        )
+    }
+
     /// Adds the window of an output, or lets the moment come not later than its begin if it is
     /// taken as soon as it can be; leaves if it has none.
     fn add_window<B: Backend<Real = R>>(
@@ -363,6 +433,10 @@ impl<R: Copy> Planning<'_, '_, R> {
             b.set_real(moment, first);
             return Ok(());
         }
+        self.push_window(b, window, low)
+    }
+
+    fn push_window<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, low: R) -> Flow<B> {
         let end = self.cut(b, window);
         let end = end.unwrap_or_else(|| b.real(f64::INFINITY));
         let number = b.window_count();
