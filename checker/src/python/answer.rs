@@ -7,10 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::convert::{
-    RejectedError, StepEntry, choice, rejected, step_entry, stop_name, until_signal,
+    RejectedError, StepEntry, code_language, rejected, step_entry, stop_name, until_signal,
     until_signal_apart, unwritten,
 };
-use super::learned::LANGUAGES;
 use super::long_text::LongText;
 use super::model::{BoundRow, Model, bound_rows};
 use super::options;
@@ -266,7 +265,7 @@ impl Answer {
         language: &str,
         name: String,
     ) -> PyResult<Option<String>> {
-        let language = choice("language", language, &LANGUAGES)?;
+        let language = code_language(language)?;
         let Some(shield) = slf.get().inner.evidence.shield.clone() else {
             return Ok(None);
         };

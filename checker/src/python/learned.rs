@@ -6,17 +6,12 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::answer::Answer;
-use super::convert::{choice, rejected, until_signal_apart, unwritten};
+use super::convert::{code_language, rejected, until_signal_apart, unwritten};
 use super::model::Model;
 use crate::engine::LoadedModel;
-use crate::engine::format::learned_code::Language;
 use crate::engine::format::learned_json;
 use crate::engine::query_form::unnamed;
 use crate::learning;
-
-/// The languages of code by their names.
-pub(super) const LANGUAGES: [(&str, Language); 2] =
-    [("c", Language::C), ("python", Language::Python)];
 
 /// A learned strategy.
 #[pyclass(frozen, module = "ntagen._checker")]
@@ -108,7 +103,7 @@ impl LearnedStrategy {
 
     /// The strategy as a function in "c" or "python", whose names begin so.
     fn code(slf: &Bound<'_, Self>, language: &str, name: String) -> PyResult<String> {
-        let language = choice("language", language, &LANGUAGES)?;
+        let language = code_language(language)?;
         written(slf, move |own, model| {
             model.learned_code(&own.inner, language, &name, &own.query)
         })

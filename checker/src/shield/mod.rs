@@ -10,8 +10,8 @@
 //!   sample of the cell enabled.
 //! * All is determined by the seed: the number of a cell says which random numbers its runs draw.
 //!
-//! Source: A. H. Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", `AISoLA` 2023;
-//! "Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025.
+//! Source: A. H. Brorholt et al., "Shielded Reinforcement Learning for Hybrid Systems", `AISoLA`
+//! 2023; "Uppaal Coshy: Automatic Synthesis of Compact Shields for Hybrid Systems", 2025.
 
 mod fixed_point;
 mod grid;

@@ -151,8 +151,8 @@ impl LoadedModel {
         self.renew_learned()
     }
 
-    /// Compiles again what learned strategies and shields see, where the model is analysed anew: code and
-    /// places of variables are others then.
+    /// Compiles again what learned strategies and shields see, where the model is analysed anew:
+    /// code and places of variables are others then.
     pub(in crate::engine) fn renew_learned(&mut self) -> Result<(), Rejection> {
         for index in 0..self.strategies.len() {
             if let Some(shield) = self.strategies[index].shield.take() {
