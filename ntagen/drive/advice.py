@@ -22,6 +22,7 @@ from ntagen.scene import Scene
 
 POLICY: Final = "policy"
 SYNTHESIS: Final = "re-synthesis"
+AS_PLANNED: Final = "as planned"
 
 _ROLL_RAD: Final = 0.1
 """What turns the shaft by less is no roll of a plan: the least one is by 5 deg or more."""
@@ -50,12 +51,16 @@ class Advice:
         self._asked: tuple[int, int] | None = None
 
     def is_due(self) -> bool:
-        """Whether the policy is to be asked: once after each push of the model, and each roll."""
+        """Whether the policy is to be asked: once after each push of the model, and each roll.
+
+        After the last roll it has nothing to decide.
+        """
         if self._policy is None:
             return False
-        pushes = self._needle.depth_mm / push_mm(self._scene)
-        is_whole = abs(pushes - round(pushes)) < _WHOLE
-        return is_whole and self._asked != (round(pushes), self._rolls())
+        pushes, rolls = self._needle.depth_mm / push_mm(self._scene), self._rolls()
+        if rolls >= len(self._policy.around.rolls) or abs(pushes - round(pushes)) > _WHOLE:
+            return False
+        return self._asked != (round(pushes), rolls)
 
     def instead_of(
         self,
@@ -80,7 +85,7 @@ class Advice:
             self._note("", SYNTHESIS, "the policy has not seen this")
             return None
         if move == _begins(rest, step_mm, policy, rolls):
-            self._note(move, POLICY, "as planned")
+            self._note(move, POLICY, AS_PLANNED)
             return None
         found = vouched(scene, plans_of(policy, move, rolls, pushes, step_mm))
         if not found:
@@ -112,10 +117,8 @@ def plans_of(
     places = [place for place, _ in around.rolls]
     if move == "roll":
         shifts: Iterable[int] = (pushes - places[rolls],)
-    elif rolls < len(places):
-        shifts = range(max(pushes + 1, around.first[rolls]) - places[rolls], around.window + 1)
     else:
-        shifts = (0,)
+        shifts = range(max(pushes + 1, around.first[rolls]) - places[rolls], around.window + 1)
     for shift in shifts:
         for most in range(around.pushes - around.window, around.most_pushes + 1):
             actions: list[Action] = []
@@ -135,7 +138,7 @@ def _begins(rest: Plan, step_mm: float, policy: Policy, rolls: int) -> Move | No
     if isinstance(first, Push) and not first.spin:
         is_whole = first.length_mm > step_mm - _WHOLE or len(actions) == 1
         return "push" if is_whole else None
-    if isinstance(first, Roll) and rolls < len(policy.around.rolls):
+    if isinstance(first, Roll):
         turn_rad = Roll(first.angle_rad - policy.angle_rad(rolls)).turn_rad
         return "roll" if abs(turn_rad) < _ROLL_RAD else None
     return None

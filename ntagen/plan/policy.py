@@ -101,14 +101,14 @@ class Policy:
             rolls: The rolls so far.
 
         Returns:
-            The move; None where the policy is silent: between two pushes of the model, and where
-            learning has never been.
+            The move; None where the policy is silent: between two pushes of the model, after the
+            last roll, and where learning has never been.
         """
         around, steps = self.around, depth_mm / push_mm(scene)
         pushes = round(steps)
-        if abs(steps - pushes) > _WHOLE or rolls > len(around.rolls):
+        if abs(steps - pushes) > _WHOLE or rolls >= len(around.rolls):
             return None
-        if rolls == len(around.rolls) or pushes < around.first[rolls]:
+        if pushes < around.first[rolls]:
             return "push"
         if pushes >= around.last[rolls]:
             # Behind that, no run has been.

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ntagen.plan.policy import Aim
     from ntagen.scene import Scene
 
+BUDGET_S: Final = 2.0
+
 STOPPED: Final = 3
 """Exit code if the budget ended before a plan was found, or proved not to exist."""
 
@@ -51,10 +53,10 @@ STOPPED: Final = 3
     "--within",
     "budget_s",
     metavar="TIME",
-    default="2s",
-    show_default=True,
+    default=None,
     type=duration,
-    help="The search ends after about this time. It ends sooner if no plan can be better.",
+    help="The search ends after about this time. It ends sooner if no plan can be better.  "
+    "[default: 2s; with --optimise: 20s]",
 )
 @click.option(
     "--rank",
@@ -91,7 +93,7 @@ STOPPED: Final = 3
 def command(
     source: Path,
     count: int,
-    budget_s: float,
+    budget_s: float | None,
     ranking: str | None,
     aim: Aim | None,
     wanted: Wanted,
@@ -150,7 +152,11 @@ def command(
     shown: Best | None = None
     found: tuple[Rated, ...] = ()
     for best in best_plans(
-        task.scene, engine, clock=time.monotonic, count=wanted.looked_for, budget_s=budget_s
+        task.scene,
+        engine,
+        clock=time.monotonic,
+        count=wanted.looked_for,
+        budget_s=BUDGET_S if budget_s is None else budget_s,
     ):
         if not as_json:
             _show_better(best, shown)

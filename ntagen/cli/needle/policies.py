@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 DEFAULT_RUNS: Final = 100_000
 """From so many runs a policy is learned. A tenth of them compares it with the plan."""
 
+BUDGET_S: Final = 20.0
+"""The search for plans ends after this time, which is enough to end by itself: so the same seed
+gives the same policy."""
+
 _COMPARED_PART: Final = 10
 _PLANS: Final = 10
 """A policy is learned around the best of so many plans."""
@@ -40,7 +44,13 @@ _STOPPED: Final = 3
 
 
 def optimise(
-    task: Task, aim: Aim, wanted: Wanted, budget_s: float, output: Path | None, *, as_json: bool
+    task: Task,
+    aim: Aim,
+    wanted: Wanted,
+    budget_s: float | None,
+    output: Path | None,
+    *,
+    as_json: bool,
 ) -> int:
     """Learns a policy, prints what it is worth, and writes it; the exit code."""
     from ntagen.drive.configure import configure
@@ -54,7 +64,7 @@ def optimise(
             "hint: write `tissue stochastic`, with its spreads if you know them"
         )
     settings = configure(task.given, scene).settings
-    best = _plans(scene, settings, budget_s)
+    best = _plans(scene, settings, BUDGET_S if budget_s is None else budget_s)
     if best.verdict != "found":
         return _say_none(best.verdict, as_json=as_json)
     runs = DEFAULT_RUNS if wanted.runs is None else wanted.runs
