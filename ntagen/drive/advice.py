@@ -1,11 +1,11 @@
 """A policy in a run: it is asked at each measurement, and its move is made if that is safe.
 
 Whoever follows a plan asks the policy after each push of the model (`ntagen.plan.policy`). If the
-plan goes on with the same move, nothing changes. If not, the rolls that the policy has still to make
-give plans that begin with its move; the best of those that hold for the newest estimate replaces
-the plan. They must pass what every plan of the driver must pass: its certificate, its tube, and the
-time that is left. Where the policy is silent, or none of its plans holds, the plan stays, which
-syntheses have found and go on to check.
+plan goes on with the same move, nothing changes. If not, the rolls that the policy has still to
+make give plans that begin with its move; the best of those that hold for the newest estimate
+replaces the plan. They must pass what every plan of the driver must pass: its certificate, its
+tube, and the time that is left. Where the policy is silent, or none of its plans holds, the plan
+stays, which syntheses have found and go on to check.
 """
 
 from __future__ import annotations
@@ -105,9 +105,7 @@ class Advice:
         self._journal.record(Advised(needle.now_s(), needle.depth_mm, move, by, reason))
 
 
-def plans_of(
-    policy: Policy, move: Move, rolls: int, pushes: int, step_mm: float
-) -> Iterator[Plan]:
+def plans_of(policy: Policy, move: Move, rolls: int, pushes: int, step_mm: float) -> Iterator[Plan]:
     """The plans with the rolls that are left, of which the first action is a move of the policy.
 
     The next roll and the end lie anywhere in their windows; rolls behind the next one are as far

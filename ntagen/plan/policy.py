@@ -82,7 +82,11 @@ class Policy:
 
     @staticmethod
     def of(
-        aim: Aim, digest: str, around: Around, strategy: Mapping[str, Any], values: Mapping[str, Any]
+        aim: Aim,
+        digest: str,
+        around: Around,
+        strategy: Mapping[str, Any],
+        values: Mapping[str, Any],
     ) -> Policy:
         """A policy with the trees of what was learned.
 
@@ -267,5 +271,3 @@ def _worth(tree: Tree, seen: tuple[float, ...]) -> float:
 
 def _cause(error: Exception) -> str:
     return f"{error} is missing" if isinstance(error, KeyError) else str(error)
-
-

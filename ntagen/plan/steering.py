@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from statistics import NormalDist, fmean, stdev
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.plan.actions import Plan
@@ -131,7 +131,7 @@ def steer(
         raise ModelError(f"the model of the policy fails: {learned.message}")
     aims = _compared(model, around, scene, sampling)
     digest = digest_of(scene, around)
-    values = {name: asdict(one) for name, one in aims.items()}
+    values: dict[str, Any] = {name: asdict(one) for name, one in aims.items()}
     policy = Policy.of(aim, digest, around, json.loads(strategy.json()), values)
     return Steered(policy, plan, aims, learned.optimised.runs)
 
@@ -243,12 +243,16 @@ def _compared(
     for aim in VALUES:
         pairs = zip(policy[aim], plan[aim], strict=True)
         gains = [_sign(aim) * (one - other) for one, other in pairs]
-        means = (Mean.of(runs, risk) for runs in (plan[aim], policy[aim], gains))
-        compared[aim] = Comparison(*means, runs=len(gains), confidence=1.0 - risk)
+        compared[aim] = Comparison(
+            plan=Mean.of(plan[aim], risk),
+            policy=Mean.of(policy[aim], risk),
+            difference=Mean.of(gains, risk),
+            runs=len(gains),
+            confidence=1.0 - risk,
+        )
     return compared
 
 
 def _sign(aim: Aim) -> int:
     """Whether more is better."""
     return 1 if aim == "probability" else -1
-

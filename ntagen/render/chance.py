@@ -219,9 +219,7 @@ def chance(
     )
 
 
-def _policy(
-    scene: Scene, around: Around, vector: Callable[[Vector], str]
-) -> PolicyValues:
+def _policy(scene: Scene, around: Around, vector: Callable[[Vector], str]) -> PolicyValues:
     """What a policy sees and may do."""
     return PolicyValues(
         seen_mm=_double(around.seen.position_mm),

@@ -1,4 +1,4 @@
-"""Drives with a policy: who decides, what the log says of it, and that a replay decides the same."""
+"""Drives with a policy: who decides, what the log says of it, and that replays decide the same."""
 
 from __future__ import annotations
 

@@ -118,9 +118,7 @@ def _plans(scene: Scene, settings: Settings, budget_s: float) -> Best:
 
     _, criteria = split_ranking("probability")
     engine = replace(engine_for(settings), ranking=criteria)
-    *_, last = best_plans(
-        scene, engine, clock=time.monotonic, count=_PLANS, budget_s=budget_s
-    )
+    *_, last = best_plans(scene, engine, clock=time.monotonic, count=_PLANS, budget_s=budget_s)
     return last
 
 
