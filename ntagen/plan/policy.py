@@ -40,10 +40,13 @@ VERSION: Final = 1
 MOST_BYTES: Final = 64 * 2**20
 """The largest file of a policy; 100,000 runs give one of 100 KB."""
 
+_MOST_PUSHES: Final = 10_000
+"""No plan is longer."""
+
 _MOVES: Final[dict[str, Move]] = {"Insertion.Push": "push", "Insertion.Next": "roll"}
 """The moves by the locations that they lead to."""
 
-_WHOLE: Final = 1e-6
+WHOLE: Final = 1e-6
 """Depths are whole pushes up to this."""
 
 
@@ -110,7 +113,7 @@ class Policy:
         """
         around, steps = self.around, depth_mm / push_mm(scene)
         pushes = round(steps)
-        if abs(steps - pushes) > _WHOLE or rolls >= len(around.rolls):
+        if abs(steps - pushes) > WHOLE or rolls >= len(around.rolls):
             return None
         if pushes < around.first[rolls]:
             return "push"
@@ -174,7 +177,7 @@ def read_policy(data: bytes, scene: Scene | None) -> Policy:
     document = _document(data)
     try:
         policy = _policy(document)
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (LookupError, TypeError, ArithmeticError, ValueError, AttributeError) as error:
         raise InputError(
             f"the file of the policy is torn, or was changed by hand: {_cause(error)}\n{_AGAIN}"
         ) from error
@@ -209,6 +212,8 @@ def _policy(document: Mapping[str, Any]) -> Policy:
     seen = Seen(**{name: float(value) for name, value in around["seen"].items()})
     plan = tuple(int(action) for action in around["actions"])
     numbers = {name: int(around[name]) for name in ("window", "most_pushes")}
+    if max(len(plan), *numbers.values()) > _MOST_PUSHES:
+        raise ValueError(f"more than {_MOST_PUSHES} pushes")
     given = Around(plan, **numbers, inside_mm=float(around["inside_mm"]), seen=seen)
     strategy, values = document["strategy"], dict(document["values"])
     return Policy.of(aim, str(document["model_sha256"]), given, strategy, values)

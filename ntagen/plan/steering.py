@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.plan.actions import Plan
 from ntagen.plan.chance import Sampling, actions_of
-from ntagen.plan.policy import CONTINUOUS, DISCRETE, Aim, Policy, digest_of
+from ntagen.plan.policy import CONTINUOUS, DISCRETE, WHOLE, Aim, Policy, digest_of, push_mm
 from ntagen.render import Around, Seen, render_policy
 from ntagen.scene import Scene
 
@@ -140,10 +140,11 @@ def around_of(plan: Plan, scene: Scene, seen: Seen) -> Around:
     """How far a policy may deviate from a plan."""
     actions = actions_of(plan, scene)
     depth_mm = scene.targets[-1].shape.depth_mm
+    most = int(scene.needle.length_mm / push_mm(scene) + WHOLE)
     return Around(
         actions=actions,
         window=WINDOW,
-        most_pushes=actions.count(0) + SPARE_PUSHES,
+        most_pushes=min(actions.count(0) + SPARE_PUSHES, most),
         inside_mm=min(_INSIDE_MM, _INSIDE_RATIO * depth_mm),
         seen=seen,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -113,6 +113,7 @@ def test_it_rolls_within_its_windows(steered: Steered) -> None:
         ({"strategy": {}}, "statevars' is missing"),
         ({"model_sha256": "0"}, "learned for another task"),
         ({"around": {"actions": []}}, "'seen' is missing"),
+        ({"around": {**asdict(around_of(PLAN, SCENE, SEEN)), "window": 10**9}}, "more than 10000"),
     ],
 )
 def test_a_file_that_is_none_is_refused(
@@ -196,6 +197,12 @@ def test_trees_decide_by_what_is_seen() -> None:
 def test_what_a_policy_cannot_be_for_is_refused(scene: Scene, plan: Plan, words: str) -> None:
     with pytest.raises(InputError, match=words):
         render_policy(scene, around_of(plan, scene, SEEN))
+
+
+def test_the_needle_bounds_the_pushes() -> None:
+    assert around_of(PLAN, SCENE, SEEN).most_pushes == 28
+    short = replace(SCENE, needle=replace(SCENE.needle, length_mm=52.0))
+    assert around_of(PLAN, short, SEEN).most_pushes == 26
 
 
 def test_plans_without_rolls_leave_nothing_to_decide() -> None:
