@@ -6,7 +6,7 @@ target lies in the tip's frame, and where the tip is. `ntagen.plan.steering` lea
 engine; here are its file and its decisions.
 
 For each number of rolls and pushes there is a binary tree for each of the two moves. Its leaves say
-what the move is worth. Where learning has never been, a policy is silent.
+what the move costs. Where learning has never been, a policy is silent.
 """
 
 from __future__ import annotations
@@ -124,9 +124,8 @@ class Policy:
         if trees is None or len(trees) < len(_MOVES):
             return None
         seen = features(scene, tip)
-        worth = {move: _worth(tree, seen) for move, tree in trees.items()}
-        better = max if self.aim == "probability" else min
-        return better(worth, key=lambda move: worth[move])
+        costs = {move: _cost(tree, seen) for move, tree in trees.items()}
+        return min(costs, key=lambda move: costs[move])
 
     def angle_rad(self, number: int) -> float:
         """The angle of a roll of the plan; the first one has number 0."""
@@ -268,7 +267,7 @@ def _finite(value: float) -> float:
     return float(value)
 
 
-def _worth(tree: Tree, seen: tuple[float, ...]) -> float:
+def _cost(tree: Tree, seen: tuple[float, ...]) -> float:
     while isinstance(tree, Split):
         tree = tree.low if seen[tree.feature] <= tree.bound else tree.high
     return tree

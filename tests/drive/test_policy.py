@@ -28,7 +28,7 @@ def rolling_after(pushes: int | None) -> Policy:
     """A policy by hand: its second roll comes after so many pushes; None: it is always silent."""
     around = around_of(PLAN, SCENE, Seen(0.1, rad_from_deg(1.0), rad_from_deg(5.0)))
     regressors = {
-        f"(1,{place})": {"regressor": {"0": 0.5, "1": 1.0 if place == pushes else 0.0}}
+        f"(1,{place})": {"regressor": {"0": 0.5, "1": 0.0 if place == pushes else 1.0}}
         for place in WINDOW
     }
     strategy = {

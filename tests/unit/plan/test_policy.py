@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from dataclasses import asdict, replace
@@ -33,7 +32,7 @@ HALF_TURN = Roll(rad_from_deg(180.0))
 PLAN = Plan.of([HALF_TURN, Push(18.0), HALF_TURN, Push(32.0)])
 WORSE = Plan.of([HALF_TURN, Push(18.0), HALF_TURN, Push(30.0)])
 SEEN = Seen(0.1, rad_from_deg(1.0), rad_from_deg(5.0))
-FEW = Sampling(runs=1000, seed=3, learning_runs=10_000)
+FEW = Sampling(runs=4000, seed=3, learning_runs=20_000)
 FEWER = replace(FEW, runs=100, learning_runs=1000)
 
 
@@ -166,7 +165,7 @@ def test_trees_decide_by_what_is_seen() -> None:
             "(1,8)": {
                 "regressor": {
                     "0": 0.5,
-                    "1": {"var": above, "bound": 1.0, "low": 0.25, "high": 0.75},
+                    "1": {"var": above, "bound": 1.0, "low": 0.75, "high": 0.25},
                 }
             },
             "(1,9)": {"regressor": {"1": 0.25}},
@@ -180,8 +179,6 @@ def test_trees_decide_by_what_is_seen() -> None:
     assert seen["above"] == pytest.approx(-4.0)
     assert policy.decide(SCENE, tip, 16.0, 1) == "push"
     assert policy.decide(SCENE, SCENE.needle.tip, 16.0, 1) == "roll"
-    least = dataclasses.replace(policy, aim="miss")
-    assert least.decide(SCENE, tip, 16.0, 1) == "roll"
     assert policy.decide(SCENE, tip, 18.0, 1) is None, "one move was never tried"
     assert policy.decide(SCENE, tip, 20.0, 1) is None, "it was never there"
 
