@@ -28,6 +28,11 @@ use crate::stochastic::{Behaviour, Failure, RunId, Runner, runs_by};
 /// Numbers of runs that learning never uses: those that judge the strategy of an iteration.
 const JUDGING: u64 = 1 << 40;
 
+/// The first part of the runs that judge a strategy is enough if its standard error is less than
+/// this part of what random runs differ by.
+const FIRST_PART: u64 = 5;
+const SURE: f64 = 0.002;
+
 /// A better strategy counts as such if it gains so many standard errors.
 const NOTABLE: f64 = 0.2;
 
@@ -259,10 +264,18 @@ impl Learner<'_> {
     /// The mean value of runs under the strategy that takes the best action everywhere; none if it
     /// was ended.
     fn judge(&mut self, watch: &mut dyn FnMut(&Progress) -> bool) -> Result<Option<Mean>, Failure> {
-        let runs = JUDGING..JUDGING + self.options.judging(self.progress.steps_of_run);
+        let count = self.options.judging(self.progress.steps_of_run);
         let mut episodes = Vec::new();
-        let is_whole = self.made(runs, 0.0, false, &mut episodes, watch)?;
-        Ok(is_whole.then(|| mean_of(&episodes, self.sign)))
+        for part in [0..count / FIRST_PART, count / FIRST_PART..count] {
+            let runs = JUDGING + part.start..JUDGING + part.end;
+            if !self.made(runs, 0.0, false, &mut episodes, watch)? {
+                return Ok(None);
+            }
+            if mean_of(&episodes, self.sign).error < SURE * self.spread {
+                break;
+            }
+        }
+        Ok(Some(mean_of(&episodes, self.sign)))
     }
 
     /// Makes runs.
