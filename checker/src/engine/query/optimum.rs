@@ -201,6 +201,7 @@ fn exact(best: Exact) -> (Answer, Arc<LearnedStrategy>) {
         compared: None,
         is_complete: true,
     });
+    answer.evidence.learned = Some(Arc::clone(&strategy));
     let states = counters.stored;
     answer.remark(format!("exact: value iteration over {states} states"));
     (answer, strategy)
