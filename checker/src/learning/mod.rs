@@ -20,7 +20,7 @@ mod whole_state;
 
 pub use exact::{Exact, ExactAnswer, Inexact, solve_exactly};
 pub use judging::{Comparison, compared, judge};
-pub use learner::{Learned, Mean, Progress, learn};
+pub use learner::{Iteration, Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};
 pub use partition::Partition;
 pub use strategy::{Appraisal, Followed, LearnedStrategy, Regressor, order, values, words};

@@ -167,6 +167,7 @@ fn learned(
         judged,
         comparison,
         uniform,
+        history: learned.history,
         is_complete: learned.is_complete,
         leaves: strategy.leaves() as u64,
         observation,
