@@ -20,6 +20,7 @@ from ntagen.checker.learned_trees import (
     Trees,
     boxes,
     cuts,
+    depth,
     halves,
     number_text,
     only,
@@ -34,6 +35,9 @@ At = Mapping[str, float | str]
 
 MOST_PANELS: Final = 12
 """A picture has at most so many states."""
+
+_MOST_DEPTH: Final = 200
+"""A tree that is drawn has at most so many levels."""
 
 _ROOM: Final = 0.15
 """The part of an axis beyond the greatest cut."""
@@ -56,12 +60,15 @@ def decisions_chart(trees: Trees, query: str, axes: Sequence[str], at: At) -> Sv
     if len(groups) > MOST_PANELS:
         raise InputError(
             f"there are {len(groups)} states to draw, and a picture has at most {MOST_PANELS}\n"
-            f"hint: give features a value (--at)\n{view.values_hint()}"
+            f"hint: give features a value{view.example(groups, names)}{view.seen()}"
         )
-    panels = [view.panel(group, chosen) for group in groups]
+    said = view.same(groups) if len(groups) > 1 else set()
+    panels = [view.panel(group, chosen, said) for group in groups]
     notes = ["where the best move is not possible, the best of those that are possible is taken"]
     if len(groups) < len(view.groups(names, with_idle=True)):
         notes.append("states in which there is nothing to choose are left out")
+    if shared := view.title(groups[0][0], names | set(trees.features) - said):
+        notes.append(f"in all of them: {shared}")
     heading = f"Decisions of {query}"
     text, colors = Text(heading, tuple(notes)), colors_of(trees.labels.values())
     if len(chosen) == 1:
@@ -78,10 +85,16 @@ def tree_chart(trees: Trees, query: str, at: At, limit: int) -> Svg:
     decided = [view.decided(state) for state in states]
     count = sum(sum(1 for _ in boxes(one, view.box)) for one in decided)
     if count > limit:
+        whose = "tree has" if len(states) == 1 else f"trees of {len(states)} states have"
         raise InputError(
-            f"the trees of {len(states)} states have {count:,} leaves, and a picture has at most "
-            f"{limit}\nhint: choose a state (--at), or draw more leaves (--set 'limit {count}')\n"
-            f"{view.values_hint()}"
+            f"the {whose} {count:,} leaves, and a picture has at most {limit}\n"
+            f"hint: draw more leaves (--set 'limit {count}'), or give features a value"
+            f"{view.example([[one] for one in states], set())}{view.seen()}"
+        )
+    if max(map(depth, decided)) > _MOST_DEPTH:
+        raise InputError(
+            f"a tree has more than {_MOST_DEPTH} levels, and cannot be drawn\n"
+            f"hint: draw a map (--as decisions), or give features a value (--at){view.seen()}"
         )
 
     def node(part: Decided) -> Leaf | Question:
@@ -119,7 +132,10 @@ class _View:
         ]
         if not self.states:
             said = " ".join(trees.value_text(trees.discrete[n], value) for n, value in exact)
-            raise InputError(f"learning has not seen {said or 'any state'}\n{self.values_hint()}")
+            raise InputError(
+                f"learning has not seen {said or 'any state'}\n"
+                f"hint: choose other values{self.seen() or ', or learn longer'}"
+            )
         self._decided: dict[tuple[float, ...], Decided] = {}
 
     def decided(self, state: Seen) -> Decided:
@@ -128,8 +144,16 @@ class _View:
             self._decided[state.values] = self.trees.decided(state, self.box)
         return self._decided[state.values]
 
-    def values_hint(self) -> str:
-        """Which exact values have been seen."""
+    def example(self, groups: Sequence[Sequence[Seen]], axes: set[str]) -> str:
+        """How the panel in which most is told apart is chosen."""
+
+        def parts(group: Sequence[Seen]) -> int:
+            return sum(sum(1 for _ in boxes(self.decided(one), self.box)) for one in group)
+
+        return f", for example --at '{self.title(max(groups, key=parts)[0], axes)}'"
+
+    def seen(self) -> str:
+        """The end of a hint: which exact values have been seen."""
         trees = self.trees
         lines = []
         for place, feature in enumerate(trees.discrete):
@@ -137,9 +161,7 @@ class _View:
             texts = [trees.value_text(feature, value) for value in values[:_NAMED]]
             more = f" and {len(values) - _NAMED} more" if len(values) > _NAMED else ""
             lines.append(f"  {', '.join(texts)}{more}")
-        if not lines:
-            return "hint: the strategy sees nothing exactly"
-        return "\n".join(["hint: what has been seen, not all of it together:", *lines])
+        return "; seen are, though not all together:\n" + "\n".join(lines) if lines else ""
 
     def chosen(self, axes: Sequence[str]) -> list[str]:
         """The features of the axes; by default those on which decisions depend.
@@ -223,9 +245,23 @@ class _View:
         choosing = [one for one in found if any(len(state.trees) > 1 for state in one)]
         return found if with_idle else choosing or found
 
-    def panel(self, states: Sequence[Seen], axes: Sequence[Axis]) -> Panel:
-        """What is drawn of states that differ only in the features of the axes."""
-        names = {axis.feature for axis in axes}
+    def same(self, groups: Sequence[Sequence[Seen]]) -> set[str]:
+        """The features that have one value in all panels."""
+        first = groups[0][0].values
+        states = [one for group in groups for one in group]
+        exact = enumerate(self.trees.discrete)
+        found = {one for n, one in exact if all(state.values[n] == first[n] for state in states)}
+        return found | set(self.given)
+
+    def panel(self, states: Sequence[Seen], axes: Sequence[Axis], said: set[str]) -> Panel:
+        """What is drawn of states that differ only in the features of the axes.
+
+        Args:
+            states: The states.
+            axes: The axes.
+            said: Features that the title leaves out.
+        """
+        names = {axis.feature for axis in axes} | said
         patches = [one for state in states for one in self._patches(state, axes)]
         curves = self._curves(states, axes[0]) if len(axes) == 1 else []
         return Panel(self.title(states[0], names), tuple(patches), tuple(curves))

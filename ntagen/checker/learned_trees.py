@@ -246,6 +246,17 @@ def boxes(decided: Decided, box: Sequence[Range]) -> Iterator[tuple[tuple[Range,
             pending += [(part.high, high), (part.low, low)]
 
 
+def depth(decided: Decided) -> int:
+    """How many cuts are at most on a way through a tree."""
+    deepest, pending = 0, [(decided, 0)]
+    while pending:
+        part, level = pending.pop()
+        deepest = max(deepest, level)
+        if isinstance(part, Cut):
+            pending += [(part.low, level + 1), (part.high, level + 1)]
+    return deepest
+
+
 def cuts(tree: Tree) -> Iterator[tuple[int, float]]:
     """All cuts of a tree: the feature, and the bound."""
     pending = [tree]

@@ -31,6 +31,8 @@ _SIDE: Final = 380
 _SMALL_SIDE: Final = 250
 """The side of a map if there are several."""
 _CURVES: Final = (560, 190)
+_WHOLE: Final = 560
+"""The room for a title that has no neighbour."""
 _COLUMNS: Final = 3
 _MOST_NAMES: Final = 14
 _UNSEEN: Final[dict[str, Any]] = {
@@ -61,7 +63,7 @@ def map_picture(
     figure, planes = tiled(text.heading, (side, side), len(panels), min(_COLUMNS, len(panels)))
     tips: _Tips = []
     for plane, panel in zip(planes, panels, strict=True):
-        _prepare(plane, panel, axes[0], side)
+        _prepare(plane, panel, axes[0], side if len(panels) > 1 else _WHOLE)
         plane.set_ylim(*axes[1].ends)
         plane.set_ylabel(shortened(axes[1].feature, side // 7))
         _name(plane.yaxis, axes[1])
@@ -84,7 +86,7 @@ def curves_picture(
     figure, planes = tiled(text.heading, _CURVES, len(panels), 1)
     tips: _Tips = []
     for plane, panel in zip(planes, panels, strict=True):
-        _prepare(plane, panel, axis, _CURVES[0])
+        _prepare(plane, panel, axis, _WHOLE)
         plane.set_ylabel("value from there on")
         plane.margins(y=0.08)
         for curve in panel.curves:
@@ -115,7 +117,7 @@ def _line(color: str) -> str:
 
 
 def _prepare(plane: Plane, panel: Panel, axis: Axis, width: int) -> None:
-    """The title, the horizontal axis, and the stripes behind all."""
+    """The title in a width, the horizontal axis, and the stripes behind all."""
     plane.set_title(shortened(panel.title, width // 6), pad=6.0, color="#404040")
     plane.grid(visible=False)
     plane.set_xlim(*axis.ends)

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.cli.guard import doing
+from ntagen.cli.guard import current, doing
 from ntagen.cli.models.options import LEARNING_SETTINGS, RUNS
 from ntagen.cli.models.queries import Asked, with_strategies
 from ntagen.cli.progress import progress_of, say_interrupted
@@ -23,6 +23,10 @@ KINDS: Final = {
     "learning": "what its value was after each iteration",
 }
 """The pictures of a learned strategy, each with what it shows."""
+
+DRAWING_S: Final = 3.0
+DRAWING_BYTES: Final = 200 << 20
+"""Enough to load matplotlib and to draw, on a slow machine too."""
 
 MOST_LEAVES: Final = 60
 """If no number is given, the picture of trees has at most this number of leaves."""
@@ -68,13 +72,17 @@ def plot_learned(
             "hint: ask for minE, maxE, minPr or maxPr, or load one: strategy S = "
             'loadStrategy("S.json"); the strategy of a game is drawn with --as zones'
         )
-    answer = _answer(model, query, settings, limits)
+    with doing("the search for the best strategy"):
+        answer = _answer(model, query, settings, limits)
+    is_cut_off = answer.optimised is not None and not answer.optimised.is_complete
+    if is_cut_off:
+        current().allow(DRAWING_S, DRAWING_BYTES)
     strategy = _strategy(answer, query)
     with doing("drawing the picture"):
         _picture(answer, strategy, query, kind, at, settings).save(path)
-    if answer.stop is None:
+    if not is_cut_off:
         return 0
-    echo(f"note: stopped by the {answer.limit_text}: the strategy is the best until then", err=True)
+    echo("note: learning was stopped by a limit: the strategy is the best until then", err=True)
     return LimitError.exit_code
 
 

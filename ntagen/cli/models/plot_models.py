@@ -78,10 +78,6 @@ RUN_SETTINGS: Final = (
 OF_RUNS: Final = {one.field: f"--set '{one.words} …'" for one in RUN_SETTINGS}
 """How each of them is given."""
 
-_DRAWING_S: Final = 3.0
-_DRAWING_BYTES: Final = 200 << 20
-"""Enough to load matplotlib and to draw, on a slow machine too."""
-
 MOST_DRAWN: Final = 100
 """If no number is given, the picture of a graph has at most this number of states."""
 
@@ -363,7 +359,7 @@ def _plot_runs(
         if answer.estimate is None and not answer.trajectories:
             raise LimitError(f"{query.text} was {said} before there was anything to draw")
         echo(f"note: {said}: the picture shows the runs until then", err=True)
-        current().allow(_DRAWING_S, _DRAWING_BYTES)
+        current().allow(plot_learned.DRAWING_S, plot_learned.DRAWING_BYTES)
     _chart_of(answer, settings).save(path)
     return code
 

@@ -198,12 +198,19 @@ def test_each_state_has_a_panel_unless_it_is_on_an_axis(
     simple: LearnedStrategy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     panels, _ = drawn(simple, monkeypatch)
-    assert [one.title for one in panels] == ["P.A n=2", "P.A n=4"]
+    assert [one.title for one in panels] == ["n=2", "n=4"]
     panels, axes = drawn(simple, monkeypatch, "x", "n", y=1)
     assert [one.title for one in panels] == ["P.A y=1"]
     # 3 has never been seen: its place is empty.
     assert (axes[1].names, axes[1].ends) == (("2", "3", "4"), (-0.5, 2.5))
     assert {one.sides[1] for one in panels[0].patches} == {(-0.5, 0.5), (1.5, 2.5)}
+
+
+def test_what_panels_share_is_said_once(simple: LearnedStrategy) -> None:
+    said = texts(simple.decisions())
+    assert "in all of them: P.A" in said
+    assert {"n=2", "n=4"} <= set(said)
+    assert "P.A n=2" in texts(simple.decisions(at={"n": 2}))
 
 
 def test_over_one_feature_each_move_has_a_curve(
@@ -264,7 +271,7 @@ def test_colours_of_many_actions_differ() -> None:
         ([], {"Q": "A"}, "does not see Q"),
         ([], {"P": "C"}, "process P has no location C\nhint: it has A, B"),
         ([], {"n": "two"}, "n=two is no number"),
-        ([], {"n": 7}, "learning has not seen n=7\nhint: what has been seen"),
+        ([], {"n": 7}, "learning has not seen n=7\nhint: choose other values; seen are"),
         ([], {"P": "B"}, "learning has not seen P.B"),
         (["x"], {}, "depends on y too, for example at 2\nhint: give it a value"),
         ([], {"P": "A", "n": 2, "x": 1, "y": 1}, "no feature with several values"),
@@ -293,6 +300,16 @@ def test_too_much_is_not_drawn(tmp_path: Path) -> None:
     assert texts(strategy.tree(limit=32)).count("wait: 2") == 16
     # Without axes, the integer is one of them.
     assert len(strategy.decisions().figure.axes) == 2  # type: ignore[union-attr]
+
+
+def test_a_tree_of_many_levels_is_refused_and_its_map_drawn(tmp_path: Path) -> None:
+    chain: object = 0.0
+    for level in range(400):
+        chain = cut(level % 2, float(400 - level), float(level % 3), chain)
+    strategy = loaded(tmp_path, {"(0,2)": {0: chain, 6: 1.5}})
+    with pytest.raises(InputError, match="more than 200 levels, and cannot be drawn\nhint: "):
+        strategy.tree(limit=1000)
+    assert strategy.decisions().text
 
 
 def test_states_without_a_choice_are_left_out(tmp_path: Path) -> None:
