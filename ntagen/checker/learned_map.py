@@ -133,7 +133,7 @@ class _View:
         if not self.states:
             said = " ".join(trees.value_text(trees.discrete[n], value) for n, value in exact)
             raise InputError(
-                f"learning has not seen {said or 'any state'}\n"
+                f"{said or 'no state'} has {'never ' if said else ''}been seen\n"
                 f"hint: choose other values{self.seen() or ', or learn longer'}"
             )
         self._decided: dict[tuple[float, ...], Decided] = {}

@@ -180,9 +180,7 @@ def _finished(
         notes.insert(0, "a line is what the action is worth; the colour behind is that of the best")
     if any(_has_gaps(panel, axes) for panel in panels):
         unseen = Rectangle((0.0, 0.0), 1.0, 1.0, **_UNSEEN)
-        entries.append(
-            (unseen, "never seen while learning: all that is possible has the same chance")
-        )
+        entries.append((unseen, "never seen: all that is possible has the same chance"))
     entries += [(Line2D([], [], linestyle="none"), note) for note in notes]
     return picture(figure, tips, entries)
 

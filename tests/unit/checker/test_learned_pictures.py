@@ -226,7 +226,7 @@ def test_over_one_feature_each_move_has_a_curve(
 
 
 def test_what_was_never_seen_is_striped(simple: LearnedStrategy) -> None:
-    unseen = "never seen while learning: all that is possible has the same chance"
+    unseen = "never seen: all that is possible has the same chance"
     assert unseen in texts(simple.decisions("x", "n", at={"y": 1}))
     assert unseen not in texts(simple.decisions("x", "y", at={"P": "A", "n": 4}))
 
@@ -271,8 +271,8 @@ def test_colours_of_many_actions_differ() -> None:
         ([], {"Q": "A"}, "does not see Q"),
         ([], {"P": "C"}, "process P has no location C\nhint: it has A, B"),
         ([], {"n": "two"}, "n=two is no number"),
-        ([], {"n": 7}, "learning has not seen n=7\nhint: choose other values; seen are"),
-        ([], {"P": "B"}, "learning has not seen P.B"),
+        ([], {"n": 7}, "n=7 has never been seen\nhint: choose other values; seen are"),
+        ([], {"P": "B"}, "P.B has never been seen"),
         (["x"], {}, "depends on y too, for example at 2\nhint: give it a value"),
         ([], {"P": "A", "n": 2, "x": 1, "y": 1}, "no feature with several values"),
     ],
@@ -406,7 +406,7 @@ def test_the_strategy_of_an_exact_answer_is_written(folder: Path) -> None:
         (["--query", LOAD, "--set", "features x,,"], "is not one feature or two"),
         (["--query", LOAD, "--set", "features z"], "does not see z"),
         (["--query", LOAD, "--at", "A"], "'A' is neither a location nor a value"),
-        (["--query", LOAD, "--at", "n=8"], "learning has not seen n=8"),
+        (["--query", LOAD, "--at", "n=8"], "n=8 has never been seen"),
         (["--query", LOAD, "--as", "learning"], "does not say how it was learned"),
         (["--query", LOAD, "--as", "tree", "--set", "limit 1"], "at most 1\n"),
     ],
