@@ -167,9 +167,10 @@ pub fn estimate(estimate: &Estimate) -> Json {
 }
 
 /// How the best strategy was found. `judged` is its value by the runs that chose it, `uniform` what
-/// runs are worth in which all is chosen uniformly, and `comparison` says whether it is better. Each
-/// iteration of `history` has the `value` of its strategy, with its standard `error`, by
-/// `judging_runs`; `runs` were made until its end, and all had been forgotten `resets` times before.
+/// runs are worth in which all is chosen uniformly, and `comparison` says whether it is better.
+///
+/// Each iteration of `history` has the `value` of its strategy with its standard `error`, by
+/// `judging_runs`. Until its end `runs` were made, and all was forgotten `resets` times before.
 pub fn optimised(optimised: &Optimised) -> Json {
     let uniform = optimised.uniform.as_ref().map(|uniform| {
         let mut object = estimate(uniform);
