@@ -19,6 +19,7 @@ from ntagen.checker.answer import (
     Iteration,
     Optimised,
     Place,
+    Shielded,
     Value,
     Verdict,
 )
@@ -89,6 +90,7 @@ __all__ = [
     "RejectedError",
     "RunProgress",
     "SearchOrder",
+    "Shielded",
     "Simulation",
     "StrategyWanted",
     "SymbolicState",

@@ -17,10 +17,19 @@ use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
 use crate::learning::LearnedStrategy;
 use crate::network::Failure;
 use crate::semantics::Reading;
+use crate::shield::Shield;
 use crate::syntax::ast::QueryText;
 
-/// The strategy that the controller stays within, and the learned one that it follows.
-type FollowedStrategies = (Option<Arc<Under>>, Option<Arc<LearnedStrategy>>);
+/// What a query under a strategy follows.
+#[derive(Default)]
+struct FollowedStrategies {
+    /// The strategy that the controller stays within.
+    under: Option<Arc<Under>>,
+    /// The learned one that it follows.
+    learned: Option<Arc<LearnedStrategy>>,
+    /// The shield that it stays within.
+    shield: Option<Arc<Shield>>,
+}
 
 impl LoadedModel {
     /// Answers a query.
@@ -56,7 +65,20 @@ impl LoadedModel {
         let level = self.level(&query, options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (under, learned) = self.followed(&query, options)?;
+        let FollowedStrategies {
+            under,
+            learned,
+            shield,
+        } = match self.followed(&query, options)? {
+            Ok(followed) => followed,
+            Err(answer) => {
+                return Ok(Answer {
+                    warnings,
+                    load_seconds: self.load_seconds,
+                    ..*answer
+                });
+            }
+        };
         let prepared = PreparedQuery {
             query,
             options: options.left_since(start),
@@ -64,6 +86,7 @@ impl LoadedModel {
             level,
             under,
             learned,
+            shield,
         };
         self.refuse_unsupported(&prepared)?;
         let mut answer = match self.prepare_in_time(reading, span, &prepared.options)? {
@@ -80,19 +103,38 @@ impl LoadedModel {
         &mut self,
         query: &Query,
         options: &Options,
-    ) -> Result<FollowedStrategies, Rejection> {
+    ) -> Result<Result<FollowedStrategies, Box<Answer>>, Rejection> {
         let Some(name) = &query.under else {
-            return Ok((None, None));
+            return Ok(Ok(FollowedStrategies::default()));
         };
         if let Some(named) = self.strategy(name)
-            && let Some(learned) = &named.learned
+            && (named.learned.is_some() || named.shield.is_some())
         {
-            return Ok((named.within.clone(), Some(Arc::clone(learned))));
+            let is_symbolic = !matches!(
+                query.kind,
+                QueryKind::Statistical(_) | QueryKind::Optimum(_)
+            );
+            if let (true, Some(learned), None) = (is_symbolic, &named.learned, &named.shield) {
+                let learned = Arc::clone(learned);
+                let in_zones = self.learned_in_zones(name, &learned, query, options)?;
+                return Ok(in_zones.map(|under| FollowedStrategies {
+                    under: Some(under),
+                    ..FollowedStrategies::default()
+                }));
+            }
+            return Ok(Ok(FollowedStrategies {
+                under: named.within.clone(),
+                learned: named.learned.clone(),
+                shield: named.shield.clone(),
+            }));
         }
         let strategy = self.permitted_by(name, query.span, options)?.strategy;
         let query = self.strategy(name).map(|one| one.query.clone());
         let query = query.unwrap_or_default();
-        Ok((Some(Arc::new(Under { query, strategy })), None))
+        Ok(Ok(FollowedStrategies {
+            under: Some(Arc::new(Under { query, strategy })),
+            ..FollowedStrategies::default()
+        }))
     }
 
     /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer
@@ -121,6 +163,7 @@ impl LoadedModel {
         let mut answer = match &query.kind {
             QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
             QueryKind::Optimum(asked) => self.answer_optimum(prepared, asked)?,
+            QueryKind::Shield(asked) => self.answer_shield(prepared, asked)?,
             QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
                 self.answer_by_file(prepared)?
             }

@@ -17,6 +17,7 @@ use crate::game::strategy::{Strategy, Under};
 use crate::ir::{FunctionId, Measure, Network, Overflow, Query};
 use crate::learning::LearnedStrategy;
 use crate::semantics::{self, FIRST_POOL, Reading};
+use crate::shield::Shield;
 use crate::syntax::{
     self,
     ast::{QueryKind, QueryText, Template},
@@ -313,7 +314,9 @@ impl LoadedModel {
     pub(super) fn reading_of(&self, span: Span) -> Reading {
         let (parsed, _) = syntax::parse_query(span, &self.sources);
         match parsed.map(|query| query.kind) {
-            Some(QueryKind::Statistical(_) | QueryKind::Optimum(_)) => Reading::Stochastic,
+            Some(QueryKind::Statistical(_) | QueryKind::Optimum(_) | QueryKind::Shield(_)) => {
+                Reading::Stochastic
+            }
             Some(QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. })
                 if self.symbolic_refusal.is_some() =>
             {
@@ -407,6 +410,10 @@ pub struct NamedStrategy {
     pub learned: Option<Arc<LearnedStrategy>>,
     /// The strategy that a learned one refines.
     pub(crate) within: Option<Arc<Under>>,
+    /// The shield, if it is one; or the one that a learned strategy refines.
+    pub(crate) shield: Option<Arc<Shield>>,
+    /// The decisions of a learned strategy in zones, once a symbolic query under it was asked.
+    pub(crate) in_zones: Option<Arc<Under>>,
 }
 
 /// A compiled query with all that it is answered by.
@@ -422,6 +429,8 @@ pub(crate) struct PreparedQuery {
     pub(crate) under: Option<Arc<Under>>,
     /// The learned strategy that it is asked under.
     pub(crate) learned: Option<Arc<LearnedStrategy>>,
+    /// The shield that it is asked under, or that the learned strategy refines.
+    pub(crate) shield: Option<Arc<Shield>>,
 }
 
 /// What a query under a strategy follows.
@@ -443,6 +452,8 @@ impl NamedStrategy {
             permitted: None,
             learned: None,
             within: None,
+            shield: None,
+            in_zones: None,
         }
     }
 }

@@ -7,6 +7,7 @@ mod episode;
 mod exact;
 mod experience;
 mod explorer;
+mod in_zones;
 mod judging;
 mod learner;
 mod observation;
@@ -19,6 +20,7 @@ mod tree;
 mod whole_state;
 
 pub use exact::{Exact, ExactAnswer, Inexact, solve_exactly};
+pub use in_zones::{Broken, InZones, NotInZones, StochasticReading};
 pub use judging::{Comparison, compared, judge};
 pub use learner::{Iteration, Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};

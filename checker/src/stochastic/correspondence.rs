@@ -6,11 +6,11 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::ir::{Network, ProcessId, Shape};
+use crate::ir::{ClockId, Network, ProcessId, Shape};
 
 /// From states of the symbolic reading to those of the stochastic one.
 #[derive(Clone, Debug)]
-pub(super) struct Correspondence {
+pub struct Correspondence {
     /// Words that lie one behind the other in both: the first of each, and how many.
     runs: Vec<(u32, u32, u32)>,
     /// The first word of each clock, without the reference clock.
@@ -19,7 +19,7 @@ pub(super) struct Correspondence {
 
 impl Correspondence {
     /// That of two readings of one model; `None` if they are not of one model.
-    pub(super) fn new(symbolic: &Network, stochastic: &Network) -> Option<Correspondence> {
+    pub fn new(symbolic: &Network, stochastic: &Network) -> Option<Correspondence> {
         let sizes = |network: &Network| -> Vec<(usize, usize)> {
             let processes = network.processes.iter();
             processes
@@ -121,6 +121,26 @@ impl Correspondence {
             rest = others;
             run
         })
+    }
+
+    /// Copies the words that both have from a state of the symbolic reading to one of the other.
+    pub fn copy(&self, symbolic: &[i32], stochastic: &mut [i32]) {
+        for &(from, to, count) in &self.runs {
+            let run = &symbolic[from as usize..(from + count) as usize];
+            stochastic[to as usize..(to + count) as usize].copy_from_slice(run);
+        }
+    }
+
+    /// Whether both have this word of the stochastic reading.
+    pub fn has(&self, word: u32) -> bool {
+        let mut runs = self.runs.iter();
+        runs.any(|&(_, first, count)| (first..first + count).contains(&word))
+    }
+
+    /// The clock of the symbolic reading that begins at this word of the stochastic one.
+    pub fn clock(&self, word: u32) -> Option<ClockId> {
+        let found = self.clocks.iter().position(|&clock| clock == word)?;
+        Some(ClockId(found as u32 + 1))
     }
 
     /// How many words both have.

@@ -125,7 +125,10 @@ def _strategy(answer: Answer, query: Asked) -> LearnedStrategy:
     if answer.verdict == "error":
         raise ModelError(answer.message or "the model has a run-time error")
     if answer.stop is None:
-        raise InputError(f"{query.text} is {answer.verdict}, and has no strategy to draw")
+        raise InputError(
+            f"{query.text} is {answer.verdict}, and has no strategy to draw\n"
+            "hint: what minE, maxE, minPr and maxPr find can be drawn like this"
+        )
     raise LimitError(
         f"{query.text} was stopped by the {answer.limit_text} before there was a strategy to draw"
     )

@@ -6,6 +6,8 @@
 //! allowed. Where a strategy has no decision, and where play has ended, everything is allowed. So
 //! the closed loop contains every run of every player that follows the strategy.
 
+use std::sync::Arc;
+
 use crate::cancellation;
 use crate::ir::{ClockAtom, ClockId, FixedConstraint, Network};
 use crate::network::{Allowed, Part, Restriction, is_same_entry};
@@ -22,7 +24,7 @@ pub struct ClosedLoop {
     owner: Player,
     store: StateStore,
     /// For each state of the store; `None` where play has ended.
-    states: Vec<Option<Allowed>>,
+    states: Vec<Option<Arc<Allowed>>>,
     atoms: Vec<ClockAtom>,
 }
 
@@ -38,9 +40,8 @@ impl ClosedLoop {
             for decision in one.decisions.iter().chain(&one.legs) {
                 collect_atoms(&decision.zones, &mut atoms);
             }
-            states.push(
-                (!one.is_goal).then(|| allowed(network, &one, strategy.owner, strategy.selection)),
-            );
+            let allowed = || allowed(network, &one, strategy.owner, strategy.selection);
+            states.push((!one.is_goal).then(|| Arc::new(allowed())));
         }
         atoms.sort_by_key(|one| (one.left.first, one.right.first, one.low, one.strict));
         atoms.dedup();
@@ -54,9 +55,9 @@ impl ClosedLoop {
 }
 
 impl Restriction for ClosedLoop {
-    fn allowed(&self, words: &[i32]) -> Option<&Allowed> {
+    fn allowed(&self, words: &[i32]) -> Option<Arc<Allowed>> {
         let id = self.store.find(words)?;
-        self.states[id.0 as usize].as_ref()
+        self.states[id.0 as usize].clone()
     }
 
     fn owns(&self, controllable: bool) -> bool {
@@ -156,7 +157,13 @@ pub fn counting<'d>(
     parts.collect()
 }
 
-fn allowed(network: &Network, joined: &Joined<'_>, owner: Player, selection: Selection) -> Allowed {
+/// What is allowed in the states with some words, by what a strategy says about them.
+pub fn allowed(
+    network: &Network,
+    joined: &Joined<'_>,
+    owner: Player,
+    selection: Selection,
+) -> Allowed {
     let dimension = network.clocks.len().max(1);
     let counting = counting(&joined.decisions, selection, dimension);
     let mut decided = Federation::empty(dimension);

@@ -74,7 +74,7 @@ pub struct StrategyState {
 
 impl StrategyState {
     /// The bytes that it takes.
-    pub(super) fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> usize {
         let decisions = self.decisions.iter().chain(&self.legs).map(|decision| {
             let action = decision.action.as_ref();
             let parts = action.map_or(0, |parts| block_bytes(size_of_val(&**parts)));

@@ -108,6 +108,11 @@ impl Symbolic<'_> {
         Ok(())
     }
 
+    /// The part of a zone in which the guards of a move hold.
+    pub fn guarded_part(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<Federation, Failure> {
+        guarded_part(one, zone, self.dimension())
+    }
+
     /// Whether the guards of a move leave anything of the zone for which the moves were computed.
     /// This is checked before a move is taken, so that no update runs that cannot happen.
     pub fn is_enabled(&self, one: MoveRef<'_>, zone: &[Bound]) -> Result<bool, Failure> {

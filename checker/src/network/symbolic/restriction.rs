@@ -13,6 +13,8 @@
 //! priority over moves of lower levels. [`crate::network::Symbolic::without_priorities`] says
 //! whether priorities count.
 
+use std::sync::Arc;
+
 use crate::ir::{ClockAtom, FixedConstraint, Network};
 use crate::zones::Federation;
 use crate::zones::future::Barriers;
@@ -36,7 +38,7 @@ pub struct Allowed {
 /// Restricts one player. Threads share it.
 pub trait Restriction: Sync {
     /// What is allowed in a state with these words; `None` means everything.
-    fn allowed(&self, words: &[i32]) -> Option<&Allowed>;
+    fn allowed(&self, words: &[i32]) -> Option<Arc<Allowed>>;
 
     /// Whether the player owns a move that is, or is not, controllable.
     fn owns(&self, controllable: bool) -> bool;
@@ -47,7 +49,7 @@ pub trait Restriction: Sync {
 
 impl Allowed {
     /// Where a move of the player is forbidden; a move of the controller is known by its entry.
-    fn forbidden(&self, network: &Network, one: &MoveRef<'_>) -> &Federation {
+    pub fn forbidden(&self, network: &Network, one: &MoveRef<'_>) -> &Federation {
         let is_it = |parts: &[Part]| {
             parts == one.parts || one.controllable && is_same_entry(network, parts, one.parts)
         };
