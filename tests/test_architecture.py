@@ -61,14 +61,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.states"},
     "checker.runs": {"errors", "checker.picture"},
     "checker.machine": {"errors"},
-    "checker.learned": {"checker.errors", "errors", "files", "_checker"},
+    "checker.learned_trees": {"errors"},
+    "checker.learned_map": {"errors", "checker.learned_trees", "checker.picture"},
+    "checker.learned": {"checker.errors", "errors", "files", "_checker"}
+    | {"checker.learned_map", "checker.learned_trees", "checker.picture"},
     "checker.story": {"checker.runs"},
     "checker.play": {"errors", "checker.errors", "checker.runs", "_checker"},
     "checker.decisions": {"checker.runs"},
     "checker.strategy": {"errors", "files", "checker.runs", "checker.play", "_checker"}
     | {"checker.decisions", "checker.errors", "checker.picture", "checker.winning"},
     "checker.answer": {"checker.edges", "checker.errors", "checker.machine", "checker.runs"}
-    | {"checker.learned"}
+    | {"checker.learned", "checker.queries"}
     | {"checker.options"}
     | {"checker.story", "checker.strategy", "_checker"}
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},

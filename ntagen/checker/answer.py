@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import ntagen._checker as _checker
 from ntagen.checker.edges import EdgeTable, EngineEdge, EnginePlan, EngineStep, step_of
 from ntagen.checker.errors import rejecting
+from ntagen.checker.queries import form_of
 from ntagen.errors import InputError
 from ntagen.values import dataclass
 
@@ -100,6 +101,25 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
+class Iteration:
+    """What an iteration of learning came to.
+
+    Attributes:
+        runs: How many runs were made until its end, those that judged it among them.
+        resets: How often all had been forgotten before.
+        value: The value of its strategy.
+        error: The standard error of the value.
+        judging_runs: How many runs judged the strategy; they are the same for all iterations.
+    """
+
+    runs: int
+    resets: int
+    value: float
+    error: float
+    judging_runs: int
+
+
+@dataclass(frozen=True, slots=True)
 class Shielded:
     """What is known of a shield.
 
@@ -144,6 +164,7 @@ class Optimised:
             before.
         comparison: Whether the strategy is ``better`` or ``worse`` than that, or ``alike`` as far
             as the runs can tell; ``None`` if a limit came before.
+        history: What the iterations came to, in their order.
         is_complete: Whether learning came to its end.
         leaves: How many leaves the trees of the strategy have.
     """
@@ -155,6 +176,7 @@ class Optimised:
     judged: float
     uniform: Estimate | None
     comparison: Literal["better", "worse", "alike"] | None
+    history: tuple[Iteration, ...]
     is_complete: bool
     leaves: int
 
@@ -331,6 +353,8 @@ class Answer:
     def chart(self, buckets: int | None = None, width: float | None = None) -> Svg | None:
         """What random runs say, as a picture; ``None`` if there is nothing to draw.
 
+        Of a strategy that was learned, it is the value of each iteration.
+
         Args:
             buckets: The number of buckets of a histogram; see `Distribution.histogram`.
             width: How wide they are, instead.
@@ -340,6 +364,8 @@ class Answer:
         """
         from ntagen.checker.trajectories import runs_chart
 
+        if (optimised := self.optimised) is not None:
+            return self._learning_chart(optimised)
         distribution, estimate = self.distribution, self.estimate
         if distribution is not None and distribution.count > 0:
             is_mean = distribution.of == "value" and estimate is not None
@@ -347,6 +373,21 @@ class Answer:
             return distribution.chart(buckets, width, ends)
         runs = self.trajectories
         return runs_chart(runs, self.query) if runs else None
+
+    def _learning_chart(self, found: Optimised) -> Svg:
+        from ntagen.checker.picture.learning import Level, Point, learning_picture
+
+        def level(one: Estimate | None) -> Level | None:
+            return None if one is None else Level(one.value, one.lower, one.upper)
+
+        form = form_of(self.query)
+        return learning_picture(
+            [Point(one.runs, one.resets, one.value, one.error) for one in found.history],
+            level(self.estimate),
+            level(found.uniform),
+            maximises=form is not None and form.kind.startswith("max"),
+            heading=self.query,
+        )
 
     def _repr_svg_(self) -> str | None:
         chart = self.chart()
@@ -496,7 +537,8 @@ class Answer:
             return None
         given = json.loads(text)
         uniform = given["uniform"] and Estimate.from_object(given["uniform"])
-        return Optimised(**given | {"uniform": uniform})
+        history = tuple(Iteration(**one) for one in given["history"])
+        return Optimised(**given | {"uniform": uniform, "history": history})
 
     @property
     def shielded(self) -> Shielded | None:

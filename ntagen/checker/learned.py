@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import ntagen._checker as _checker
 from ntagen.checker.errors import rejecting
 from ntagen.errors import InputError
 from ntagen.files import write_files
 
+if TYPE_CHECKING:
+    from ntagen.checker.learned_trees import Trees
+    from ntagen.checker.picture.page import Svg
+
 __all__ = ["LearnedStrategy"]
 
 Language = Literal["c", "python"]
+
+MOST_LEAVES: Final = 60
+"""If no number is given, the picture of trees has at most this number of leaves."""
 
 _LANGUAGES: Final[dict[str, Language]] = {".c": "c", ".py": "python"}
 """The languages by the ends of names of files."""
@@ -63,6 +70,56 @@ class LearnedStrategy:
             ValueError: There are too many or too few values.
         """
         return self._raw.decide(list(discrete), list(continuous), list(enabled))
+
+    def decisions(
+        self,
+        x: str | None = None,
+        y: str | None = None,
+        *,
+        at: Mapping[str, float | str] | None = None,
+    ) -> Svg:
+        """What it decides as a picture: a map over two features, or the worth of moves over one.
+
+        Each combination of the exact values that are not drawn and have no value is a panel.
+
+        Args:
+            x: The feature to the right. By default both axes are the first ones on which decisions
+                depend; with `x` alone the picture has no second one.
+            y: The feature upwards.
+            at: Values of other features: ``{"Gate": "Open", "n": 2}``, the location of a process by
+                its name.
+
+        Raises:
+            InputError: There is no such feature, learning has not seen these values, there are too
+                many states, or decisions depend on a feature that is not drawn and has no value.
+        """
+        # Imported here: few commands draw.
+        from ntagen.checker.learned_map import decisions_chart
+
+        axes = [one for one in (x, y) if one is not None]
+        return decisions_chart(self._trees(), self.query, axes, at or {})
+
+    def tree(self, *, at: Mapping[str, float | str] | None = None, limit: int = MOST_LEAVES) -> Svg:
+        """What it decides as a picture: in each state a tree of questions with the best move.
+
+        Parts that decide the same are one leaf.
+
+        Args:
+            at: Values of features, as for `decisions`.
+            limit: How many leaves the picture may have.
+
+        Raises:
+            InputError: There is no such feature, learning has not seen these values, or there are
+                more leaves.
+        """
+        from ntagen.checker.learned_map import tree_chart
+
+        return tree_chart(self._trees(), self.query, at or {}, limit)
+
+    def _trees(self) -> Trees:
+        from ntagen.checker.learned_trees import Trees
+
+        return Trees(self.json(), maximises=self.maximises)
 
     def json(self) -> str:
         """The strategy as JSON text, in the form that ``saveStrategy`` writes.

@@ -15,8 +15,8 @@ from itertools import product
 from typing import Final
 
 from ntagen.checker.decisions import StrategyState
-from ntagen.checker.picture.page import Svg
-from ntagen.checker.picture.zones import WAIT, Area, Axes, Half, zones_picture
+from ntagen.checker.picture.page import WAIT, Svg
+from ntagen.checker.picture.zones import Area, Axes, Half, zones_picture
 from ntagen.errors import InputError
 
 _CONSTRAINT: Final = re.compile(r"(.+?) (<=|<|>=|>|==) (-?[0-9]+)")

@@ -12,14 +12,15 @@ import click
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.guard import current, doing, guarded
 from ntagen.cli.loading import load_task
+from ntagen.cli.models.options import LEARNING_SETTINGS
+from ntagen.cli.models.plot_learned import MOST_LEAVES, OF_LEARNING
 from ntagen.cli.models.plot_models import (
     KINDS,
     MODELS,
     MOST_DRAWN,
     MOST_SEARCHED,
-    OF_GRAPHS,
     OF_RUNS,
-    OF_ZONES,
+    OF_SOME,
     RUN_SETTINGS,
     Wish,
     plot_model,
@@ -51,13 +52,21 @@ SETTINGS: Final = (
         "[default: the first on which decisions depend]",
     ),
     Setting(
+        "features X,Y",
+        click.STRING,
+        "With --as decisions: the features of the two axes, or of one.  "
+        "[default: the first on which decisions depend]",
+    ),
+    Setting(
         "limit N",
         click.IntRange(min=1),
         "With --as states or discrete: draw at most this many states. A graph with more is not "
         f"drawn, and the message says how many it has.  [default: {MOST_DRAWN}; a file that ends "
-        f"in .dot may have {MOST_SEARCHED:,}]",
+        f"in .dot may have {MOST_SEARCHED:,}]  With --as tree: at most this many leaves.  "
+        f"[default: {MOST_LEAVES}]",
     ),
     *RUN_SETTINGS,
+    *LEARNING_SETTINGS,
 )
 """What ``--set`` takes."""
 
@@ -97,21 +106,22 @@ _LIMITS: Final = limits(default="none for a model; of an environment, what drive
     "kind",
     type=click.Choice(list(KINDS)),
     help="Of a model: " + "; ".join(f"{kind}: {what}" for kind, what in KINDS.items()) + ".  "
-    "[default for a UPPAAL model: runs if the query is Pr, E or simulate, else gantt]",
+    "[default for a UPPAAL model: runs if the query is Pr, E or simulate, decisions for minE and "
+    "its kin, else gantt]",
 )
 @click.option(
     "--query",
     "asked",
     metavar="TEXT|NAME",
-    help="Of a model: the query whose trace or random runs are drawn.  [default: the model's only "
-    "query]",
+    help="Of a model: the query whose trace, random runs or strategy are drawn.  [default: the "
+    "model's only query]",
 )
 @click.option(
     "--at",
     metavar="STATE",
     help="With --as zones: the state, as locations and values where they differ from the initial "
     "state, for example 'Train(1).Cross n=1'. A clock with a value (x=3/2) is fixed; one without "
-    "may have any.",
+    "may have any. With --as decisions or tree: values of what the strategy sees.",
 )
 @_LIMITS["timeout_s"]
 @_LIMITS["memory_bytes"]
@@ -144,7 +154,8 @@ def command(
 
     Of a UPPAAL model (.xml, .xta), and with --as of the model of an environment, it draws the trace
     of a query, what the strategy of a game does over two clocks (--as zones), the templates
-    (--as templates), or the states of a small model (--as states).
+    (--as templates), or the states of a small model (--as states). Of a strategy that was learned,
+    it draws what is decided (--as decisions, --as tree) and how it was learned (--as learning).
     For Pr and E it draws a histogram and the cumulative distribution with its band, for simulate
     the runs over time. All pictures may end in .svg, .png or .pdf.
 
@@ -159,6 +170,7 @@ def command(
       ntagen plot model.xml --query "Pr[<=10](<> Gate.Open)" -o reached.png
       ntagen plot model.xml --query "simulate[<=10; 5]{Gate.Open, x}" -o runs.svg
       ntagen plot game.xml --query "control: A<> P.Won" --as zones --at "P.Middle" -o zones.svg
+      ntagen plot model.xml --query "strategy S = minE(cost)[<=9]: <> P.Done" --as decisions
       ntagen plot model.xml --as states --set "limit 300" -o states.pdf
     """  # noqa: D301  click wants the control character
     from ntagen.checker.picture.page import kind_of
@@ -172,7 +184,7 @@ def command(
         echo(f"wrote {path}")
         return code
     say_idle(
-        {"asked": "--query"} | OF_ZONES | OF_GRAPHS,
+        {"asked": "--query"} | OF_SOME | OF_LEARNING,
         "without --as: the scene is drawn, not its model",
     )
     say_idle(OF_RUNS, "here: no random runs are drawn")

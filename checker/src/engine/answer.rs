@@ -8,7 +8,7 @@ use crate::game::partial_observation::Machine;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::plan_list::PlanList;
 use crate::ir::{Observation, SiteId};
-use crate::learning::{Comparison, LearnedStrategy, Mean};
+use crate::learning::{Comparison, Iteration, LearnedStrategy, Mean};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
@@ -149,6 +149,8 @@ pub struct Optimised {
     pub uniform: Option<Estimate>,
     /// How the strategy compares with that.
     pub comparison: Option<Comparison>,
+    /// What the iterations came to, in their order.
+    pub history: Vec<Iteration>,
     /// Whether learning came to its end.
     pub is_complete: bool,
     /// What the strategy sees.

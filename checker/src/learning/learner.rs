@@ -60,6 +60,17 @@ pub struct Progress {
     pub best: Option<Mean>,
 }
 
+/// What an iteration came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iteration {
+    /// How many runs were made until its end.
+    pub runs: u64,
+    /// How many times all had been forgotten before.
+    pub resets: u64,
+    /// The value of its strategy, by the runs that judged it.
+    pub value: Mean,
+}
+
 /// What learning came to.
 #[derive(Clone, Debug)]
 pub struct Learned {
@@ -67,6 +78,8 @@ pub struct Learned {
     pub partition: Partition,
     /// What happened until then.
     pub progress: Progress,
+    /// What its iterations came to, in their order.
+    pub history: Vec<Iteration>,
     /// How many times all was forgotten.
     pub resets: u64,
     /// The iterations since then.
@@ -116,6 +129,7 @@ pub fn learn(
             steps_of_run: 1.0,
             best: None,
         },
+        history: Vec::new(),
         best: Partition::new(width),
     };
     learner.all(&mut watch)
@@ -139,6 +153,7 @@ struct Learner<'a> {
     /// The standard deviation of what runs cost when all was random.
     spread: f64,
     progress: Progress,
+    history: Vec<Iteration>,
     best: Partition,
 }
 
@@ -158,6 +173,11 @@ impl Learner<'_> {
                 is_complete = false;
                 break;
             };
+            self.history.push(Iteration {
+                runs: self.progress.runs,
+                resets,
+                value: mean,
+            });
             let gain = match self.progress.best {
                 None => f64::INFINITY,
                 Some(best) => self.sign * (best.value - mean.value),
@@ -188,6 +208,7 @@ impl Learner<'_> {
         Ok(Learned {
             partition: std::mem::take(&mut self.best),
             progress: self.progress,
+            history: std::mem::take(&mut self.history),
             resets,
             iterations_in_last_reset: in_reset,
             is_complete,

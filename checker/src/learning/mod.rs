@@ -22,7 +22,7 @@ mod whole_state;
 pub use exact::{Exact, ExactAnswer, Inexact, solve_exactly};
 pub use in_zones::{Broken, InZones, NotInZones, StochasticReading};
 pub use judging::{Comparison, compared, judge};
-pub use learner::{Learned, Mean, Progress, learn};
+pub use learner::{Iteration, Learned, Mean, Progress, learn};
 pub use options::{Learning, Method};
 pub use partition::Partition;
 pub use strategy::{Appraisal, Followed, LearnedStrategy, Regressor, order, values, words};

@@ -44,6 +44,8 @@ BAND: Final = 0.16
 _WIDTH: Final = 640
 _PANEL_HEIGHT: Final = 190
 _GAP: Final = 20
+_TILE_GAPS: Final = (76, 74)
+"""The room between axes that have their own numbers, labels and titles, across and down."""
 _HEADING_GAP: Final = 26
 """The room between the heading and the axes, for a line of text."""
 
@@ -56,7 +58,8 @@ _PIXELS: Final = 96
 _SAMPLE: Final = 46
 """The width of a sample in the legend, with the room around its text."""
 
-_MOST_TIPS: Final = 300
+MOST_TIPS: Final = 300
+"""More tooltips than that nobody could point at."""
 
 _TIP: Final = re.compile(r'<g id="tip(\d+)">')
 
@@ -69,17 +72,41 @@ def stacked(heading: str, size: tuple[float, float], count: int = 1) -> tuple[Fi
     figure = Figure((width / _PIXELS, whole / _PIXELS), dpi=_PIXELS)
     filled = {"left": 0.0, "right": 1.0, "bottom": 0.0, "top": 1.0, "hspace": _GAP / height}
     axes = figure.subplots(count, sharex=True, squeeze=False, gridspec_kw=filled)
+    _head(figure, heading, whole)
+    return figure, list(axes[:, 0])
+
+
+@mpl.rc_context(CHART_STYLE)
+def tiled(
+    heading: str, size: tuple[float, float], count: int, columns: int
+) -> tuple[Figure, list[Axes]]:
+    """Axes in rows, each of a size in pixels and with its own numbers, labels and title."""
+    width, height = size
+    rows = -(-count // columns)
+    across = width * columns + _TILE_GAPS[0] * (columns - 1)
+    down = height * rows + _TILE_GAPS[1] * (rows - 1)
+    figure = Figure((across / _PIXELS, down / _PIXELS), dpi=_PIXELS)
+    gaps = {"wspace": _TILE_GAPS[0] / width, "hspace": _TILE_GAPS[1] / height}
+    filled = {"left": 0.0, "right": 1.0, "bottom": 0.0, "top": 1.0, **gaps}
+    axes = figure.subplots(rows, columns, squeeze=False, gridspec_kw=filled)
+    for left_over in list(axes.flat)[count:]:
+        left_over.remove()
+    _head(figure, shortened(heading.strip(), 90), down)
+    return figure, list(axes.flat)[:count]
+
+
+def _head(figure: Figure, heading: str, height: float) -> None:
+    """Writes the heading above a figure of a height in pixels."""
     figure.suptitle(
         # A query may have several lines.
         " ".join(without_controls(heading).split()),
         x=0.0,
-        y=1.0 + _HEADING_GAP / whole,
+        y=1.0 + _HEADING_GAP / height,
         horizontalalignment="left",
         verticalalignment="bottom",
         fontsize=10.0,
         fontweight="bold",
     )
-    return figure, list(axes[:, 0])
 
 
 @mpl.rc_context(CHART_STYLE)
@@ -124,7 +151,7 @@ def add_bars(
         Their tooltips; none if there are so many that nobody could point at one.
     """
     style: dict[str, Any] = {"color": BLUE, "alpha": 0.75, "label": label}
-    if len(bars) > _MOST_TIPS:
+    if len(bars) > MOST_TIPS:
         # As one artist, they are drawn in a hundredth of the time.
         corners = [((a, 0.0), (a, height), (b, height), (b, 0.0)) for a, b, height in bars]
         axes.add_collection(PolyCollection(corners, linewidth=0.0, **style))

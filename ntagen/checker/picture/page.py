@@ -7,6 +7,7 @@ a minute. `page` is the paper on which they stand.
 
 from __future__ import annotations
 
+import colorsys
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -37,6 +38,11 @@ LIGHT: Final = (
     "#bfe5ea",
 )
 """Colours for things of one kind; light, for dark texts."""
+
+WAIT: Final = "wait"
+"""To do nothing yet; it is grey."""
+
+_GREY: Final = "#d5d8dd"
 
 _NOT_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -142,3 +148,26 @@ def without_controls(text: str) -> str:
 def shortened(text: str, most: int) -> str:
     """A text of at most `most` characters."""
     return text if len(text) <= most else text[: max(1, most - 1)] + "…"
+
+
+def colors_of(kinds: Iterable[str]) -> dict[str, str]:
+    """A colour for each kind, in their order, for dark texts; to wait comes last."""
+    found = dict.fromkeys(kinds)
+    moves = [kind for kind in found if kind != WAIT]
+    palette: Sequence[str] = [color for color in LIGHT if color != _GREY]
+    if len(moves) > len(palette):
+        palette = [_hue(number / len(moves)) for number in range(len(moves))]
+    colors = dict(zip(moves, palette, strict=False))
+    return colors | ({WAIT: _GREY} if WAIT in found else {})
+
+
+def _hue(turn: float) -> str:
+    """A light colour of the circle of colours."""
+    parts = colorsys.hls_to_rgb(turn, 0.8, 0.7)
+    return "#" + "".join(f"{round(255 * part):02x}" for part in parts)
+
+
+def darker(color: str) -> str:
+    """A colour that is still seen in thin stripes."""
+    parts = [int(color[at : at + 2], 16) for at in (1, 3, 5)]
+    return "#" + "".join(f"{max(0, round(255 - 1.9 * (255 - part))):02x}" for part in parts)

@@ -20,7 +20,7 @@ from matplotlib.patches import Polygon, Rectangle
 
 from ntagen.checker.picture.chart import picture, stacked
 from ntagen.checker.picture.figure import CHART_STYLE
-from ntagen.checker.picture.page import LIGHT, Svg
+from ntagen.checker.picture.page import Svg, colors_of, darker
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -87,10 +87,6 @@ class Axes:
     y_end: Fraction
 
 
-WAIT: Final = "wait"
-"""The kind of areas in which nothing is done yet; they are grey."""
-
-_GREY: Final = "#d5d8dd"
 _SIDE: Final = 380
 _STRIP: Final = 56
 """The height of the picture of one clock."""
@@ -115,7 +111,7 @@ def zones_picture(
         striped: Whether all areas count where they overlap: they have stripes, so that all are
             seen.
     """
-    colors = _colors(areas)
+    colors = colors_of(area.kind for area in areas)
     striped = striped and len(colors) > 1
     figure, (plane,) = stacked(heading, (_SIDE, _SIDE if axes.y else _STRIP))
     plane.grid(visible=False)
@@ -128,7 +124,7 @@ def zones_picture(
     else:
         plane.set_ylabel(f"{axes.y} {_UNIT}")
     paints = {
-        kind: _striped(number, _darker(color)) if striped else {"facecolor": color}
+        kind: _striped(number, darker(color)) if striped else {"facecolor": color}
         for number, (kind, color) in enumerate(colors.items())
     }
     tips = [
@@ -158,14 +154,6 @@ def _striped(number: int, color: str) -> dict[str, Any]:
     """Stripes of a colour, in a direction of their own."""
     hatch = _HATCHES[number % len(_HATCHES)]
     return {"facecolor": "none", "edgecolor": color, "linewidth": 0.0, "hatch": hatch}
-
-
-def _colors(areas: Sequence[Area]) -> dict[str, str]:
-    """A colour for each kind, in the order of the areas."""
-    palette = [color for color in LIGHT if color != _GREY]
-    moves = [kind for kind in dict.fromkeys(area.kind for area in areas) if kind != WAIT]
-    colors = {kind: palette[number % len(palette)] for number, kind in enumerate(moves)}
-    return colors | ({WAIT: _GREY} if any(area.kind == WAIT for area in areas) else {})
 
 
 def _seen(areas: Sequence[Area], *, striped: bool) -> Iterator[tuple[Area, Sequence[Half]]]:
@@ -280,9 +268,3 @@ def _point(plane: Plane, place: tuple[float, float], size: float, color: str) ->
     (point,) = plane.plot(*place, "o", markersize=size, zorder=1.0, clip_on=False)
     point.set(markerfacecolor=color, markeredgecolor=_LINE)
     return point
-
-
-def _darker(color: str) -> str:
-    """A colour that is still seen in thin stripes."""
-    parts = [int(color[at : at + 2], 16) for at in (1, 3, 5)]
-    return "#" + "".join(f"{max(0, round(255 - 1.9 * (255 - part))):02x}" for part in parts)

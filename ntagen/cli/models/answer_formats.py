@@ -82,6 +82,7 @@ def _record(outcome: Outcome) -> dict[str, object]:
             "resets": found.resets,
             "learning_runs": found.runs,
             "leaves": found.leaves,
+            "history": [asdict(one) for one in found.history],
             "uniform": found.uniform and _interval(found.uniform),
             "better": found.comparison and found.comparison == "better",
         }

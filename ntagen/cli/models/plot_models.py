@@ -13,6 +13,7 @@ import click
 from ntagen.checker.picture.page import kind_of
 from ntagen.cli.guard import current, doing
 from ntagen.cli.loading import load_model, pointing_to_explanations
+from ntagen.cli.models import plot_learned
 from ntagen.cli.models.options import RUNS
 from ntagen.cli.models.queries import Asked, queries_of
 from ntagen.cli.progress import progress_of, say_interrupted, shown_progress
@@ -39,14 +40,28 @@ KINDS: Final = {
     "templates": "the templates, as UPPAAL's editor shows them",
     "states": "the state space of a small model as a graph",
     "discrete": "the same without clocks",
+    **plot_learned.KINDS,
 }
 """The pictures of a model, each with what it shows."""
 
 GRAPHS: Final = ("states", "discrete")
 """Those that may be written for Graphviz, too."""
 
-OF_ZONES: Final = {"at": "--at", "clocks": "--set 'clocks …'"}
-OF_GRAPHS: Final = {"limit": "--set 'limit …'"}
+_FOR: Final = {
+    "at": ("zones", "decisions", "tree"),
+    "clocks": ("zones",),
+    "features": ("decisions",),
+    "limit": (*GRAPHS, "tree"),
+}
+"""What counts for some pictures only, and for which."""
+
+OF_SOME: Final = {
+    "at": "--at",
+    "clocks": "--set 'clocks …'",
+    "features": "--set 'features …'",
+    "limit": "--set 'limit …'",
+}
+"""How each of them is given."""
 
 RUN_SETTINGS: Final = (
     *RUNS,
@@ -62,10 +77,6 @@ RUN_SETTINGS: Final = (
 
 OF_RUNS: Final = {one.field: f"--set '{one.words} …'" for one in RUN_SETTINGS}
 """How each of them is given."""
-
-_DRAWING_S: Final = 3.0
-_DRAWING_BYTES: Final = 200 << 20
-"""Enough to load matplotlib and to draw, on a slow machine too."""
 
 MOST_DRAWN: Final = 100
 """If no number is given, the picture of a graph has at most this number of states."""
@@ -85,10 +96,11 @@ class Wish:
     """The text or name of a query."""
 
     at: str | None
-    """The state of zones, where it differs from the initial one."""
+    """The state of zones, where it differs from the initial one; or values of features."""
 
     settings: dict[str, Any]
-    """``clocks`` for zones, ``limit`` for graphs, and those of random runs, as far as given."""
+    """``clocks`` for zones, ``features`` for decisions, ``limit`` for graphs and trees, and those
+    of random runs and of learning, as far as given."""
 
     memory_bytes: int | None
 
@@ -112,42 +124,64 @@ def plot_model(
             model = load_model(source, include).model
         path = path or Path(f"{source.stem}.svg")
         require_apart({"-o": path}, {"source": source})
-        if wish.kind in (None, "runs") and (asked := _asked_of_runs(model, wish)) is not None:
-            say_idle(OF_ZONES, "without --as zones")
-            say_idle(OF_GRAPHS, "without --as states or discrete")
+        kind = wish.kind or _kind(model, wish)
+        wish = replace(wish, kind=kind)
+        _say_idle(kind)
+        if kind == "runs":
+            asked = _asked_of_runs(model, wish)
             return path, _plot_runs(model, asked, path, wish.settings, wish.limits())
-        say_idle(OF_RUNS, "here: no random runs are drawn")
-        _plot_exactly(model, path, replace(wish, kind=wish.kind or "gantt"))
+        if kind in plot_learned.KINDS:
+            kind_of(path)
+            drawn = model, _query(model, wish), path, kind, wish.at
+            return path, plot_learned.plot_learned(*drawn, wish.settings, wish.limits())
+        _plot_exactly(model, path, wish)
         return path, 0
 
 
-def _asked_of_runs(model: Model, wish: Wish) -> Asked | None:
-    """The query that is answered by random runs, if it is one.
-
-    Raises:
-        InputError: Random runs are wanted, and the query has none.
-    """
-    if wish.kind is None and wish.asked is None and len(model.queries) != 1:
-        return None
+def _kind(model: Model, wish: Wish) -> str:
+    """The picture that shows most of what the query asks for."""
+    if wish.asked is None and len(model.queries) != 1:
+        return "gantt"
     query = _query(model, wish)
     if query.form is not None and query.form.is_statistical:
-        return query
-    if wish.kind == "runs":
+        return "runs"
+    return "decisions" if plot_learned.has_learned(query) else "gantt"
+
+
+def _say_idle(kind: str) -> None:
+    """Says which options have no effect on a picture."""
+    for name, option in OF_SOME.items():
+        *others, last = kinds = _FOR[name]
+        if kind not in kinds:
+            either = f"{', '.join(others)} or {last}" if others else last
+            say_idle({name: option}, f"without --as {either}")
+    if kind != "runs":
+        used = {one.field for one in RUNS} if kind in plot_learned.KINDS else set()
+        idle = {name: option for name, option in OF_RUNS.items() if name not in used}
+        say_idle(idle, "here: no random runs are drawn")
+    if kind not in plot_learned.KINDS:
+        say_idle(plot_learned.OF_LEARNING, "here: no learned strategy is drawn")
+
+
+def _asked_of_runs(model: Model, wish: Wish) -> Asked:
+    """The query, which is to be answered by random runs.
+
+    Raises:
+        InputError: Random runs do not answer it.
+    """
+    query = _query(model, wish)
+    if query.form is None or not query.form.is_statistical:
         raise InputError(
             f"{query.text} is not answered by random runs\n"
             "hint: ask for Pr[…](…), E[…](…) or simulate[…]{…}"
         )
-    return None
+    return query
 
 
 def _plot_exactly(model: Model, path: Path, wish: Wish) -> None:
     """Writes a picture of a model that does not show random runs."""
     is_graph = wish.kind in GRAPHS
     kind_of(path, ("dot",) if is_graph else ())
-    if not is_graph:
-        say_idle(OF_GRAPHS, "without --as states or discrete")
-    if wish.kind != "zones":
-        say_idle(OF_ZONES, "without --as zones")
     if is_graph or wish.kind == "templates":
         drawn = "templates" if wish.kind == "templates" else "states"
         say_idle({"asked": "--query"}, f"with --as {wish.kind}: all {drawn} are drawn")
@@ -206,6 +240,13 @@ def _query(model: Model, wish: Wish) -> Asked:
             raise InputError(
                 "no query of the model is a game, so there is no strategy to draw\n"
                 "hint: give one with --query: control: A<> p, control: A[] p, …"
+            )
+    if wish.kind in plot_learned.KINDS and wish.asked is None:
+        queries = [query for query in queries if plot_learned.has_learned(query)]
+        if not queries:
+            raise InputError(
+                "no query of the model asks for the best strategy, so there is none to draw\n"
+                "hint: give one with --query: strategy S = minE(cost)[<=9]: <> p, …"
             )
     if len(queries) > 1:
         names = "\n".join(f"  {query.name or query.text}" for query in queries[:10])
@@ -318,7 +359,7 @@ def _plot_runs(
         if answer.estimate is None and not answer.trajectories:
             raise LimitError(f"{query.text} was {said} before there was anything to draw")
         echo(f"note: {said}: the picture shows the runs until then", err=True)
-        current().allow(_DRAWING_S, _DRAWING_BYTES)
+        current().allow(plot_learned.DRAWING_S, plot_learned.DRAWING_BYTES)
     _chart_of(answer, settings).save(path)
     return code
 

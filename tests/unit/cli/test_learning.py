@@ -48,6 +48,7 @@ def test_json_has_what_learning_took(capsys: pytest.CaptureFixture[str]) -> None
     assert (record["runs"], record["confidence"]) == (1000, 0.95)
     assert record["lower"] < record["value"] < record["upper"]
     assert (record["iterations"], record["resets"], record["learning_runs"]) == (2, 0, 800)
+    assert [one["runs"] for one in record["history"]] == [400, 800]
     assert record["better"] is True
     assert record["uniform"]["lower"] < record["uniform"]["value"] < record["uniform"]["upper"]
     assert '"better"' not in check(capsys, "--json", query="E<> Shop.Done")

@@ -168,6 +168,9 @@ pub fn estimate(estimate: &Estimate) -> Json {
 
 /// How the best strategy was found. `judged` is its value by the runs that chose it, `uniform` what
 /// runs are worth in which all is chosen uniformly, and `comparison` says whether it is better.
+///
+/// Each iteration of `history` has the `value` of its strategy with its standard `error`, by
+/// `judging_runs`. Until its end `runs` were made, and all was forgotten `resets` times before.
 pub fn optimised(optimised: &Optimised) -> Json {
     let uniform = optimised.uniform.as_ref().map(|uniform| {
         let mut object = estimate(uniform);
@@ -179,6 +182,15 @@ pub fn optimised(optimised: &Optimised) -> Json {
         Comparison::Worse => "worse",
         Comparison::Alike => "alike",
     });
+    let history = optimised.history.iter().map(|iteration| {
+        json!({
+            "runs": iteration.runs,
+            "resets": iteration.resets,
+            "value": real(iteration.value.value),
+            "error": real(iteration.value.error),
+            "judging_runs": iteration.value.runs,
+        })
+    });
     json!({
         "runs": optimised.runs,
         "iterations": optimised.iterations,
@@ -187,6 +199,7 @@ pub fn optimised(optimised: &Optimised) -> Json {
         "judged": real(optimised.judged.value),
         "uniform": uniform,
         "comparison": comparison,
+        "history": history.collect::<Json>(),
         "is_complete": optimised.is_complete,
         "leaves": optimised.leaves,
     })

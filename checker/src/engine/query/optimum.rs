@@ -172,6 +172,7 @@ fn learned(
         judged,
         comparison,
         uniform,
+        history: learned.history,
         is_complete: learned.is_complete,
         leaves: strategy.leaves() as u64,
         observation,
@@ -206,6 +207,7 @@ fn exact(best: Exact) -> (Answer, Arc<LearnedStrategy>) {
         compared: None,
         is_complete: true,
     });
+    answer.evidence.learned = Some(Arc::clone(&strategy));
     let states = counters.stored;
     answer.remark(format!("exact: value iteration over {states} states"));
     (answer, strategy)
