@@ -443,6 +443,12 @@ impl<'a> Program<'a> {
         })
     }
 
+    /// Whether both sides have outputs in a location.
+    pub(super) fn is_mixed(&self, spot: &Spot) -> bool {
+        let outputs = self.range(spot.outputs).iter();
+        spot.is_controllable && outputs.into_iter().any(|one| !one.edge.controllable)
+    }
+
     /// The parts of a condition.
     pub(super) fn comparisons(&self, place: u32) -> &Comparisons {
         &self.comparisons[place as usize]

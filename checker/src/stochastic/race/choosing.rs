@@ -76,6 +76,24 @@ impl Race<'_> {
         Ok(demanded.min(asked))
     }
 
+    /// Leaves of the outputs that are enabled those about which the controller is asked now, if the
+    /// process has come to move for that, and else the others, if no delay is drawn for the
+    /// former: each has a moment of its own.
+    pub(super) fn keep_outputs_of_winner(&mut self, program: &Program<'_>, process: usize) {
+        let Some(control) = &self.control else {
+            return;
+        };
+        let is_normal = self.urgency(process) == Urgency::Normal && self.committed == 0;
+        let is_question = self.is_question[process];
+        if !is_normal || control.is_drawing() && !is_question {
+            return;
+        }
+        let is_kept = |&one: &u32| program.instance(one).edge.controllable == is_question;
+        if self.choices.iter().any(is_kept) {
+            self.choices.retain(is_kept);
+        }
+    }
+
     /// Lets the controller decide, now that the delay of a process with a move of it is over: the
     /// move that it makes, or none if it waits.
     pub(super) fn decide(

@@ -117,6 +117,11 @@ pub(in crate::stochastic) struct Race<'a> {
     advice: Option<Advice<'a>>,
     /// Who decides for the controller, if somebody does.
     pub(in crate::stochastic) control: Option<Control>,
+    /// By process: whether its attempt is the moment at which the controller is asked about its
+    /// outputs, and not the end of a delay that was drawn.
+    is_question: Vec<bool>,
+    /// When the controller is asked about the process that plans.
+    question: f64,
     /// What keeps the controller from some of its moves.
     fence: Option<&'a dyn Fence>,
     /// The first time at which an urgent channel stops time for a move that the strategy forbids,
@@ -166,6 +171,8 @@ impl<'a> Race<'a> {
             has_moved: false,
             advice: restriction.map(Advice::new),
             control: guidance.map(Control::new),
+            is_question: vec![false; processes],
+            question: f64::INFINITY,
             fence,
             standstill: None,
             longest_stay: f64::INFINITY,
@@ -425,6 +432,7 @@ impl<'a> Race<'a> {
             self.make_stale(process as u32);
             return self.count_move(process, false);
         }
+        self.keep_outputs_of_winner(program, process);
         let choices = std::mem::take(&mut self.choices);
         let chosen = self.one_of(program, &choices);
         self.choices = choices;

@@ -26,7 +26,9 @@ impl Race<'_> {
         let view = View::Drawn(self.longest_stay);
         for instance in program.range(spot.outputs) {
             if self.is_decided(instance) {
-                urgent = urgent.min(self.decided_windows(program, instance, bound)?);
+                let question = self.decided_windows(program, instance, bound)?;
+                self.question = self.question.min(question);
+                urgent = urgent.min(question);
             } else if self.is_advised(instance) {
                 urgent = urgent.min(self.advised_windows(program, instance, bound)?);
             } else if instance.may_be_urgent && self.is_urgent(instance)? {

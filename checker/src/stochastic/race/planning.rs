@@ -206,6 +206,7 @@ impl Race<'_> {
         bound: f64,
     ) -> Result<f64, Failure> {
         self.windows.clear();
+        self.question = f64::INFINITY;
         if bound.is_finite() {
             // A uniform delay is drawn from all of its windows.
             self.until = bound;
@@ -227,6 +228,8 @@ impl Race<'_> {
             drawn.set(race.delay_in_windows(rate)?);
             Ok(())
         })?;
-        Ok(drawn.get().min(urgent))
+        let attempt = drawn.get().min(urgent);
+        self.is_question[process] = self.question <= attempt;
+        Ok(attempt)
     }
 }

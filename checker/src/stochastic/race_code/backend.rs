@@ -303,6 +303,13 @@ impl Backend for Writer<'_> {
         }
     }
 
+    fn set_question(&mut self, process: usize, is_question: Register) {
+        let decisions = self.layout.decisions.as_ref().expect("somebody decides");
+        if let Some(word) = decisions.questions[process] {
+            self.store(word, is_question);
+        }
+    }
+
     fn holds(&mut self, _: Condition, _: &[i32]) -> Flow<Self, Register> {
         unreachable!("networks with such conditions are not written as code")
     }

@@ -6,6 +6,7 @@
 //! place of its move among all of them.
 
 use std::cell::Cell;
+use std::slice;
 
 use super::layout::Decisions;
 use super::moves::Ways;
@@ -19,7 +20,7 @@ use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::TOLERANCE;
 use crate::stochastic::program::{Channel, Instance, Program};
 use crate::stochastic::readers::Reader;
-use crate::stochastic::rules::{self, Backend};
+use crate::stochastic::rules::{self, Backend, Candidate};
 
 /// How the code goes on: as at the begin of a run, or of so many moves;
 pub(super) const AS_AT_BEGIN: i32 = 0;
@@ -156,6 +157,51 @@ impl<'a> RaceWriter<'_, 'a> {
         let may = w.call_for(possible_moves, Vec::new());
         let asks = w.plus(may, ASKS);
         w.return_value(Some(asks));
+    }
+
+    /// Chooses one of the outputs of a process that are enabled: of those about which the
+    /// controller is asked now, if the process has come to move for that, and else of the others,
+    /// if no delay is drawn for the former.
+    pub(super) fn choose_asked(
+        &self,
+        w: &mut Writer<'_>,
+        decisions: &Decisions,
+        outputs: &[Instance<'a>],
+        otherwise: BlockId,
+    ) -> Register {
+        let process = outputs[0].process as usize;
+        let question = decisions.questions[process].expect("it has outputs of both sides");
+        let is_question = w.load(question);
+        let is_drawn = if decisions.sees_time {
+            w.load(decisions.draws)
+        } else {
+            w.integer(1)
+        };
+        let own = w.arithmetic(IntegerOperator::Or, is_question, is_drawn);
+        let others = w.compare_to(is_question, Relation::Equal, 0);
+        let any = w.variable(0);
+        let mut flags = Vec::new();
+        for output in outputs {
+            let Ok(enabled) = rules::is_any_enabled(w, self.program, slice::from_ref(output));
+            let side = if output.edge.controllable {
+                own
+            } else {
+                others
+            };
+            let kept = w.arithmetic(IntegerOperator::And, enabled, side);
+            let some = w.arithmetic(IntegerOperator::Or, any.get(), kept);
+            w.set(&any, some);
+            flags.push((enabled, kept));
+        }
+        let candidates = (0..).zip(outputs).zip(flags);
+        let candidates = candidates.map(|((number, instance), (enabled, kept))| Candidate {
+            instance,
+            number: w.integer(number),
+            flag: Some(w.either(any.get(), kept, enabled)),
+        });
+        let candidates: Vec<_> = candidates.collect();
+        let Ok(chosen) = rules::one_of(w, self.program, candidates.iter().copied(), otherwise);
+        chosen
     }
 
     /// The function that carries out a move of the controller.

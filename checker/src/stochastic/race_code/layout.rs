@@ -65,6 +65,9 @@ pub(super) struct Decisions {
     pub(super) draws: u32,
     /// How the code goes on when it is called again: see [`super::decisions`].
     pub(super) resume: u32,
+    /// By process, if it has outputs of both sides in one location: whether its attempt is the
+    /// moment at which the controller is asked.
+    pub(super) questions: Vec<Option<u32>>,
     /// The process whose delay is over.
     pub(super) winner: u32,
     /// The moves that are possible: their number, and their places among `entries`.
@@ -143,6 +146,13 @@ impl Layout {
                     hold: take(2),
                     draws: take(1),
                     resume: take(1),
+                    questions: (0..processes)
+                        .map(|process| {
+                            let mut spots = program.spots_of(process).iter();
+                            let is_mixed = spots.any(|spot| program.is_mixed(spot));
+                            is_mixed.then(|| take(1))
+                        })
+                        .collect(),
                     winner: take(1),
                     move_count: take(1),
                     moves: take(entries.len() as u32),

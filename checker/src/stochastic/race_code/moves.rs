@@ -90,7 +90,14 @@ impl<'a> RaceWriter<'_, 'a> {
             }
             self.let_take(w, only, ids);
         } else {
-            let chosen = self.choose(w, outputs.iter(), missed);
+            let chosen = match &self.layout.decisions {
+                Some(decisions)
+                    if spot.urgency == Urgency::Normal && self.program.is_mixed(spot) =>
+                {
+                    self.choose_asked(w, decisions, outputs, missed)
+                }
+                _ => self.choose(w, outputs.iter(), missed),
+            };
             let Ok(()) = w.cases(chosen, outputs.len(), |w, number| {
                 self.let_take(w, &outputs[number], ids);
                 Ok(())

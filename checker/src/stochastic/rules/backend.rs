@@ -260,6 +260,11 @@ pub(in crate::stochastic) trait Backend: Sized {
         unreachable!("the rules do not know when anybody decides")
     }
 
+    /// Notes whether a process tries to move when the controller is asked.
+    fn set_question(&mut self, _: usize, _: Self::Integer) {
+        unreachable!("the rules do not know when anybody decides")
+    }
+
     /// Whether one is enabled now that they do not know.
     fn other_ability(&mut self, program: &Program<'_>, spot: &Spot) -> Flow<Self, Self::Integer>;
 

@@ -348,12 +348,13 @@ impl<R: Copy> Planning<'_, '_, R> {
     /// drawn for outputs about which nobody decides.
     fn for_decisions<B: Backend<Real = R>>(&self, b: &mut B) -> Flow<B> {
         let moment = b.real_variable(f64::INFINITY);
+        let question = b.real_variable(f64::INFINITY);
         let none = b.integer(0);
         b.set_window_count(none);
         for output in self.program.range(self.spot.outputs) {
             b.attempt(|b, next| {
                 if output.edge.controllable {
-                    self.ask_in_window(b, output, &moment, next)
+                    self.ask_in_window(b, output, &question, next)
                 } else {
                     self.add_window(b, output, &moment, next)
                 }
@@ -362,7 +363,10 @@ impl<R: Copy> Planning<'_, '_, R> {
         let windows = b.window_count();
         b.when(windows, |b| self.draw_in_windows(b, &moment))?;
         let stay = self.bound.map(|bound| bound.end);
-        b.set_plan(self.process, Some(moment.get()), stay, true);
+        let attempt = b.least(moment.get(), question.get());
+        let is_question = b.compare_reals(question.get(), Relation::LessEqual, attempt);
+        b.set_question(self.process, is_question);
+        b.set_plan(self.process, Some(attempt), stay, true);
         Ok(())
     }
 
