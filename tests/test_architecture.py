@@ -74,9 +74,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
+    "checker.policy": {"errors"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.constants"}
+    | {"checker.constants", "checker.policy"}
     | {"checker.options", "checker.queries", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
@@ -86,6 +87,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
+    "gymnasium": {"errors", "loading", "checker", "checker.errors", "checker.policy", "_checker"},
     "serve": {"errors"},
     "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
@@ -181,6 +183,7 @@ ONLY_IN: dict[str, set[str]] = {
     "matplotlib": {"checker.picture", "experiment", "plot"},
     "scipy": {"experiment", "imaging", "needle", "plan", "traces"},
     "nibabel": {"imaging"},
+    "gymnasium": {"gymnasium"},
     "dask": {"cluster"},
     "distributed": {"cluster"},
     "mcap": {"drive"},

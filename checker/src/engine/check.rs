@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
 use super::limits::LimitWatch;
-use super::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
+use super::loaded_model::{Decider, LoadedModel, NamedStrategy, PreparedQuery};
 use super::options::Options;
 use super::query_form::unnamed;
 use super::rejection::Rejection;
@@ -14,14 +14,16 @@ use crate::diagnostics::Span;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
 use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
-use crate::learning::LearnedStrategy;
 use crate::network::Failure;
 use crate::semantics::Reading;
 use crate::syntax::ast::QueryText;
 
-/// The strategy that the controller stays within, and the learned one that it follows; or the
-/// answer if a limit came before they were known.
-type FollowedStrategies = Result<(Option<Arc<Under>>, Option<Arc<LearnedStrategy>>), Box<Answer>>;
+/// The strategy that the controller stays within, and who decides; or the answer if a limit came
+/// before they were known.
+type FollowedStrategies = Result<(Option<Arc<Under>>, Option<Decider>), Box<Answer>>;
+
+/// A query whose code is ready, with its warnings; or the answer if a limit came before.
+type Ready = Result<(PreparedQuery, Vec<String>), Box<Answer>>;
 
 impl LoadedModel {
     /// Answers a query.
@@ -47,6 +49,18 @@ impl LoadedModel {
     }
 
     fn check_once(&mut self, span: Span, options: &Options) -> Result<Answer, Rejection> {
+        let (prepared, warnings) = match self.make_ready(span, options)? {
+            Ok(ready) => ready,
+            Err(answer) => return Ok(*answer),
+        };
+        let mut answer = self.answer(&prepared)?;
+        answer.warnings = warnings;
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    /// Compiles a query, and makes its code ready.
+    pub(super) fn make_ready(&mut self, span: Span, options: &Options) -> Result<Ready, Rejection> {
         let start = Instant::now();
         let (reading, names) = (self.reading_of(span), self.strategy_names());
         let (query, warnings) = self.compile_in(reading, span, &names)?;
@@ -57,32 +71,34 @@ impl LoadedModel {
         let level = self.level(&query, options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (under, learned) = match self.followed(&query, options)? {
+        let (under, decider) = match self.followed(&query, options)? {
             Ok(followed) => followed,
             Err(answer) => {
-                return Ok(Answer {
+                return Ok(Err(Box::new(Answer {
                     warnings,
                     load_seconds: self.load_seconds,
                     ..*answer
-                });
+                })));
             }
         };
+        let mut options = options.left_since(start);
+        if matches!(decider, Some(Decider::Policy(_))) {
+            // It may remember what it was asked: it is asked in the order of runs.
+            options.threads = 1;
+        }
         let prepared = PreparedQuery {
             query,
-            options: options.left_since(start),
+            options,
             guide,
             level,
             under,
-            learned,
+            decider,
         };
         self.refuse_unsupported(&prepared)?;
-        let mut answer = match self.prepare_in_time(reading, span, &prepared.options)? {
-            Some(cut) => return Ok(cut),
-            None => self.answer(&prepared)?,
-        };
-        answer.warnings = warnings;
-        answer.load_seconds = self.load_seconds;
-        Ok(answer)
+        match self.prepare_in_time(reading, span, &prepared.options)? {
+            Some(cut) => Ok(Err(Box::new(cut))),
+            None => Ok(Ok((prepared, warnings))),
+        }
     }
 
     /// What a query under a strategy follows.
@@ -94,16 +110,19 @@ impl LoadedModel {
         let Some(name) = &query.under else {
             return Ok(Ok((None, None)));
         };
+        let is_symbolic = !matches!(
+            query.kind,
+            QueryKind::Statistical(_) | QueryKind::Optimum(_)
+        );
+        if let Some(policy) = self.policy(name, query, is_symbolic)? {
+            return Ok(Ok((None, Some(Decider::Policy(policy)))));
+        }
         if let Some(named) = self.strategy(name)
             && let Some(learned) = &named.learned
         {
             let (within, learned) = (named.within.clone(), Arc::clone(learned));
-            let is_symbolic = !matches!(
-                query.kind,
-                QueryKind::Statistical(_) | QueryKind::Optimum(_)
-            );
             if !is_symbolic {
-                return Ok(Ok((within, Some(learned))));
+                return Ok(Ok((within, Some(Decider::Learned(learned)))));
             }
             let in_zones = self.learned_in_zones(name, &learned, query, options)?;
             return Ok(in_zones.map(|under| (Some(under), None)));
