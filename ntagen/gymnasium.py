@@ -13,16 +13,15 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-import ntagen._checker as _checker
 from ntagen.checker import Model
-from ntagen.checker.errors import RejectedError, rejecting
-from ntagen.checker.policy import action_number, checked_wait
+from ntagen.checker.policy import action_number
+from ntagen.checker.stepwise import Moment
 from ntagen.errors import InputError
 from ntagen.loading import load
 
@@ -100,19 +99,15 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
             RejectedError: The model or a query is wrong, or nothing is there to be decided.
             InputError: The file cannot be read, or `wait` is no positive number.
         """
-        checked_wait(wait)
         loaded = model if isinstance(model, Model) else load(os.fspath(model))
-        with rejecting():
-            raw = _checker.Environment(loaded._raw, query, list(strategies), wait)  # noqa: SLF001
-        self._raw: _checker.Environment | None = raw
-        self._sign = 1.0 if raw.is_greatest else -1.0
-        self.actions = tuple(raw.actions())
-        discrete, continuous = raw.features()
-        self.discrete, self.continuous = tuple(discrete), tuple(continuous)
+        self._runs = loaded.stepwise(query, strategies=strategies, wait=wait)
+        self._sign = 1.0 if self._runs.maximises else -1.0
+        self.actions = self._runs.actions
+        self.discrete, self.continuous = self._runs.discrete, self._runs.continuous
         self.action_space = gymnasium.spaces.Discrete(len(self.actions))
         count = len(self.discrete) + len(self.continuous)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (count,), np.float64)
-        self._moment: _checker.Moment | None = None
+        self._moment: Moment | None = None
         self._worth = 0.0
         self._seed: int | None = None
         self._run = 0
@@ -138,7 +133,7 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
             self._run += 1
         self._worth = 0.0
         self._moment = None
-        self._moment = self._report(self._open().begin, self._seed, self._run)
+        self._moment = self._runs.begin(self._seed, self._run)
         return self._seen(self._moment, is_replaced=False)
 
     def step(
@@ -152,14 +147,13 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
             RejectedError: The run fails.
         """
         before = self._moment
-        raw = self._open()
         if before is None:
             raise InputError(_NO_RUN)
         number = action_number(action, len(self.actions))
         self._moment = None
         moment = before
         if before.end is None:
-            moment = self._report(raw.act, number)
+            moment = self._runs.act(number)
         reward = self._sign * (moment.worth - self._worth) + 0.0  # no zero has a sign
         self._worth = moment.worth
         self._moment = moment if moment.end is None else None
@@ -178,27 +172,11 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
     def close(self) -> None:
         """Gives back what the environment takes; it can make no more runs."""
-        self._raw = None
+        self._runs.close()
         self._moment = None
 
-    def _open(self) -> _checker.Environment:
-        if self._raw is None:
-            raise InputError("the environment is closed\nhint: make another one")
-        return self._raw
-
-    def _report(self, ask: Callable[..., _checker.Moment], *command: int) -> _checker.Moment:
-        """What the engine reports on a command. An interruption closes the environment."""
-        try:
-            with rejecting():
-                return ask(*command)
-        except RejectedError:
-            raise
-        except BaseException:
-            self.close()
-            raise
-
     def _seen(
-        self, moment: _checker.Moment, *, is_replaced: bool
+        self, moment: Moment, *, is_replaced: bool
     ) -> tuple[NDArray[np.float64], dict[str, Any]]:
         possible = moment.possible
         info = {

@@ -75,9 +75,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
     "checker.policy": {"errors"},
+    "checker.stepwise": {"errors", "checker.errors", "_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.constants", "checker.policy"}
+    | {"checker.constants", "checker.policy", "checker.stepwise"}
     | {"checker.options", "checker.queries", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
@@ -87,7 +88,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
-    "gymnasium": {"errors", "loading", "checker", "checker.errors", "checker.policy", "_checker"},
+    "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "serve": {"errors"},
     "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
@@ -368,6 +369,7 @@ def test_the_compiled_engine_has_one_door(module: str) -> None:
         "checker.learned",
         "checker.play",
         "checker.queries",
+        "checker.stepwise",
         "checker.strategy",
     }
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from ntagen.checker.runs import Choose, Run
     from ntagen.checker.state_space import StateSpace
     from ntagen.checker.states import Simulation, SymbolicState
+    from ntagen.checker.stepwise import StepwiseRuns
     from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
 OverflowRule = Literal["wrap", "error"]
@@ -235,6 +236,9 @@ class Model:
 
     def answer(self, query: str, options: Options) -> Answer:
         """Answers a query as `check` does, with all options as one value."""
+        if any(one.is_asked for one in self._followers.values()):
+            # The model answers a query until the policy has decided.
+            raise InputError("a policy must not ask the model that is asked under it")
         try:
             with rejecting():
                 raw = _checker.check(self._raw, query, options)
@@ -252,6 +256,24 @@ class Model:
                 raise raised from None
             raise error from raised
         return Answer(raw, query, self._edges, options)
+
+    def stepwise(
+        self, query: str, *, strategies: Sequence[str] = (), wait: float | None = None
+    ) -> StepwiseRuns:
+        """Random runs in which the caller decides for the controller.
+
+        `ntagen.gymnasium.Environment`, which is made of them, explains the arguments.
+
+        Raises:
+            RejectedError: A query is wrong, or nothing is there to be decided.
+            InputError: `wait` is no positive number.
+        """
+        from ntagen.checker.policy import checked_wait
+        from ntagen.checker.stepwise import StepwiseRuns
+
+        checked_wait(wait)
+        with rejecting():
+            return StepwiseRuns(_checker.Environment(self._raw, query, list(strategies), wait))
 
     def follow(
         self, name: str, policy: Policy, features: str, *, wait: float | None = None

@@ -68,7 +68,11 @@ def checked_wait(wait: float | None) -> None:
 
 
 class Follower:
-    """Asks a policy, in the form in which the engine asks."""
+    """Asks a policy, in the form in which the engine asks.
+
+    Attributes:
+        is_asked: Whether the policy is deciding.
+    """
 
     def __init__(self, policy: Policy) -> None:
         predict = getattr(policy, "predict", None)
@@ -85,6 +89,7 @@ class Follower:
             "action_masks" in inspect.signature(predict).parameters
         )
         self._raised: BaseException | None = None
+        self.is_asked = False
 
     def taken(self) -> BaseException | None:
         """What the policy raised since this was last asked."""
@@ -93,11 +98,14 @@ class Follower:
 
     def __call__(self, values: Sequence[float], possible: Sequence[bool]) -> int:
         """The number of an action, for what is seen and what is possible."""
+        self.is_asked = True
         try:
             return action_number(self._action(values, possible), len(possible))
         except BaseException as error:
             self._raised = error
             raise
+        finally:
+            self.is_asked = False
 
     def _action(self, values: Sequence[float], possible: Sequence[bool]) -> object:
         observation = np.array(values, dtype=np.float64)

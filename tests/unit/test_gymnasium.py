@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import _thread
 import importlib
 import math
+import re
 import sys
+import threading
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,6 +31,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs gymnasium, whose inte
 if TYPE_CHECKING:
     from ntagen.gymnasium import Environment
 
+ROOT = Path(__file__).parents[2]
 PARTS = "minE(cost)[<=1] {parts, left} -> {}: <> Shop.Done"
 LEAVE = "minE(cost)[<=6] {} -> {x}: <> Guest.Done"
 BUS = "minE(time)[<=100] {P.location} -> {}: <> P.Done"
@@ -170,7 +174,9 @@ def test_random_actions_have_the_mean_of_the_uniform_choice() -> None:
 
 @pytest.mark.slow
 def test_a_learned_strategy_has_its_value() -> None:
-    answer = ntagen.load(HERE / "leave.xta").check(f"strategy Best = {LEAVE}", seed=1)
+    answer = ntagen.load(HERE / "leave.xta").check(
+        f"strategy Best = {LEAVE}", seed=1, good_runs=500, max_iterations=6, runs=1000
+    )
     strategy = answer.strategy
     assert isinstance(strategy, LearnedStrategy)
     assert answer.estimate is not None
@@ -492,6 +498,36 @@ def test_an_interruption_in_a_policy_goes_on() -> None:
         model.check("E[<=1; 100](max: cost) under Agent")
 
 
+def test_a_policy_must_not_ask_its_model() -> None:
+    model = ntagen.load(HERE / "parts.xta")
+
+    def curious(_seen: object, _mask: object) -> int:
+        return int(model.check("E<> Shop.Done").verdict == "satisfied")
+
+    model.follow("Agent", curious, "{parts, left} -> {}")
+    with pytest.raises(ntagen.RejectedError, match="must not ask the model"):
+        model.check("E[<=1; 100](max: cost) under Agent")
+
+
+def test_an_interruption_closes_the_environment() -> None:
+    """No decision comes before the bound, which is far away."""
+    text = """
+        int cost;
+        process Clock() { clock x; state Tick { x <= 1 }; init Tick;
+          trans Tick -u-> Tick { guard x >= 1; assign x = 0; }; }
+        process Never() { state Stay; init Stay; trans Stay -> Stay { guard cost > 0; }; }
+        system Clock, Never;
+    """
+    env = ntagen.gymnasium.Environment(text, "minE(cost)[<=1e12] {cost} -> {}: <> cost > 0")
+    timer = threading.Timer(0.2, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        env.reset(seed=1)
+    timer.join()
+    with pytest.raises(InputError, match="closed"):
+        env.reset(seed=1)
+
+
 def test_a_wrong_policy_is_refused() -> None:
     model = ntagen.load(HERE / "parts.xta")
     with pytest.raises(InputError, match="no policy"):
@@ -503,6 +539,15 @@ def test_a_wrong_policy_is_refused() -> None:
             model.follow("Agent", Predictor(), features)
     with pytest.raises(ntagen.RejectedError, match="how long to wait is"):
         ntagen.load(HERE / "leave.xta").follow("Agent", Predictor(), "{} -> {x}")
+
+
+def test_the_page_shows_what_happens(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (ROOT / "docs" / "environments.md").read_text(encoding="utf-8")
+    program = "".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL))
+    exec(compile(program, "environments.md", "exec"), {})
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == "2.386 True"
+    assert "value=2.386" in second
 
 
 # The same cases, made by others: uppaal-gym has environments of its own for them.

@@ -140,7 +140,8 @@ impl Policy for PythonPolicy {
             let asked = (situation.values.to_vec(), situation.possible.to_vec());
             let decided = self.decide.call1(py, asked);
             let decided = decided.and_then(|action| action.extract::<usize>(py));
-            decided.map_err(|error| error.to_string())
+            // What is wrong, and what to do, may be several lines.
+            decided.map_err(|error| error.to_string().replace('\n', "; "))
         });
         decided.map_err(|why| {
             *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = why;

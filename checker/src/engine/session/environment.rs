@@ -18,11 +18,11 @@ use std::time::Duration;
 use crate::cancellation;
 use crate::engine::codes;
 use crate::engine::format::learned_json;
-use crate::engine::loaded_model::{LoadedModel, PreparedQuery};
+use crate::engine::loaded_model::{ANALYSED, LoadedModel, PreparedQuery};
 use crate::engine::options::Options;
 use crate::engine::query::libraries::Hooks;
 use crate::engine::rejection::Rejection;
-use crate::ir::{Aim, FeatureTexts, Optimum, QueryKind, RunLimit};
+use crate::ir::{Aim, FeatureTexts, Observation, Optimum, QueryKind, RunLimit};
 use crate::learning::{Policy, SeeingPolicy, Situation, seen_values, whole_state};
 use crate::stochastic::{Behaviour, Ended, Failure, RunId, Runner, StateView};
 use crate::syntax;
@@ -114,7 +114,7 @@ impl Environment {
         let is_over = Arc::new(AtomicBool::new(false));
         let environment = Environment {
             actions: model.all_actions(),
-            features: learned_json::texts(&asked.policy.observation),
+            features: learned_json::texts(&asked.observation),
             is_greatest: asked.optimum.is_greatest,
             commands,
             reports,
@@ -163,8 +163,8 @@ impl Environment {
 struct Asked {
     prepared: PreparedQuery,
     optimum: Optimum,
-    /// What is seen, and how long to wait is; who decides is not known yet.
-    policy: SeeingPolicy,
+    observation: Arc<Observation>,
+    wait: f64,
 }
 
 impl LoadedModel {
@@ -191,58 +191,37 @@ impl LoadedModel {
                 );
             }
         }
-        let (prepared, _) = match self.make_ready(span, options)? {
-            Ok(ready) => ready,
-            Err(_) => return refused(self, "the query cannot be compiled", "ask it by itself"),
+        let Ok((prepared, _)) = self.make_ready(span, options)? else {
+            return refused(self, "the query cannot be compiled", "ask it by itself");
         };
         let QueryKind::Optimum(optimum) = &prepared.query.kind else {
             unreachable!("it is a query for the best strategy");
         };
         self.expect_moves(span)?;
         let optimum = Optimum::clone(optimum);
-        let network = self.stochastic.as_ref().map(|one| one.network());
-        let observation = match (&optimum.features, network) {
-            (Some(features), _) => features.clone(),
-            (None, Some(network)) => whole_state(network, &optimum),
-            (None, None) => unreachable!("the query was compiled in the stochastic reading"),
-        };
-        let of_bound = match optimum.bound.limit {
-            RunLimit::Time | RunLimit::Clock(_) => Some(optimum.bound.value / WAITS),
-            RunLimit::Moves => None,
-        };
-        let fitting = if observation.has_clocks() {
-            of_bound.filter(|&wait| wait > 0.0)
-        } else {
-            Some(f64::INFINITY)
-        };
+        let network = self.stochastic.as_ref().expect(ANALYSED).network();
+        let features = optimum.features.clone();
+        let observation = features.unwrap_or_else(|| whole_state(network, &optimum));
         let wait = question
             .wait
-            .or(fitting)
-            .ok_or_else(|| self.no_wait(span))?;
-        let policy = SeeingPolicy {
-            observation: Arc::new(observation),
-            wait,
-            policy: Arc::new(Nobody),
-        };
+            .or_else(|| fitting_wait(&optimum, &observation));
         Ok(Asked {
             prepared,
             optimum,
-            policy,
+            observation: Arc::new(observation),
+            wait: wait.ok_or_else(|| self.no_wait(span))?,
         })
     }
 }
 
-/// Stands for who decides until it is known.
-struct Nobody;
-
-impl Policy for Nobody {
-    fn decide(&self, _: &mut StateView<'_>, _: Situation<'_>) -> Result<usize, Failure> {
-        Err(Failure::NoDecision)
-    }
-
-    fn failure(&self) -> String {
-        String::new()
-    }
+/// For how long the controller waits if nobody says it; none if that cannot be told.
+fn fitting_wait(optimum: &Optimum, observation: &Observation) -> Option<f64> {
+    let wait = match optimum.bound.limit {
+        _ if !observation.has_clocks() => f64::INFINITY,
+        RunLimit::Time | RunLimit::Clock(_) => optimum.bound.value / WAITS,
+        RunLimit::Moves => return None,
+    };
+    (wait > 0.0).then_some(wait)
 }
 
 /// Who decides outside: as the thread that makes runs sees it.
@@ -319,7 +298,8 @@ fn serve(model: &LoadedModel, asked: Asked, outside: &Arc<Outside>) {
     let Asked {
         prepared,
         optimum,
-        policy,
+        observation,
+        wait,
     } = asked;
     let restriction = match model.restriction(&prepared) {
         Ok(restriction) => restriction,
@@ -329,8 +309,9 @@ fn serve(model: &LoadedModel, asked: Asked, outside: &Arc<Outside>) {
         }
     };
     let policy = Arc::new(SeeingPolicy {
+        observation: Arc::clone(&observation),
+        wait,
         policy: Arc::clone(outside) as Arc<dyn Policy>,
-        ..policy
     });
     let moves = model.moves_of_controller();
     let guidance = policy.followed(&moves);
@@ -342,7 +323,7 @@ fn serve(model: &LoadedModel, asked: Asked, outside: &Arc<Outside>) {
     let mut runner = Runner::of(behaviour);
     let mut next = None;
     while let Some(id) = mem::take(&mut next).or_else(|| outside.next_run()) {
-        let see = |state: &mut StateView<'_>| seen_values(&policy.observation, state);
+        let see = |state: &mut StateView<'_>| seen_values(&observation, state);
         let reported = match runner.to_end(id, &optimum, see).and_then(|end| {
             finite(end.value)?;
             Ok(end)
