@@ -93,7 +93,8 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
                 ``under S``, only what S allows is possible.
             wait: After how many units of time the agent is asked again at the latest, if a clock
                 is among the features: else a hundredth of the bound.
-            strategies: The queries that define S, such as ``strategy S = control: A[] p``.
+            strategies: The queries that define S, such as ``strategy S = control: A[] p``, or a
+                shield: ``strategy S = acontrol: A[] p { x[0,9]:9 }``.
 
         Raises:
             RejectedError: The model or a query is wrong, or nothing is there to be decided.

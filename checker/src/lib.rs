@@ -30,6 +30,8 @@ pub mod stochastic;
 
 pub mod learning;
 
+pub mod shield;
+
 pub mod verify;
 
 pub mod engine;

@@ -18,6 +18,7 @@ from ntagen.checker.answer import (
     Interrupted,
     Optimised,
     Place,
+    Shielded,
     Value,
     Verdict,
 )
@@ -87,6 +88,7 @@ __all__ = [
     "RejectedError",
     "RunProgress",
     "SearchOrder",
+    "Shielded",
     "Simulation",
     "StrategyWanted",
     "SymbolicState",

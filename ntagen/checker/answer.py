@@ -100,6 +100,36 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
+class Shielded:
+    """What is known of a shield.
+
+    Attributes:
+        cells: How many cells its grid has.
+        safe_cells: How many of them are safe.
+        choice_cells: In how many cells some sample has a choice.
+        unseen_pairs: How many pairs of a cell and a move no sample has shown; cells count whose
+            samples have what must be kept.
+        stuck_runs: How many runs were stuck where time cannot pass; they count as unsafe.
+        moves: How many moves the controller has.
+        trial: How likely it is that a fresh run under the shield, of 100 choices, breaks what must
+            be kept; ``None`` without a shield, or if a limit came before.
+    """
+
+    cells: int
+    safe_cells: int
+    choice_cells: int
+    unseen_pairs: int
+    stuck_runs: int
+    moves: int
+    trial: Estimate | None
+
+    @property
+    def safe_share(self) -> float:
+        """The share of cells that are safe."""
+        return self.safe_cells / self.cells
+
+
+@dataclass(frozen=True, slots=True)
 class Optimised:
     """How the best strategy was found.
 
@@ -469,6 +499,16 @@ class Answer:
         return Optimised(**given | {"uniform": uniform})
 
     @property
+    def shielded(self) -> Shielded | None:
+        """What is known of the shield; ``None`` for other queries than ``acontrol``."""
+        text = self._raw.shielded_json()
+        if text is None:
+            return None
+        given = json.loads(text)
+        trial = given["trial"] and Estimate.from_object(given["trial"])
+        return Shielded(**given | {"trial": trial})
+
+    @property
     def machine(self) -> Machine | None:
         """The controller's strategy in a game with observations.
 
@@ -476,11 +516,13 @@ class Answer:
         """
         from ntagen.checker.machine import Machine
 
+        if self._raw.is_shield or self.strategy is not None:
+            return None
         text = self.strategy_json()
-        return None if text is None or self.strategy is not None else Machine.from_json(text)
+        return None if text is None else Machine.from_json(text)
 
     def strategy_json(self) -> str | None:
-        """The strategy, or the machine of a game with observations, as JSON text.
+        """The strategy, the shield, or the machine of a game with observations, as JSON text.
 
         A learned strategy has UPPAAL's form.
 
@@ -488,6 +530,26 @@ class Answer:
         """
         text = self._raw.strategy_json()
         return None if text is None else str(text)
+
+    @property
+    def is_shield(self) -> bool:
+        """Whether there is a shield: one that was made or loaded."""
+        return self._raw.is_shield
+
+    def shield_code(self, language: Literal["c", "python"], name: str = "shield") -> str:
+        """The shield as a function that depends on nothing; the file says how to call it.
+
+        Args:
+            language: The language: C99, or Python.
+            name: What the names in C begin with.
+
+        Raises:
+            ValueError: There is no shield, or this is no name in C.
+        """
+        code = self._raw.shield_code(language, name) if name.isidentifier() else None
+        if code is None or not name.isascii():
+            raise ValueError(f"there is no shield, or {name!r} is no name in C")
+        return code
 
     def decisions_of(
         self, process: str, variables: Sequence[str]

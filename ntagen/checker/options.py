@@ -27,6 +27,7 @@ StrategyWanted = Literal["winner", "controller"]
 TraceWanted = Literal["any", "shortest", "fastest"]
 UnderChoice = Literal["race", "eager", "lazy"]
 LearningMethod = Literal["auto", "q", "m"]
+OutOfBounds = Literal["error", "safe", "unsafe", "sample"]
 MeanInterval = Literal["auto", "student", "bernstein", "dkw"]
 
 Progress = Callable[[int, int, int, int], object]
@@ -42,6 +43,7 @@ MAX_PLANS = 1_000_000
 """The default maximum of plans that are listed."""
 
 MAX_EFFORT = 1_000_000
+MAX_SAMPLES = 1_000
 """The greatest effort of importance splitting: each part may keep a state."""
 
 MAX_REPETITIONS = 1_000_000
@@ -168,6 +170,16 @@ class Options:
 
     qlearning_alpha: float | None = None
     """In Q-learning, the n-th sample counts for 1 / min(`qlearning_alpha`, n + 1)."""
+
+    out_of_bounds: OutOfBounds = "error"
+    """What counts where a run leaves the grid of ``acontrol``: it is an ``error``, all is ``safe``
+    there or ``unsafe``, or a ``sample`` outside decides."""
+
+    shield_samples: int = 3
+    """How many samples of a cell of ``acontrol`` there are along each axis of intervals."""
+
+    shield_repeats: int = 1
+    """How many random runs begin with each move in each sample."""
 
     guide: str | None = None
     """An integer expression: games explore first where its value is least."""
@@ -305,8 +317,11 @@ class Options:
             raise ValueError(f"discretisation is {self.discretisation}, but must be positive")
 
     def _require_learning(self) -> None:
-        """Raises an error if an option of learning has no meaning."""
+        """Raises an error if an option of learning or of shields has no meaning."""
         least = {"good_runs": 1, "eval_runs": 1, "max_iterations": 1, "reset_no_better": 1}
+        for name in ("shield_samples", "shield_repeats"):
+            if not 0 < (number := getattr(self, name)) <= MAX_SAMPLES:
+                raise ValueError(f"{name} is {number}, but must be 1 to {MAX_SAMPLES:,}")
         for name, number in (least | {"max_reset_learning": 0}).items():
             value = getattr(self, name)
             if value is not None and value < number:

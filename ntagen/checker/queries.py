@@ -141,6 +141,11 @@ class QueryForm:
         return self.kind in ("minE", "maxE", "minPr", "maxPr")
 
     @property
+    def is_shield(self) -> bool:
+        """Whether it asks for a shield, which samples show."""
+        return self.kind == "acontrol"
+
+    @property
     def is_game(self) -> bool:
         """Whether it asks who wins a game."""
         return self.kind in _GAMES

@@ -34,6 +34,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from ntagen.drive.advice import Advice
 from ntagen.drive.deviation import DeviationMonitor, DivergenceMonitor, require_explained
 from ntagen.drive.device import Device
 from ntagen.drive.following import Course
@@ -58,6 +59,7 @@ from ntagen.needle.path import Path
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Action, Plan, Push, Roll, Wait
 from ntagen.plan.certify import certify
+from ntagen.plan.policy import Policy
 from ntagen.plan.rank import Candidate, reserve_of
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Pose, Scene
@@ -83,6 +85,7 @@ class Controller:
         agree: Is told each time what the driver wants to do next; raises `KeyboardInterrupt` if
             the operator does not want that.
         course: In a tissue that answers, the strategy that is followed; plans without one.
+        policy: In a tissue with chance, what is asked at each measurement; plans alone without one.
 
     Attributes:
         reason: Why the run ends, as far as it is known.
@@ -99,6 +102,7 @@ class Controller:
         supervisor: Supervisor | None = None,
         agree: Callable[[str], None] = lambda _: None,
         course: Course | None = None,
+        policy: Policy | None = None,
     ) -> None:
         self._settings = settings
         self._journal = journal
@@ -109,6 +113,7 @@ class Controller:
         self._learner = Learner(scene, settings, self._needle, journal)
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
         self._guide = Guide(course, scene, settings, self._needle, journal)
+        self._advice = Advice(policy, scene, self._needle, journal)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
         self._divergence = DivergenceMonitor(settings)
         self._moves = Moves(scene)
@@ -418,6 +423,7 @@ class Controller:
         If it does, the tip is expected where the newest estimate says. If it has little reserve,
         a better plan is looked for, and the rest is one of the choices.
         """
+        self._take_advice()
         if not self._is_review_due() or not self._moves:
             return Event.AS_PREDICTED
         self._reviewed_mm = self._needle.depth_mm
@@ -435,6 +441,16 @@ class Controller:
         self._planner.note_tube(rest, scene, estimate)
         self._look_for_promise(scene, estimate)
         return Event.AS_PREDICTED
+
+    def _take_advice(self) -> None:
+        """Follows the policy instead of the plan, where it goes on otherwise and that is safe."""
+        if not self._advice.is_due():
+            return
+        scene, rest = self._left(self._needle.glance())
+        plan = self._advice.instead_of(rest, scene, self._planner.vouched)
+        if plan is not None:
+            self._agree(f"follow the policy: {plan}")
+            self._follow(scene, plan)
 
     def _left(self, estimate: Estimate) -> tuple[Scene, Plan]:
         """The known scene for an estimate, and the rest of the plan."""
@@ -506,6 +522,7 @@ class Controller:
         self._follow(synthesis.scene, best.plan)
         self._planner.note_tube(best.plan, synthesis.scene, self._needle.known)
         self._reviewed_mm = self._needle.depth_mm
+        self._take_advice()
         self._look_for_promise(synthesis.scene, self._needle.known)
 
     def _keep_pace(self, action: Action) -> bool:

@@ -5,8 +5,9 @@ It contains:
 * metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
 * attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
   (the true scene and its source), ``against-tissue.json`` (the strategy against a tissue that
-  answers, if one is followed), and for each synthesis ``rebuild-0001/scene.json``,
-  ``…/model.xml`` (``…/model.xml.gz`` if it is large), ``…/plans.json``, ``…/strategy.json.gz``;
+  answers, if one is followed), ``policy.json`` (the policy, if one is asked), and for each
+  synthesis ``rebuild-0001/scene.json``, ``…/model.xml`` (``…/model.xml.gz`` if it is large),
+  ``…/plans.json``, ``…/strategy.json.gz``;
 * one channel ``/ntagen/…`` for each kind of record (`ntagen.drive.messages`), and the channels for
   viewers (`ntagen.drive.viewing`).
 
@@ -63,6 +64,7 @@ SCENE: Final = "scene.json"
 ACTUAL: Final = "actual.json"
 SOURCE: Final = "scene.nsl"
 TREE: Final = "against-tissue.json"
+POLICY: Final = "policy.json"
 STRATEGY: Final = "strategy.json.gz"
 
 VIEW_S: Final = 2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -24,7 +24,8 @@ from ntagen.needle.kinematics import Arc
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.plan.certify import clearance
 from ntagen.plan.extract import step_length_mm
-from ntagen.plan.synthesise import Synthesis, Synthesiser
+from ntagen.plan.rank import Candidate
+from ntagen.plan.synthesise import Synthesis, Synthesiser, select
 from ntagen.scene import Pose, Scene
 
 _NO_REGION_MM: Final = 1e9
@@ -154,6 +155,15 @@ class Planner:
         self.asked_s = self._needle.now_s()
         self._journal.record(Timed(self.asked_s, number, synthesis.seconds, synthesis.loop_seconds))
         return synthesis
+
+    def vouched(self, scene: Scene, plans: Iterable[Plan]) -> tuple[Candidate, ...]:
+        """Those of some plans that may be followed from where the needle is, best first."""
+        settings = self._settings
+        kept = select(plans, scene, settings.margins, settings.ranking)
+        synthesis = Synthesis(
+            scene, "", len(kept), kept, 0.0, margins=settings.margins, ranking=settings.ranking
+        )
+        return self._in_time(self._sure(synthesis), 0.0).candidates
 
     def _found(self, scene: Scene, rest: Plan | None) -> Synthesis:
         """The plans of a scene, and the rest of a plan if that holds, best first."""

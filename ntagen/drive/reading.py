@@ -25,7 +25,7 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from ntagen.drive.following import Course
-from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, SCENE, TREE
+from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, POLICY, SCENE, TREE
 from ntagen.drive.messages import PACKAGE, decode
 from ntagen.drive.no_log import HEAD, Contents, no_log, nothing_attached
 from ntagen.drive.records import Record
@@ -35,6 +35,7 @@ from ntagen.drive.trees import COURSE, course_from_log
 from ntagen.errors import InputError
 from ntagen.files import json_of, open_file
 from ntagen.frames import frame_of
+from ntagen.plan.policy import Policy, read_policy
 from ntagen.scene import Scene
 
 MAX_LOG_BYTES: Final = 512 * 2**20
@@ -124,6 +125,18 @@ class RunLog:
             raise InputError(
                 f"{self.path}: the strategy of the run cannot be read: {error!r}"
             ) from error
+
+    @property
+    def policy(self) -> Policy | None:
+        """The policy that was asked in the run; None if there was none.
+
+        Raises:
+            InputError: It cannot be read.
+        """
+        if POLICY not in self.attachments:
+            return None
+        with self.naming():
+            return read_policy(self.attachments[POLICY], None)
 
     def scene_of(self, number: int) -> Scene:
         """The scene of a synthesis.

@@ -19,6 +19,7 @@ from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import steered
 from ntagen.drive.supervisor import Supervisor
 from ntagen.errors import InputError
+from ntagen.plan.policy import Policy
 from ntagen.plan.synthesise import Synthesiser
 from ntagen.scene import Scene
 
@@ -52,6 +53,7 @@ def drive(
     listen: Callable[[], None] = lambda: None,
     agree: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
+    policy: Policy | None = None,
 ) -> Driven:
     """Drives a real needle through the scene.
 
@@ -66,6 +68,7 @@ def drive(
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
         agree: As in `Controller`.
         course: As in `Controller`.
+        policy: As in `Controller`.
     """
     supervisor = Supervisor(sensor, listen)
     actuator.watch = supervisor.watch
@@ -80,6 +83,7 @@ def drive(
         supervisor,
         agree,
         course,
+        policy,
     )
     ended = controller.run()
     return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)

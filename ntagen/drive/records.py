@@ -341,6 +341,23 @@ class Promised(Record):
     confidence: float
 
 
+@dataclass(frozen=True, slots=True)
+class Advised(Record):
+    """The policy of the run was asked (`ntagen.drive.advice`).
+
+    Attributes:
+        depth_mm: The insertion depth.
+        move: What it says: ``push`` or ``roll``; empty where it is silent.
+        by: Who decided: ``policy``, or ``re-synthesis`` if the plan stays against it.
+        reason: Why, in words; the new plan if there is one.
+    """
+
+    depth_mm: float
+    move: str
+    by: str
+    reason: str
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

@@ -86,6 +86,7 @@ def replay(log: RunLog, synthesise: Synthesiser) -> Comparison:
         stage.listen,
         agree=lambda _: stage.listen(),
         course=log.course,
+        policy=log.policy,
     )
     try:
         controller.run()

@@ -28,6 +28,7 @@ from ntagen.needle.virtual import Errors, Obstacle, SimulatedClock, VirtualNeedl
 from ntagen.plan.best_plan import BestPlanSynthesiser
 from ntagen.plan.branches import worst_path
 from ntagen.plan.closed_loop import Segment
+from ntagen.plan.policy import Policy
 from ntagen.plan.synthesise import Synthesis, Synthesiser
 from ntagen.scene import Needle, Pose, Scene
 
@@ -147,6 +148,7 @@ def simulate(
     listen: Callable[[], None] = lambda: None,
     agree: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
+    policy: Policy | None = None,
 ) -> Result:
     """Drives a simulated needle through the scene.
 
@@ -164,6 +166,7 @@ def simulate(
         listen: Raises `KeyboardInterrupt` if somebody wants the run to end.
         agree: As in `Controller`.
         course: As in `Controller`.
+        policy: As in `Controller`.
     """
     obstacles = obstacles_of(scene, settings.sensing_margin_mm)
     errors = errors or Errors()
@@ -187,6 +190,7 @@ def simulate(
         listen,
         agree=agree,
         course=course,
+        policy=policy,
     )
     ended = controller.run()
     last = scene.targets[-1]

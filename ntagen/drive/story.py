@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ntagen.drive.records import (
+    Advised,
     CutShort,
     Ended,
     Estimated,
@@ -57,6 +58,8 @@ def _text(record: Record) -> str | None:
             return of_strategy(record)
         case Relied():
             return record.text
+        case Advised():
+            return _advised(record)
         case Visited():
             return f"target {record.target} reached"
         case Ended():
@@ -80,6 +83,17 @@ def _transition(record: Transition) -> str | None:
         case State.PULL_BACK.value:
             return "pull back"
     return None
+
+
+def _advised(record: Advised) -> str | None:
+    """What the policy changes, or why it does not decide; what goes on as planned is routine."""
+    place = f"{record.depth_mm:.2f} mm deep"
+    if record.by != "policy":
+        said = f"the policy says {record.move}, but " if record.move else ""
+        return f"{place}: {said}{record.reason}; {record.by} decides"
+    if record.reason == "as planned":
+        return None
+    return f"{place}: the policy says {record.move}: {record.reason}"
 
 
 def _synthesis(record: Synthesised) -> str:

@@ -39,12 +39,14 @@ class Sampling:
         seed: The same seed gives the same runs.
         risk: The risk that any of the intervals misses.
         threads: They share the runs; results do not depend on their number.
+        learning_runs: From how many runs a policy is learned.
     """
 
     runs: int = DEFAULT_RUNS
     seed: int = 0
     risk: float = 0.05
     threads: int | Literal["all"] = "all"
+    learning_runs: int = 100_000
 
 
 @dataclass(frozen=True, slots=True)

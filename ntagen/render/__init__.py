@@ -13,11 +13,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ntagen.errors import InputError
+from ntagen.render.chance import Around, Seen
 from ntagen.render.queries import model_queries, plan_queries, render_queries
 from ntagen.render.values import model_values
 from ntagen.scene import Scene
 
-__all__ = ["render", "render_plan", "render_queries"]
+__all__ = ["Around", "Seen", "render", "render_plan", "render_policy", "render_queries"]
 
 
 def render(scene: Scene, source: str | None = None, *, only_plans: bool = False) -> str:
@@ -67,3 +68,34 @@ def render_plan(scene: Scene, plan: Sequence[int], runs: int) -> str:
 
     values = model_values(scene, plan=plan)
     return plan_document(values, plan_queries(scene, plan.count(0), runs))
+
+
+def render_policy(scene: Scene, around: Around) -> str:
+    """The model in which a policy is learned: the tip is seen, and what is done depends on it.
+
+    Args:
+        scene: The scene, with a stochastic tissue and one target.
+        around: A plan, and how far the policy may deviate from it.
+
+    Returns:
+        The XML document, without queries.
+
+    Raises:
+        InputError: The tissue is another one, there are several targets, the plan has no roll, or
+            a value does not fit the model's numbers.
+    """
+    if not scene.tissue.is_stochastic:
+        raise InputError("the tissue has no chance\nhint: write `tissue stochastic`")
+    if len(scene.targets) != 1:
+        raise InputError(
+            f"a policy is for one target, and the task has {len(scene.targets)}\n"
+            "hint: leave out the others"
+        )
+    if not around.rolls:
+        raise InputError(
+            "the plan has no roll, so there is nothing that a policy could decide\n"
+            "hint: drive without a policy"
+        )
+    from ntagen.render.documents import policy_document
+
+    return policy_document(model_values(scene, plan=around.actions, around=around))

@@ -6,7 +6,7 @@ The true pose of the tip is kept in doubles, in mm and rad, so nothing here is r
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
 from ntagen.errors import InputError
@@ -19,8 +19,108 @@ SPACING_MM: Final = 0.25
 """The way of the tip is looked at in places that are at most so far apart. Between two of them it
 comes nearer to a ball with its centre 2 mm away by at most 0.004 mm."""
 
+_WHOLE: Final = 1e-6
+"""Distances between rolls are whole pushes up to this."""
+
+TOUCH_MM: Final = 10.0
+"""A tip that touches a region counts as one that misses the target by this much; ours."""
+
 UNSEEN_MM: Final = 1e6
 """What distances are before anything was looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """How exactly the pose of the tip is seen after each push: standard deviations.
+
+    Attributes:
+        position_mm: Of each coordinate of the tip.
+        heading_rad: Of the heading, about either transverse axis.
+        bevel_rad: Of the bevel's angle about the shaft.
+    """
+
+    position_mm: float
+    heading_rad: float
+    bevel_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Around:
+    """A plan, and how far a policy may deviate from it.
+
+    Attributes:
+        actions: The plan: 0 is a push, else a roll by that number of degrees.
+        window: A roll may come so many pushes before or after its place in the plan. One before
+            the first push stays there.
+        most_pushes: So many pushes are made at most.
+        inside_mm: The needle stops where the tip is seen so deep in the target.
+        seen: How exactly the tip is seen.
+    """
+
+    actions: tuple[int, ...]
+    window: int
+    most_pushes: int
+    inside_mm: float
+    seen: Seen
+
+    @property
+    def pushes(self) -> int:
+        """The pushes of the plan."""
+        return self.actions.count(0)
+
+    @property
+    def rolls(self) -> tuple[tuple[int, int], ...]:
+        """For each roll of the plan, after how many pushes it comes, and its angle in degrees."""
+        return tuple(
+            (self.actions[:place].count(0), action)
+            for place, action in enumerate(self.actions)
+            if action
+        )
+
+    @property
+    def first(self) -> tuple[int, ...]:
+        """For each roll, after how many pushes it may be made."""
+        return tuple(max(1, place - self.window) if place else 0 for place, _ in self.rolls)
+
+    @property
+    def last(self) -> tuple[int, ...]:
+        """For each roll, after how many pushes it must be made."""
+        return tuple(place + self.window if place else 0 for place, _ in self.rolls)
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyValues:
+    """The numbers of the model in which a policy is learned, as texts of doubles.
+
+    Attributes:
+        seen_mm: The standard deviation of each coordinate of the tip that is seen.
+        heading_rad: That of the heading.
+        bevel_rad: That of the bevel's angle.
+        most_pushes: So many pushes are made at most.
+        apart: So many pushes must lie between two rolls.
+        first: By roll: from how many pushes on it may be made.
+        last: By roll: after how many it must be made.
+        places: By roll: after how many the plan makes it.
+        angles: By roll: that of the plan, in degrees.
+        planned_pushes: The pushes of the plan.
+        center: The centre of the target, in the model's frame.
+        inside_mm: The needle stops where the tip is seen so deep in the target.
+        touch_mm: A touch counts as such a miss.
+    """
+
+    seen_mm: str
+    heading_rad: str
+    bevel_rad: str
+    most_pushes: int
+    apart: int
+    first: tuple[int, ...]
+    last: tuple[int, ...]
+    places: tuple[int, ...]
+    angles: tuple[int, ...]
+    planned_pushes: int
+    center: str
+    inside_mm: str
+    touch_mm: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +146,7 @@ class Chance:
         target_forms: The kinds of targets that are no spheres, and their numbers.
         plan: What is done one after the other: 0 is a push, else a roll by that number of
             degrees; empty in a game.
+        policy: What a policy sees and may do; None where none is learned.
     """
 
     curvature_spread: str
@@ -64,10 +165,15 @@ class Chance:
     unsafe_solids: tuple[tuple[str, int, int], ...]
     target_forms: tuple[tuple[str, int], ...]
     plan: tuple[int, ...] = ()
+    policy: PolicyValues | None = None
 
 
 def chance(
-    scene: Scene, solids: Solids, frame: Matrix, plan: Sequence[int] | None = None
+    scene: Scene,
+    solids: Solids,
+    frame: Matrix,
+    plan: Sequence[int] | None = None,
+    around: Around | None = None,
 ) -> Chance | None:
     """The numbers of a scene with a stochastic tissue; None for another one.
 
@@ -108,8 +214,34 @@ def chance(
         has_unsafe=has_unsafe(scene),
         unsafe_solids=tuple(_unsafe(scene, solids)),
         target_forms=tuple(_forms(scene.targets)),
-        plan=tuple(plan or ()),
+        plan=tuple(plan or ()) if around is None else (),
+        policy=None if around is None else _policy(scene, around, vector),
     )
+
+
+def _policy(scene: Scene, around: Around, vector: Callable[[Vector], str]) -> PolicyValues:
+    """What a policy sees and may do."""
+    return PolicyValues(
+        seen_mm=_double(around.seen.position_mm),
+        heading_rad=_double(around.seen.heading_rad),
+        bevel_rad=_double(around.seen.bevel_rad),
+        most_pushes=around.most_pushes,
+        apart=apart(scene),
+        first=around.first,
+        last=around.last,
+        places=tuple(place for place, _ in around.rolls),
+        angles=tuple(angle for _, angle in around.rolls),
+        planned_pushes=around.pushes,
+        center=vector(scene.targets[-1].center_mm),
+        inside_mm=_double(around.inside_mm),
+        touch_mm=_double(TOUCH_MM),
+    )
+
+
+def apart(scene: Scene) -> int:
+    """So many pushes must lie between two rolls."""
+    push_mm = scene.needle.speed_mm_per_s * scene.limits.step_s
+    return max(1, math.ceil(scene.limits.min_roll_distance_mm / push_mm - _WHOLE))
 
 
 def has_unsafe(scene: Scene) -> bool:

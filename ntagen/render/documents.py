@@ -44,6 +44,11 @@ def plan_document(values: ModelValues, queries: Sequence[Query]) -> str:
     return filled("plan.xml.jinja", declaration=_declaration(values, None), queries=queries)
 
 
+def policy_document(values: ModelValues) -> str:
+    """The document in which a policy is learned; see `model_document`."""
+    return filled("policy.xml.jinja", declaration=_declaration(values, None))
+
+
 def _declaration(values: ModelValues, source: str | None) -> Markup:
     """The declaration of a model; quotes need no escape between two tags."""
     text = filled("uppaal/declarations.c.jinja", model=values, source=source)

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from ntagen import rules
 from ntagen.errors import InputError
-from ntagen.render.chance import Chance, chance
+from ntagen.render.chance import Around, Chance, chance
 from ntagen.render.fixed_point import c_literal, fixed_point
 from ntagen.render.frame import Matrix, cross, model_frame, turned
 from ntagen.render.moving import Moving, moving, still
@@ -166,7 +166,11 @@ class _Writer:
 
 
 def model_values(
-    scene: Scene, *, only_plans: bool = False, plan: Sequence[int] | None = None
+    scene: Scene,
+    *,
+    only_plans: bool = False,
+    plan: Sequence[int] | None = None,
+    around: Around | None = None,
 ) -> ModelValues:
     """The values of a scene for the templates.
 
@@ -174,6 +178,7 @@ def model_values(
         scene: The scene.
         only_plans: As in `ntagen.render.render`.
         plan: As in `ntagen.render.render_plan`.
+        around: As in `ntagen.render.render_policy`.
 
     Raises:
         InputError: A value does not fit the model's numbers, or the model would not move.
@@ -234,7 +239,7 @@ def model_values(
             writer.number(radius_mm, "the radius of the motion circle of a needle that spins")
             for radius_mm in (scene.radii_mm if limits.spins else ())
         ),
-        chance=chance(scene, tables, frame, plan),
+        chance=chance(scene, tables, frame, plan, around),
     )
 
 

@@ -180,6 +180,13 @@ OPTIONS: Final = (
     Option(
         "", "--qlearning-alpha", ">=1", "honoured", "The n-th sample counts for 1/min(this, n+1)."
     ),
+    Option(
+        "",
+        "--out-of-bounds",
+        "0|1|2|3",
+        "honoured",
+        "Outside the grid of acontrol: an error (0), safe (1), unsafe (2), as samples say (3).",
+    ),
     *(Option("", f"--{name}", "X", "idle", _IDLE_IN_LEARNING) for name in IDLE_IN_LEARNING),
 )
 """The options that are known, in the order of the help."""
@@ -324,6 +331,10 @@ def _method(number: str) -> str:
     return "q" if number == "4" else "m"
 
 
+def _out_of_bounds(number: str) -> str:
+    return ("error", "safe", "unsafe", "sample")[int(number)]
+
+
 _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--seed": ("seed", int),
     "--runs": ("runs", int),
@@ -340,9 +351,10 @@ _FIELDS: Final[dict[str, tuple[str, Callable[[str], Any]]]] = {
     "--max-reset-learning": ("max_reset_learning", int),
     "--discount": ("discount", float),
     "--qlearning-alpha": ("qlearning_alpha", float),
+    "--out-of-bounds": ("out_of_bounds", _out_of_bounds),
 }
-"""For each option of random runs and of learning, the field of `ntagen.checker.Options`, and its
-type."""
+"""For each option of random runs, of learning and of shields, the field of
+`ntagen.checker.Options`, and its type."""
 
 
 def of_model(options: Mapping[str, str], given: Collection[str] = ()) -> dict[str, Any]:

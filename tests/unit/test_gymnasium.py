@@ -288,6 +288,32 @@ def test_a_safe_strategy_restricts_what_is_possible() -> None:
     assert all(run.is_terminated for run in runs)
 
 
+TANK = """
+double level = 5;
+process Tank() {
+  state Choose, Done;
+  commit Choose, Done;
+  init Choose;
+  trans Choose -> Done { assign level = level + 2.5; },
+        Choose -> Done { assign level = level - 5; },
+        Done -u-> Choose { };
+}
+system Tank;
+"""
+
+
+def test_a_shield_restricts_what_is_possible() -> None:
+    unsafe = "level < 0 || level >= 8"
+    query = f"minPr[#<=60] {{}} -> {{level}}: <> {unsafe}"
+    shield = "strategy Shield = acontrol: A[] level >= 0 && level < 8 { level[0,10]:4 }"
+    free = ntagen.gymnasium.Environment(TANK, query, wait=1.0)
+    assert values(free, at_random(1), 20).tolist() == [-1.0] * 20
+    kept = ntagen.gymnasium.Environment(
+        TANK, f"{query} under Shield", wait=1.0, strategies=[shield]
+    )
+    assert values(kept, at_random(1), 20).tolist() == [0.0] * 20
+
+
 def test_runs_are_bounded_by_moves_or_a_clock() -> None:
     moves = environment("parts", "minE(cost)[#<=3] {left} -> {}: <> Shop.Done")
     run = played(moves, lambda _seen, _mask: 0, 1)

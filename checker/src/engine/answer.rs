@@ -12,6 +12,7 @@ use crate::learning::{Comparison, LearnedStrategy, Mean};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason};
 use crate::search::optimum::extremum::Extremes;
+use crate::shield::{Facts, Shield};
 use crate::stochastic::{Estimate, Simulated, ValuesOfRuns};
 use crate::verify;
 use crate::verify::certificate::States;
@@ -44,6 +45,8 @@ pub struct Evidence {
     pub strategy: Option<Arc<Strategy>>,
     /// The strategy that was learned, or loaded as such a one.
     pub learned: Option<Arc<LearnedStrategy>>,
+    /// The shield that was made, or loaded.
+    pub shield: Option<Arc<Shield>>,
     /// The strategy of the controller in a game with observations, if it wins and it was wanted.
     pub machine: Option<Arc<Machine>>,
     /// How the check of the strategy ended, if it was wanted.
@@ -118,6 +121,17 @@ pub struct Values {
     pub items: Vec<Extremes>,
 }
 
+/// What is known of a shield.
+#[derive(Clone, Debug)]
+pub struct Shielded {
+    /// What its samples show.
+    pub facts: Facts,
+    /// How many moves the controller has.
+    pub moves: u64,
+    /// Of fresh runs under the shield: how many broke what it must keep.
+    pub tried: Option<Estimate>,
+}
+
 /// How the best strategy was found.
 #[derive(Clone, Debug)]
 pub struct Optimised {
@@ -154,6 +168,8 @@ pub struct Answer {
     pub estimate: Option<Estimate>,
     /// How the best strategy was found, if it was asked for.
     pub optimised: Option<Optimised>,
+    /// What is known of the shield, if one was asked for.
+    pub shielded: Option<Shielded>,
     /// The runs that `simulate` shows.
     pub simulated: Option<Arc<Simulated>>,
     /// How the values of the runs of a statistical query are distributed.
@@ -187,6 +203,7 @@ impl Answer {
             value: None,
             estimate: None,
             optimised: None,
+            shielded: None,
             simulated: None,
             values_of_runs: None,
             block: None,

@@ -16,11 +16,19 @@ use crate::game::strategy::Under;
 use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
 use crate::network::Failure;
 use crate::semantics::Reading;
+use crate::shield::Shield;
 use crate::syntax::ast::QueryText;
 
-/// The strategy that the controller stays within, and who decides; or the answer if a limit came
-/// before they were known.
-type FollowedStrategies = Result<(Option<Arc<Under>>, Option<Decider>), Box<Answer>>;
+/// What a query under a strategy follows.
+#[derive(Default)]
+struct FollowedStrategies {
+    /// The strategy that the controller stays within.
+    under: Option<Arc<Under>>,
+    /// Who decides in random runs.
+    decider: Option<Decider>,
+    /// The shield that it stays within.
+    shield: Option<Arc<Shield>>,
+}
 
 /// A query whose code is ready, with its warnings; or the answer if a limit came before.
 type Ready = Result<(PreparedQuery, Vec<String>), Box<Answer>>;
@@ -71,7 +79,11 @@ impl LoadedModel {
         let level = self.level(&query, options)?;
         self.load_seconds += start.elapsed().as_secs_f64();
         let start = Instant::now();
-        let (under, decider) = match self.followed(&query, options)? {
+        let FollowedStrategies {
+            under,
+            decider,
+            shield,
+        } = match self.followed(&query, options)? {
             Ok(followed) => followed,
             Err(answer) => {
                 return Ok(Err(Box::new(Answer {
@@ -93,6 +105,7 @@ impl LoadedModel {
             level,
             under,
             decider,
+            shield,
         };
         self.refuse_unsupported(&prepared)?;
         match self.prepare_in_time(reading, span, &prepared.options)? {
@@ -106,31 +119,44 @@ impl LoadedModel {
         &mut self,
         query: &Query,
         options: &Options,
-    ) -> Result<FollowedStrategies, Rejection> {
+    ) -> Result<Result<FollowedStrategies, Box<Answer>>, Rejection> {
         let Some(name) = &query.under else {
-            return Ok(Ok((None, None)));
+            return Ok(Ok(FollowedStrategies::default()));
         };
         let is_symbolic = !matches!(
             query.kind,
             QueryKind::Statistical(_) | QueryKind::Optimum(_)
         );
         if let Some(policy) = self.policy(name, query, is_symbolic)? {
-            return Ok(Ok((None, Some(Decider::Policy(policy)))));
+            return Ok(Ok(FollowedStrategies {
+                decider: Some(Decider::Policy(policy)),
+                ..FollowedStrategies::default()
+            }));
         }
         if let Some(named) = self.strategy(name)
-            && let Some(learned) = &named.learned
+            && (named.learned.is_some() || named.shield.is_some())
         {
-            let (within, learned) = (named.within.clone(), Arc::clone(learned));
-            if !is_symbolic {
-                return Ok(Ok((within, Some(Decider::Learned(learned)))));
+            if let (true, Some(learned), None) = (is_symbolic, &named.learned, &named.shield) {
+                let learned = Arc::clone(learned);
+                let in_zones = self.learned_in_zones(name, &learned, query, options)?;
+                return Ok(in_zones.map(|under| FollowedStrategies {
+                    under: Some(under),
+                    ..FollowedStrategies::default()
+                }));
             }
-            let in_zones = self.learned_in_zones(name, &learned, query, options)?;
-            return Ok(in_zones.map(|under| (Some(under), None)));
+            return Ok(Ok(FollowedStrategies {
+                under: named.within.clone(),
+                decider: named.learned.clone().map(Decider::Learned),
+                shield: named.shield.clone(),
+            }));
         }
         let strategy = self.permitted_by(name, query.span, options)?.strategy;
         let query = self.strategy(name).map(|one| one.query.clone());
         let query = query.unwrap_or_default();
-        Ok(Ok((Some(Arc::new(Under { query, strategy })), None)))
+        Ok(Ok(FollowedStrategies {
+            under: Some(Arc::new(Under { query, strategy })),
+            ..FollowedStrategies::default()
+        }))
     }
 
     /// Makes the code of the model with that of queries, of which one is at `span`; gives an answer
@@ -159,6 +185,7 @@ impl LoadedModel {
         let mut answer = match &query.kind {
             QueryKind::Statistical(asked) => self.answer_by_runs(prepared, asked)?,
             QueryKind::Optimum(asked) => self.answer_optimum(prepared, asked)?,
+            QueryKind::Shield(asked) => self.answer_shield(prepared, asked)?,
             QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. } => {
                 self.answer_by_file(prepared)?
             }

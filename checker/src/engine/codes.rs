@@ -13,4 +13,8 @@ crate::diagnostics::codes! {
     STRATEGY_FILE = "E0805" "strategy-file";
     /// A random run that has no result.
     RUN_FAILS = "E0806" "run-fails";
+    /// A shield whose grid has too many cells.
+    GRID_TOO_LARGE = "E0807" "grid-too-large";
+    /// A shield whose grid a run leaves.
+    GRID_LEFT = "E0808" "grid-left";
 }

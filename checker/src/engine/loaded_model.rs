@@ -17,6 +17,7 @@ use crate::game::strategy::{Strategy, Under};
 use crate::ir::{FunctionId, Measure, Network, Overflow, Query};
 use crate::learning::{LearnedStrategy, SeeingPolicy};
 use crate::semantics::{self, FIRST_POOL, Reading};
+use crate::shield::Shield;
 use crate::syntax::{
     self,
     ast::{QueryKind, QueryText, Template},
@@ -313,7 +314,9 @@ impl LoadedModel {
     pub(super) fn reading_of(&self, span: Span) -> Reading {
         let (parsed, _) = syntax::parse_query(span, &self.sources);
         match parsed.map(|query| query.kind) {
-            Some(QueryKind::Statistical(_) | QueryKind::Optimum(_)) => Reading::Stochastic,
+            Some(QueryKind::Statistical(_) | QueryKind::Optimum(_) | QueryKind::Shield(_)) => {
+                Reading::Stochastic
+            }
             Some(QueryKind::SaveStrategy { .. } | QueryKind::LoadStrategy { .. })
                 if self.symbolic_refusal.is_some() =>
             {
@@ -409,6 +412,8 @@ pub struct NamedStrategy {
     pub(crate) policy: Option<Arc<SeeingPolicy>>,
     /// The strategy that a learned one refines.
     pub(crate) within: Option<Arc<Under>>,
+    /// The shield, if it is one; or the one that a learned strategy refines.
+    pub(crate) shield: Option<Arc<Shield>>,
     /// The decisions of a learned strategy in zones, once a symbolic query under it was asked.
     pub(crate) in_zones: Option<Arc<Under>>,
 }
@@ -426,6 +431,8 @@ pub(crate) struct PreparedQuery {
     pub(crate) under: Option<Arc<Under>>,
     /// Who decides in its runs, if it is asked under a learned strategy or a policy.
     pub(crate) decider: Option<Decider>,
+    /// The shield that it is asked under, or that the learned strategy refines.
+    pub(crate) shield: Option<Arc<Shield>>,
 }
 
 /// Who decides for the controller in random runs.
@@ -455,6 +462,7 @@ impl NamedStrategy {
             learned: None,
             policy: None,
             within: None,
+            shield: None,
             in_zones: None,
         }
     }

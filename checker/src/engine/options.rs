@@ -9,6 +9,7 @@ use super::limits::Limits;
 use crate::game::{Forced, Nodes, Player, Priorities};
 use crate::learning::Learning;
 use crate::search::reachability::report::{MOST_THREADS, Manner, Order};
+use crate::shield::Sampling;
 use crate::stochastic::statistics::Interval;
 use crate::stochastic::{Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
@@ -185,6 +186,8 @@ pub struct Options {
     pub precision: Precision,
     /// How strategies are learned; the seed and the threads are those of all runs.
     pub learning: Learning,
+    /// How shields are sampled; the seed and the threads are those of all runs.
+    pub shield: Sampling,
     /// When the controller moves in random runs where a strategy lets it choose.
     pub under_choice: UnderChoice,
     /// Sees what the runs of a statistical query say while they are made.

@@ -44,8 +44,17 @@ impl LoadedModel {
             }
             QueryKind::Statistical(_)
             | QueryKind::Optimum(_)
+            | QueryKind::Shield(_)
             | QueryKind::SaveStrategy { .. }
             | QueryKind::LoadStrategy { .. } => return Ok(()),
+            _ if prepared.shield.is_some() => {
+                return Err(self.refusal(
+                    codes::UNSUPPORTED_QUERY,
+                    query.span,
+                    "symbolic queries under a shield are not supported",
+                    "ask Pr, E, simulate, minE, maxE, minPr or maxPr under it",
+                ));
+            }
             QueryKind::Control(control) => Some(control),
             _ => None,
         };

@@ -31,6 +31,7 @@ mod network;
 mod operands;
 mod queries;
 mod runs;
+mod shields;
 mod statistical;
 
 mod accesses;
@@ -48,4 +49,5 @@ pub use network::*;
 pub(crate) use operands::{Access, Operand};
 pub use queries::*;
 pub use runs::*;
+pub use shields::{Axis, Shield};
 pub use statistical::*;

@@ -3,6 +3,7 @@
 use super::ids::{ClockId, FunctionId, LocationId, ProcessId};
 use super::labels::{ClockAtom, ClockRange};
 use super::learning::Optimum;
+use super::shields::Shield;
 use super::statistical::Statistical;
 use crate::diagnostics::Span;
 
@@ -63,6 +64,8 @@ pub enum QueryKind {
     },
     /// `minE`, `maxE`, `minPr`, `maxPr`: for the best strategy.
     Optimum(Box<Optimum>),
+    /// `acontrol: A[] p {…}`: for what the controller may do so that p holds for ever.
+    Shield(Box<Shield>),
     /// `Pr`, `E`, `simulate`: what random runs answer.
     Statistical(Box<Statistical>),
 }

@@ -121,7 +121,7 @@ impl Learning {
 
     /// How many runs judge the strategy of an iteration.
     pub(super) fn judging(&self, steps_of_run: f64) -> u64 {
-        let fitting = (JUDGING_STEPS / steps_of_run).clamp(200.0, 20_000.0) as u64;
+        let fitting = (JUDGING_STEPS / steps_of_run).clamp(200.0, 100_000.0) as u64;
         self.judging_runs.unwrap_or(fitting)
     }
 }

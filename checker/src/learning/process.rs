@@ -174,13 +174,15 @@ impl Process {
     }
 
     /// Computes the worth of a stand: the value of the best action there; 0 where nothing is known.
-    /// What is known from few samples counts as worse by its error, or else luck would be taken for
-    /// skill.
+    /// What is known from few samples counts as worse by its error when the best is chosen, or else
+    /// luck would be taken for skill. The error is not handed on: in a run of many decisions it
+    /// would add up, and make short runs look better than long ones.
     fn appraise(&mut self, stand: u32) {
-        let slots = self.stands[stand as usize].iter();
-        let cautious = slots.map(|&slot| self.values[slot as usize] + self.errors[slot as usize]);
-        let least = cautious.fold(f64::INFINITY, f64::min);
-        self.worths[stand as usize] = if least.is_finite() { least } else { 0.0 };
+        let (values, errors) = (&self.values, &self.errors);
+        let cautious = |slot: u32| values[slot as usize] + errors[slot as usize];
+        let slots = self.stands[stand as usize].iter().copied();
+        let best = slots.min_by(|&one, &other| cautious(one).total_cmp(&cautious(other)));
+        self.worths[stand as usize] = best.map_or(0.0, |slot| values[slot as usize]);
     }
 
     /// To wait puts nothing off, so it is not discounted.

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use super::convert::{
-    RejectedError, StepEntry, rejected, step_entry, stop_name, until_signal, until_signal_apart,
-    unwritten,
+    RejectedError, StepEntry, code_language, rejected, step_entry, stop_name, until_signal,
+    until_signal_apart, unwritten,
 };
 use super::long_text::LongText;
 use super::model::{BoundRow, Model, bound_rows};
@@ -19,6 +19,7 @@ use crate::engine::format::{
     decisions, distribution_json, json, machine_c, machine_json, strategy_c, strategy_json,
     strategy_text, text, trajectory_json,
 };
+use crate::engine::query_form::unnamed;
 use crate::engine::session::plan_texts::PlanTexts;
 use crate::engine::{self, JointQuery, LoadedModel, Options, Rejection, Verdict, Wanted};
 use crate::game::strategy::plan_list::PlanWalk;
@@ -252,6 +253,38 @@ impl Answer {
         Some(json::optimised(optimised).to_string())
     }
 
+    /// Whether there is a shield.
+    #[getter]
+    fn is_shield(&self) -> bool {
+        self.inner.evidence.shield.is_some()
+    }
+
+    /// The shield as a function in "c" or "python", whose names begin so; `None` without one.
+    fn shield_code(
+        slf: &Bound<'_, Self>,
+        language: &str,
+        name: String,
+    ) -> PyResult<Option<String>> {
+        let language = code_language(language)?;
+        let Some(shield) = slf.get().inner.evidence.shield.clone() else {
+            return Ok(None);
+        };
+        let held = slf.get().model.clone_ref(slf.py());
+        let query = unnamed(&slf.get().query).to_owned();
+        let written = until_signal_apart(slf.py(), move || {
+            let write =
+                |model: &mut LoadedModel| model.shield_code(&shield, language, &name, &query);
+            held.get().with(write)
+        })?;
+        Ok(Some(written))
+    }
+
+    /// What is known of a shield, as JSON; `None` for other queries.
+    fn shielded_json(&self) -> Option<String> {
+        let shielded = self.inner.shielded.as_ref()?;
+        Some(json::shielded(shielded).to_string())
+    }
+
     /// "states", "memory" or "time" if a limit stopped the search, "interrupted" if the user ended
     /// random runs.
     #[getter]
@@ -452,6 +485,14 @@ impl Answer {
                 held.get().with(|model| model.learned_text(&learned))
             })?;
             return Ok(Some(LongText::new(text.map_err(unwritten)?)));
+        }
+        if let Some(shield) = slf.get().inner.evidence.shield.clone() {
+            let held = slf.get().model.clone_ref(slf.py());
+            let query = unnamed(&slf.get().query).to_owned();
+            let text = until_signal_apart(slf.py(), move || {
+                held.get().with(|model| model.shield_text(&shield, &query))
+            })?;
+            return Ok(Some(LongText::new(text)));
         }
         written(slf, |answer, network| {
             let (evidence, query) = (&answer.inner.evidence, &answer.query);

@@ -11,6 +11,7 @@ use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::cancellation::{self, Cut, Look};
+use crate::engine::format::learned_code::Language;
 use crate::engine::format::text;
 use crate::engine::limits::Observer;
 use crate::engine::{CodeEngine, MOST_THREADS, Rejection, Rules};
@@ -41,6 +42,11 @@ pub(super) fn unknown(what: &str, value: &str) -> PyErr {
 pub(super) fn choice<T: Copy>(what: &str, name: &str, known: &[(&str, T)]) -> PyResult<T> {
     let found = known.iter().find(|one| one.0 == name);
     found.map(|one| one.1).ok_or_else(|| unknown(what, name))
+}
+
+pub(super) fn code_language(name: &str) -> PyResult<Language> {
+    let known = [("c", Language::C), ("python", Language::Python)];
+    choice("language", name, &known)
 }
 
 pub(super) fn code_engine(name: &str) -> PyResult<CodeEngine> {

@@ -6,10 +6,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::answer::Answer;
-use super::convert::{choice, rejected, until_signal_apart, unwritten};
+use super::convert::{code_language, rejected, until_signal_apart, unwritten};
 use super::model::Model;
 use crate::engine::LoadedModel;
-use crate::engine::format::learned_code::Language;
 use crate::engine::format::learned_json;
 use crate::engine::query_form::unnamed;
 use crate::learning;
@@ -104,8 +103,7 @@ impl LearnedStrategy {
 
     /// The strategy as a function in "c" or "python", whose names begin so.
     fn code(slf: &Bound<'_, Self>, language: &str, name: String) -> PyResult<String> {
-        let known = [("c", Language::C), ("python", Language::Python)];
-        let language = choice("language", language, &known)?;
+        let language = code_language(language)?;
         written(slf, move |own, model| {
             model.learned_code(&own.inner, language, &name, &own.query)
         })

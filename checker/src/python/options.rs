@@ -18,6 +18,7 @@ use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, Trac
 use crate::learning::{Learning, Method};
 use crate::search::limits::StopReason;
 use crate::search::reachability::report::Order;
+use crate::shield::{Outside, Sampling};
 use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
 
@@ -87,6 +88,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
         run_source: run_source(field(given, "run_source")?, &raised),
         rare: rare_event(given)?,
         learning: learning(given)?,
+        shield: sampling(given)?,
         ..Options::default()
     };
     Ok((options, raised))
@@ -180,6 +182,23 @@ fn learning(given: &Bound<'_, PyAny>) -> PyResult<Learning> {
         discount: discount.or(usual.discount),
         alpha: alpha.unwrap_or(usual.alpha),
         ..usual
+    })
+}
+
+/// How shields are sampled.
+fn sampling(given: &Bound<'_, PyAny>) -> PyResult<Sampling> {
+    use Outside::{Error, Safe, Sampled, Unsafe};
+    let known = [
+        ("error", Error),
+        ("safe", Safe),
+        ("unsafe", Unsafe),
+        ("sample", Sampled),
+    ];
+    let outside = field::<String>(given, "out_of_bounds")?;
+    Ok(Sampling {
+        samples: field(given, "shield_samples")?,
+        repeats: field(given, "shield_repeats")?,
+        outside: choice("rule for what is out of bounds", &outside, &known)?,
     })
 }
 

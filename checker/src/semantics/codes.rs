@@ -145,7 +145,7 @@ codes! {
     QUERY_UNSUPPORTED = "E0274" "query-unsupported";
     /// A strategy that no query defined.
     STRATEGY_UNKNOWN = "E0275" "strategy-unknown";
-    /// A loaded strategy without a name.
+    /// A strategy that is loaded, or a shield, without a name.
     STRATEGY_WITHOUT_NAME = "E0277" "strategy-without-name";
     /// A function that is called by its name, with parameters or a result.
     HOOK_SIGNATURE = "E0281" "hook-signature";
@@ -173,6 +173,8 @@ codes! {
     DYNAMIC_SYMBOLIC = "E0298" "dynamic-symbolic";
     /// Something that a strategy cannot see.
     FEATURE_EXPECTED = "E0299" "feature-expected";
+    /// Something that is no axis of the grid of a shield.
+    SHIELD_AXIS = "E0289" "shield-axis";
     /// A branch point that has no leg, or one that does not end in a location.
     BRANCH_POINT_OPEN = "E0287" "branch-point-open";
     /// An edge to a branch point and a leg of it that both synchronise.

@@ -33,6 +33,18 @@ impl Checker<'_> {
             None => Some(None),
             Some(features) => self.features(features).map(Some),
         };
+        self.warn_without_choice(span);
+        Some(Optimum {
+            is_greatest: asked.is_greatest,
+            aim: aim?,
+            bound: bound?,
+            goal: goal?,
+            features: features?,
+        })
+    }
+
+    /// Warns of a query for a strategy of a controller that has no edge.
+    pub(super) fn warn_without_choice(&mut self, span: Span) {
         let edges = self.world.network.edges();
         if edges.filter(|edge| edge.controllable).count() == 0 {
             self.report(
@@ -44,13 +56,6 @@ impl Checker<'_> {
                 .help("an edge is the controller's if it is written `->`, and not `-u->`"),
             );
         }
-        Some(Optimum {
-            is_greatest: asked.is_greatest,
-            aim: aim?,
-            bound: bound?,
-            goal: goal?,
-            features: features?,
-        })
     }
 
     /// Checks and lowers what a strategy sees.

@@ -100,6 +100,7 @@ mod each;
 mod formulas;
 mod value_ranges;
 
+mod shields;
 mod statistical;
 
 use self::left_out::LeftOut;

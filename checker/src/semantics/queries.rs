@@ -22,7 +22,7 @@ impl Checker<'_> {
     pub(super) fn query(&mut self, query: &ast::Query, strategies: &[String]) -> Option<ir::Query> {
         let is_of_runs = matches!(
             query.kind,
-            ast::QueryKind::Statistical(_) | ast::QueryKind::Optimum(_)
+            ast::QueryKind::Statistical(_) | ast::QueryKind::Optimum(_) | ast::QueryKind::Shield(_)
         );
         if is_of_runs && self.reading == Reading::Symbolic {
             return self.refused(
@@ -142,12 +142,10 @@ impl Checker<'_> {
                 let optimum = self.optimum(asked, query.span)?;
                 Some(QueryKind::Optimum(Box::new(optimum)))
             }
-            ast::QueryKind::Shield(_) => self.refused(
-                codes::QUERY_UNSUPPORTED,
-                query.formula,
-                "acontrol (approximate control) queries are not supported",
-                "use `control: A[] p` where no double and no rate of a clock decides",
-            ),
+            ast::QueryKind::Shield(asked) => {
+                let shield = self.shield(asked, query)?;
+                Some(QueryKind::Shield(Box::new(shield)))
+            }
             ast::QueryKind::Unsupported(_) => None,
         }
     }

@@ -1,6 +1,6 @@
 //! What random runs are runs of.
 
-use super::control::Guidance;
+use super::control::{Fence, Guidance};
 use super::restriction::Restriction;
 use crate::exec::Executor;
 use crate::ir::Network;
@@ -16,6 +16,8 @@ pub struct Behaviour<'a> {
     pub restriction: Option<&'a Restriction>,
     /// Who decides for the controller, if somebody does, within what the strategy allows.
     pub guidance: Option<&'a dyn Guidance>,
+    /// What keeps the controller from some of its moves, if something does.
+    pub fence: Option<&'a dyn Fence>,
     /// The step with which Euler's method solves equations of clocks; adaptive steps without it.
     pub fixed_step: Option<f64>,
 }
@@ -28,6 +30,7 @@ impl<'a> Behaviour<'a> {
             executor,
             restriction: None,
             guidance: None,
+            fence: None,
             fixed_step: None,
         }
     }

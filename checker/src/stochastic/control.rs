@@ -14,6 +14,9 @@
 //! and in code that is made of a strategy.
 //!
 //! A move of the controller is known by its entry: the number of an instance in the program.
+//!
+//! A fence keeps it from some moves: whoever decides sees only what the fence leaves. If nobody
+//! decides, one of the moves that are left is drawn.
 
 use std::any::Any;
 
@@ -136,6 +139,32 @@ pub trait Chooser: Any + Send {
 pub trait Guidance: Sync {
     /// One of them.
     fn chooser(&self) -> Box<dyn Chooser>;
+}
+
+/// Keeps the controller from some of its moves, whoever decides.
+pub trait Fence: Sync {
+    /// Leaves out of the moves that are possible those that must not be made; some are left.
+    fn keep_allowed(&self, state: &StateView<'_>, moves: &mut Vec<u32>);
+}
+
+/// Makes those who choose among all moves with equal chances, and never wait.
+pub(super) struct Uniform;
+
+impl Guidance for Uniform {
+    fn chooser(&self) -> Box<dyn Chooser> {
+        Box::new(Uniform)
+    }
+}
+
+impl Chooser for Uniform {
+    fn sees_time(&self) -> bool {
+        false
+    }
+
+    fn choose(&mut self, state: &mut StateView<'_>, moment: Moment<'_>) -> Result<Chosen, Failure> {
+        let drawn = state.stream().below(moment.moves.len() as u32);
+        Ok(Chosen::Move(drawn as usize))
+    }
 }
 
 /// What a run keeps of who decides.

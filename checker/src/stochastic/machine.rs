@@ -89,6 +89,19 @@ impl<'a> Machine<'a> {
         Stream::start(&mut self.words[start..start + STREAM_WORDS], seed, run);
     }
 
+    /// The words of the random numbers of the run.
+    pub(super) fn stream_words(&self) -> [i32; STREAM_WORDS] {
+        let start = self.network.chances.stream as usize;
+        let words = &self.words[start..start + STREAM_WORDS];
+        words.try_into().expect("there are as many")
+    }
+
+    /// Goes on with random numbers of a run.
+    pub(super) fn set_stream(&mut self, stream: [i32; STREAM_WORDS]) {
+        let start = self.network.chances.stream as usize;
+        self.words[start..start + STREAM_WORDS].copy_from_slice(&stream);
+    }
+
     /// The words of the state.
     pub(super) fn words(&self) -> &[i32] {
         &self.words

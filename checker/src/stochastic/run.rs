@@ -112,7 +112,7 @@ impl<'a> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
         let mut runner = Runner::with(Arc::new(program), behaviour, None);
         let sees_time = runner.race.control.as_ref().map(Control::sees_time);
-        let is_free = behaviour.restriction.is_none();
+        let is_free = behaviour.restriction.is_none() && behaviour.fence.is_none();
         runner.stages = is_free.then(|| Stages::new(behaviour.executor, sees_time));
         runner
     }

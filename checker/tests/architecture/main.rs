@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The rooms in reading order: each may use those before it.
-const ROOMS: [&str; 18] = [
+const ROOMS: [&str; 19] = [
     "cancellation",
     "diagnostics",
     "tuning",
@@ -22,6 +22,7 @@ const ROOMS: [&str; 18] = [
     "game",
     "stochastic",
     "learning",
+    "shield",
     "verify",
     "engine",
     "python",

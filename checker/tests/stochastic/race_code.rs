@@ -204,7 +204,7 @@ fn who_decides_is_asked_the_same() {
         .map_or(12, |number| number.parse::<u64>().expect("it is a number"));
     for family in [Family::Exponential, Family::Timed, Family::Ticking] {
         for sees_time in [false, true] {
-            let mut random = Random(0xdec1de);
+            let mut random = Random(0xdec1);
             let (mut written, mut models) = (0, 0);
             for _ in 0..networks {
                 let (net, query) = network(&mut random, family);

@@ -85,6 +85,14 @@ def _record(outcome: Outcome) -> dict[str, object]:
             "uniform": found.uniform and _interval(found.uniform),
             "better": found.comparison and found.comparison == "better",
         }
+    if answer is not None and (shielded := answer.shielded) is not None:
+        record |= {
+            "cells": shielded.cells,
+            "safe_cells": shielded.safe_cells,
+            "choice_cells": shielded.choice_cells,
+            "unseen_pairs": shielded.unseen_pairs,
+            "trial": shielded.trial and _interval(shielded.trial),
+        }
     if answer is not None and answer.distribution is not None:
         record["distribution"] = answer.distribution.to_json()
     if answer is None:

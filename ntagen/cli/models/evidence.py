@@ -176,6 +176,8 @@ def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str]
     if isinstance(learned := answer.strategy, LearnedStrategy):
         defines = None if query.form is None else query.form.defines
         return [learned.file_text(suffix, defines or "strategy")]
+    if answer.is_shield:
+        return _shield_pieces(answer, query, suffix)
     if suffix == ".c":
         controller = answer.controller_c()
         return None if controller is None else [controller]
@@ -187,6 +189,14 @@ def _strategy_pieces(answer: Answer, query: Asked, target: str) -> Iterable[str]
     if suffix == ".json":
         return chain([first], pieces, ["\n"])
     return chain([f"{query.text}\n\n", first], pieces)
+
+
+def _shield_pieces(answer: Answer, query: Asked, suffix: str) -> Iterable[str]:
+    """A shield as code or, in every other file, as JSON."""
+    if suffix in (".c", ".py"):
+        name = (query.form and query.form.defines) or "shield"
+        return [answer.shield_code("c" if suffix == ".c" else "python", name)]
+    return chain(answer.strategy_pieces("json"), ["\n"])
 
 
 def _write_strategy(answer: Answer, target: str, pieces: Iterable[str]) -> list[str]:

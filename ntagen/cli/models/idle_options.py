@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from ntagen.cli.models.options import LEARNING, OPTIONS, SETTINGS, STATISTICAL
+from ntagen.cli.models.options import LEARNING, OPTIONS, SETTINGS, SHIELD, STATISTICAL
 
 if TYPE_CHECKING:
     from ntagen.checker import QueryForm
@@ -15,8 +15,8 @@ _NOTHING_WRITTEN: Final = {
     "--trace": "no answer has a trace",
     "--certificate": "only an E<> that is not satisfied and an A[] that is satisfied have a "
     "certificate",
-    "--strategy": "no answer has a strategy; only control queries, and minE, maxE, minPr and "
-    "maxPr, can have one",
+    "--strategy": "no answer has a strategy; only control queries, minE, maxE, minPr and maxPr, "
+    "and acontrol can have one",
     "--plans": "plans are listed for control: A<> and A[ U ] without `under`, if the environment "
     "has no choices",
 }
@@ -101,8 +101,13 @@ def _find_idle_statistics(
     has_runs = is_learned or any(query.is_statistical for query in queries)
     for name in ("effort", "repetitions"):
         idle(name, has_runs and "levels" not in given, "without --set 'levels …'")
+    is_shielded = any(query.is_shield for query in queries)
+    for name in SHIELD:
+        idle(name, not is_shielded, "here: no query is for a shield")
     for name in STATISTICAL:
-        idle(name, not has_runs, "here: no query is a statistical one")
+        is_taken = has_runs or (is_shielded and name in ("alpha", "discretisation"))
+        idle(name, not is_taken, "here: no query is a statistical one")
+    has_runs |= is_shielded
     is_fixed = not has_runs and values["search"] != "random"
     idle("seed", is_fixed, "without --search random or a statistical query")
     is_under = any(one.is_statistical and one.uses for one in queries)
@@ -113,7 +118,7 @@ def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:
     """Whether more than one thread can share the work of a query."""
     if query.is_game:
         return not query.is_observed
-    if query.is_statistical or query.is_learned:
+    if query.is_statistical or query.is_learned or query.is_shield:
         return True
     return values["search"] == "bfs" and query.kind not in ("E[]", "A<>", "-->")
 

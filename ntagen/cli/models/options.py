@@ -66,6 +66,19 @@ def _learning_method(value: object) -> str:
     return method
 
 
+OUT_OF_BOUNDS: Final = ("error", "safe", "unsafe", "sample")
+"""What may count outside the grid of a shield, in the order of UPPAAL's numbers."""
+
+
+def _out_of_bounds(value: object) -> str:
+    """What counts outside the grid of a shield, by its name or UPPAAL's number."""
+    text = str(value).strip().lower()
+    names = dict(zip("0123", OUT_OF_BOUNDS, strict=True)) | {one: one for one in OUT_OF_BOUNDS}
+    if text not in names:
+        raise click.BadParameter(f"{value!r} is none of error, safe, unsafe and sample")
+    return names[text]
+
+
 _SHARE: Final = number(0, 1)
 
 RUNS: Final = (
@@ -235,6 +248,24 @@ LEARNING_SETTINGS: Final = (
 )
 """What ``--set`` takes for queries for the best strategy; the names are those of UPPAAL."""
 
+SHIELD_SETTINGS: Final = (
+    Setting(
+        "shield samples N",
+        click.IntRange(1, 1_000),
+        "For acontrol: a cell has N samples along each axis of intervals.  [default: 3]",
+    ),
+    Setting(
+        "shield repeats N",
+        click.IntRange(1, 1_000),
+        "For acontrol: N random runs begin with each move in each sample; one is enough where "
+        "nothing is drawn at random.  [default: 1]",
+    ),
+)
+"""What ``--set`` takes for queries for shields."""
+
+SHIELD: Final = ("out_of_bounds", *(one.field for one in SHIELD_SETTINGS))
+"""The names of options and settings that count for queries for shields only."""
+
 LEARNING: Final = ("learning_method", *(one.field for one in LEARNING_SETTINGS))
 """The names of options and settings that count for queries for the best strategy only."""
 
@@ -247,6 +278,7 @@ STATISTICAL: Final = (
 SETTINGS: Final = (
     *STATISTICAL_SETTINGS,
     *LEARNING_SETTINGS,
+    *SHIELD_SETTINGS,
     Setting(
         "under choice race|eager|lazy",
         click.Choice(["race", "eager", "lazy"]),
@@ -320,6 +352,15 @@ OPTIONS: Final[dict[str, Decorator]] = {
         default="auto",
         help="How minE, maxE, minPr and maxPr learn what actions are worth: by Q-learning (q, or 4 "
         "as in UPPAAL), or from the finite process that all samples make (m, or 5).  [default: m]",
+    ),
+    "out_of_bounds": click.option(
+        "--out-of-bounds",
+        metavar="error|safe|unsafe|sample",
+        type=_out_of_bounds,
+        default="error",
+        help="What counts where a run leaves the grid of acontrol: it is an error, all is safe "
+        "there, nothing is, or samples outside decide (0, 1, 2, 3 as in UPPAAL).  "
+        "[default: error]",
     ),
     "reductions": click.option(
         "--reductions",

@@ -23,6 +23,7 @@ from ntagen.cli.needle.answering_tissue import (
     say_idle_options,
 )
 from ntagen.cli.needle.operator import SignalledOperator, signalled_operator
+from ntagen.cli.needle.policies import load_policy
 from ntagen.cli.needle.report import lines, report, summary
 from ntagen.cli.needle.steering import (
     known_option,
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from ntagen.drive.records import Journal
     from ntagen.nsl import Task
     from ntagen.parameters import Given
+    from ntagen.plan.policy import Policy
     from ntagen.plan.synthesise import Synthesiser
     from ntagen.scene import Scene
 
@@ -94,6 +96,14 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 @tracker_option
 @registration_option
 @course_options
+@path_option(
+    "--policy",
+    "policy_path",
+    metavar="FILE.json",
+    help="In a tissue with chance (tissue stochastic), ask the policy in this file after each push "
+    "whether to roll now; ntagen plan --optimise -o wrote it for this task. Where it is silent, or "
+    "its move is not safe, plans are followed as without it.",
+)
 @known_option
 @click.option(
     "--breath-phase",
@@ -125,6 +135,7 @@ def command(
     confirm: bool,
     tracker: str | None,
     registration: str | None,
+    policy_path: Path | None,
     known: str,
     breath_phase_deg: float | None,
     log_path: Path | None,
@@ -158,6 +169,7 @@ def command(
       ntagen drive task.nsl --needle grbl:/dev/ttyACM0 --confirm --log run.mcap \\
         --tracker openigtlink:localhost:18944:Needle --registration registration.json
       ntagen drive examples/answering/answering.nsl --tissue between --seed 1 --only-guaranteed
+      ntagen drive examples/chance/chance.nsl --policy t.policy.json --log run.mcap
       ntagen drive examples/paper.nsl --settings
 
     \b
@@ -186,7 +198,10 @@ def command(
     terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
     with signalled_operator() as operator:
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
-        run = _Run(environment, task, configuration, known, tracking, wanted, course)
+        policy = None
+        if policy_path is not None:
+            policy = load_policy(policy_path, told(task.scene, known))
+        run = _Run(environment, task, configuration, known, tracking, wanted, course, policy)
         result = _drive(run, needle, log_path, terminal, operator)
     if as_json:
         guarantee = guarantee_of(result, task.scene, course)
@@ -233,6 +248,7 @@ class _Run:
     tracking: Tracking
     wanted: Wanted
     course: Course | None
+    policy: Policy | None
 
     @property
     def scene(self) -> Scene:
@@ -320,6 +336,7 @@ def _drive(
             listen=operator.listen,
             agree=agree,
             course=run.course,
+            policy=run.policy,
         )
 
 
@@ -351,7 +368,7 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         yield []
         return
     from ntagen.drive.knowledge import told
-    from ntagen.drive.log import TREE, Log
+    from ntagen.drive.log import POLICY, TREE, Log
     from ntagen.drive.log_facts import facts_of
 
     # Mistakes on the command line must be found before an earlier log is replaced.
@@ -365,6 +382,8 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
 
         metadata[COURSE], tree = course_to_log(run.course)
         attachments |= {} if tree is None else {TREE: tree}
+    if run.policy is not None:
+        attachments[POLICY] = run.policy.text().encode()
     with Log(path, metadata, attachments) as log:
         yield [log]
 

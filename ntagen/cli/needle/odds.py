@@ -30,14 +30,14 @@ class Wanted:
     """What is to be known of plans.
 
     Attributes:
-        runs: How many are made of each.
+        runs: How many are made of each; None for as many as are usual.
         seed: That of the runs.
         by_odds: Whether plans are ranked by their probability.
         is_random: Whether runs are made.
         shown: How many plans are shown.
     """
 
-    runs: int
+    runs: int | None
     seed: int
     by_odds: bool = False
     is_random: bool = False
@@ -71,10 +71,11 @@ odds_options = gathered(
         "runs": click.option(
             "--runs",
             metavar="N",
-            default=2000,
-            show_default=True,
+            default=None,
             type=click.IntRange(min=2),
-            help="With tissue stochastic: how many random runs are made of each plan.",
+            help="With tissue stochastic: how many random runs are made of each plan; with "
+            "--optimise: from how many a policy is learned, and a tenth as many compare it.  "
+            "[default: 2000; with --optimise: 100000]",
         ),
         "seed": click.option(
             "--seed",
@@ -94,9 +95,10 @@ def rate(candidates: Sequence[Candidate], scene: Scene, wanted: Wanted) -> tuple
     """What runs say of some plans, in the order that is wanted; none if no runs are made."""
     if not wanted.is_random or not candidates:
         return ()
-    from ntagen.plan.chance import Sampling, rated
+    from ntagen.plan.chance import DEFAULT_RUNS, Sampling, rated
 
-    found = rated(candidates, scene, Sampling(runs=wanted.runs, seed=wanted.seed))
+    runs = DEFAULT_RUNS if wanted.runs is None else wanted.runs
+    found = rated(candidates, scene, Sampling(runs=runs, seed=wanted.seed))
     if wanted.by_odds:
         return found
     by_plan = {one.candidate.plan: one for one in found}

@@ -15,14 +15,17 @@ from ntagen.cli.loading import load_task
 from ntagen.cli.needle.odds import Wanted, odds_lines, odds_options, rate, with_odds
 from ntagen.cli.options import include_option, output_option, path_argument
 from ntagen.cli.quantities import duration
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
     from ntagen.drive.settings import Settings
     from ntagen.plan.anytime import Best
     from ntagen.plan.chance import Rated
+    from ntagen.plan.policy import Aim
     from ntagen.scene import Scene
+
+BUDGET_S: Final = 2.0
 
 STOPPED: Final = 3
 """Exit code if the budget ended before a plan was found, or proved not to exist."""
@@ -50,10 +53,10 @@ STOPPED: Final = 3
     "--within",
     "budget_s",
     metavar="TIME",
-    default="2s",
-    show_default=True,
+    default=None,
     type=duration,
-    help="The search ends after about this time. It ends sooner if no plan can be better.",
+    help="The search ends after about this time. It ends sooner if no plan can be better.  "
+    "[default: 2s; with --optimise: 20s]",
 )
 @click.option(
     "--rank",
@@ -65,10 +68,20 @@ STOPPED: Final = 3
     "tissue stochastic, `probability` may come first: the best plans by the other criteria (or by "
     "reserve,length,rolls) are ranked by how likely they reach the target.",
 )
+@click.option(
+    "--optimise",
+    "aim",
+    type=click.Choice(["probability", "miss", "cut"]),
+    help="With tissue stochastic: learn a policy around the best plan, which says at each "
+    "measurement whether to roll now. It is the best for the probability that the tip reaches the "
+    "target and touches nothing, for the miss at the end, or for the length that is cut, where a "
+    "failure costs the length of the plan once more.",
+)
 @odds_options
 @output_option(
     "FILE.json",
-    "Write the best plans with their certificates.",
+    "Write the best plans with their certificates; with --optimise: the policy, for `ntagen drive "
+    "--policy`.",
 )
 @click.option(
     "--json",
@@ -80,8 +93,9 @@ STOPPED: Final = 3
 def command(
     source: Path,
     count: int,
-    budget_s: float,
+    budget_s: float | None,
     ranking: str | None,
+    aim: Aim | None,
     wanted: Wanted,
     output: Path | None,
     as_json: bool,
@@ -99,6 +113,7 @@ def command(
       ntagen plan examples/paper.nsl --best 10 --within 5s -o plans.json
       ntagen plan examples/paper.nsl --rank length,clearance
       ntagen plan examples/chance/chance.nsl --rank probability --best 5
+      ntagen plan examples/chance/chance.nsl --optimise probability -o t.policy.json
 
     \b
     In a tissue with chance (tissue stochastic), random runs say of the best plans how likely the
@@ -111,6 +126,10 @@ def command(
     good as the last one), plans (as in the file of -o), is_final. Where runs were made, each of the
     last plans has chance: reach, touch, clearance_mm (value, lower, upper, confidence, runs), and
     is_apart (whether it is less probable than the best one).
+
+    \b
+    With --optimise there is one JSON object: verdict, optimised, plan, is_better, aims (for each
+    aim plan, policy and difference, with value, lower, upper), learning_runs, seconds.
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.settings import engine_for
@@ -121,6 +140,11 @@ def command(
         require_apart({"-o": output}, {"source": source})
     by_odds, criteria = (False, None) if ranking is None else split_ranking(ranking)
     task = load_task(source, include)
+    if aim is not None:
+        from ntagen.cli.needle.policies import optimise
+
+        say_idle({"count": "--best", "ranking": "--rank"}, "with --optimise")
+        return optimise(task, aim, wanted, budget_s, output, as_json=as_json)
     wanted = wanted.checked(task.scene, count, by_odds=by_odds)
     settings = configure(task.given, task.scene).settings
     settings = settings if criteria is None else replace(settings, ranking=criteria)
@@ -128,7 +152,11 @@ def command(
     shown: Best | None = None
     found: tuple[Rated, ...] = ()
     for best in best_plans(
-        task.scene, engine, clock=time.monotonic, count=wanted.looked_for, budget_s=budget_s
+        task.scene,
+        engine,
+        clock=time.monotonic,
+        count=wanted.looked_for,
+        budget_s=BUDGET_S if budget_s is None else budget_s,
     ):
         if not as_json:
             _show_better(best, shown)

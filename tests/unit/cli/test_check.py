@@ -734,22 +734,22 @@ def test_games_without_plans_say_so(
 def test_queries_beside_a_rejected_one_are_answered(
     gate: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    asked = ("--query", "E<> Gate.Open", "--query", "acontrol: A[] true { x[0,9]:9 }")
+    asked = ("--query", "E<> Gate.Open", "--query", "acontrol: A[] true { Gate.x[0,9]:9 }")
     asked += ("--query", "A[] Gate.Closed")
     out, err = check_run(capsys, 2, gate, *asked, "--json")
     verdicts = [json.loads(line)["verdict"] for line in out.splitlines()]
     assert verdicts == ["satisfied", "refused", "not satisfied"]
     refused = json.loads(out.splitlines()[1])
     assert refused["place"] == "query:1:1"
-    assert refused["message"].startswith("query:1:1: error[E0274]: ")
-    assert err.count("error[E0274]") == 1
+    assert refused["message"].startswith("query:1:1: error[E0277]: ")
+    assert err.count("error[E0277]") == 1
     out, err = check_run(capsys, 2, gate, *asked)
     rows = [
         line.split()[0] for line in out.splitlines() if line.startswith("  ") and line[2:3] != " "
     ]
     assert rows == ["yes", "refused", "no"]
     assert out.endswith("3 queries: 1 satisfied, 1 not satisfied, 1 refused\n")
-    assert err.rstrip().endswith("ntagen explain E0274")
+    assert err.rstrip().endswith("ntagen explain E0277")
 
 
 @pytest.mark.parametrize(

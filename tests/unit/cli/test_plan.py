@@ -122,3 +122,54 @@ def test_static_tissue_has_no_probabilities(capsys: pytest.CaptureFixture[str]) 
 def test_other_commands_do_not_rank_by_probability(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["check", CHANCE, "--plans", "-", "--set", "ranking probability"]) == 2
     assert "by `ntagen plan` only" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_policy_is_learned_compared_and_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.policy.json"
+    wanted = ["plan", CHANCE, "--optimise", "probability", "--runs", "6000", "-o", str(path)]
+    assert cli.main(wanted) == 0
+    out = capsys.readouterr().out
+    assert "reaches the target, and touches nothing (optimised)" in out
+    assert f"policy written to {path}" in out
+    written = json.loads(path.read_text("utf-8"))
+    assert (written["format"], written["aim"]) == ("ntagen policy", "probability")
+    assert cli.main([*wanted[:-2], "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["aims"] == written["values"]
+    compared = found["aims"]["probability"]
+    assert found["is_better"] == (compared["difference"]["lower"] > 0.0)
+    said = "better" if found["is_better"] else "not better"
+    assert said in out
+
+
+@pytest.mark.parametrize(
+    ("task", "exit_code", "words"),
+    [
+        (PAPER, 2, "there is nothing to optimise in a tissue that is static"),
+        ("{task}", 2, "a policy is for one target"),
+        ("{wall}", 1, "there is no policy"),
+    ],
+)
+def test_without_a_policy_no_file_is_written(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    task: str,
+    exit_code: int,
+    words: str,
+) -> None:
+    text = Path(CHANCE).read_text("utf-8")
+    two = text.replace("  critical", "  target T2 sphere (0, -56, 4) mm radius 4 mm\n  critical")
+    wall = text.replace("radius 4.5 mm", "radius 20 mm")
+    places = {"task": tmp_path / "two.nsl", "wall": tmp_path / "wall.nsl"}
+    places["task"].write_text(two, "utf-8")
+    places["wall"].write_text(wall, "utf-8")
+    path = tmp_path / "t.policy.json"
+    path.write_text("an earlier policy")
+    asked = ["plan", task.format(**places), "--optimise", "miss", "--within", "1min"]
+    assert cli.main([*asked, "-o", str(path)]) == exit_code
+    said = capsys.readouterr()
+    assert words in said.out + said.err
+    assert path.read_text() == "an earlier policy"

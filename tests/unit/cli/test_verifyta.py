@@ -217,7 +217,7 @@ def test_a_mistake_is_one_line_and_exit_code_1(
 ) -> None:
     (gate / "o1.xml").write_text(GATE, "utf-8")
     (gate / "wrong.q").write_text("E<> P.Open &&", "utf-8")
-    (gate / "smc.q").write_text("acontrol: A[] true { x[0,9]:9 }", "utf-8")
+    (gate / "smc.q").write_text("acontrol: A[] true { P.location }", "utf-8")
     (gate / "fails.xta").write_text(
         "int[0,1] n;\nprocess P() { state A; init A; trans A -> A { assign n = n + 1; }; }\n"
         "system P;",

@@ -164,3 +164,13 @@ def test_options_that_learning_does_not_have_are_accepted_and_known() -> None:
     given = parse(words).given
     assert idle_in_learning(given) == ["--total-runs", "--filter", "--split-ks"]
     assert statistical(given) == {"good_runs": 9}
+
+
+@pytest.mark.parametrize(
+    ("number", "rule"), [("0", "error"), ("1", "safe"), ("2", "unsafe"), ("3", "sample")]
+)
+def test_what_counts_outside_a_grid_has_a_number(number: str, rule: str) -> None:
+    assert statistical(parse(["--out-of-bounds", number]).given) == {"out_of_bounds": rule}
+    assert of_model({"--out-of-bounds": number}) == {"out_of_bounds": rule}
+    with pytest.raises(InputError, match="--out-of-bounds is '4', but must be 0, 1, 2 or 3"):
+        parse(["--out-of-bounds", "4"])

@@ -204,6 +204,7 @@ fn predicates(kind: &QueryKind) -> Vec<&Predicate> {
         QueryKind::SaveStrategy { .. }
         | QueryKind::LoadStrategy { .. }
         | QueryKind::Optimum(_)
+        | QueryKind::Shield(_)
         | QueryKind::Statistical(_) => Vec::new(),
     }
 }

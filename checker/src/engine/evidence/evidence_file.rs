@@ -11,7 +11,7 @@ use super::checked::{Checked, Unreadable};
 use super::strategy_check::{self, Played};
 use super::{certificate, trace_file};
 use crate::engine::format::json_reader::MACHINE_FORMAT;
-use crate::engine::format::{json, learned_json, machine_json, strategy_json};
+use crate::engine::format::{json, learned_json, machine_json, shield_json, strategy_json};
 use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Rules;
 use crate::engine::query::partial_observation;
@@ -39,6 +39,10 @@ impl LoadedModel {
             .map_err(|error| unreadable(format!("it is no JSON: {error}")))?;
         if learned_json::is_one(&header) {
             let why = "it is a learned strategy, of which only random runs say what it is worth";
+            return Err(unreadable(why.to_owned()));
+        }
+        if shield_json::is_one(&header) {
+            let why = "it is a shield, which samples have shown and nothing proves";
             return Err(unreadable(why.to_owned()));
         }
         let kind = header["format"].as_str().unwrap_or_default().to_owned();

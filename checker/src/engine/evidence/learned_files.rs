@@ -155,11 +155,15 @@ impl LoadedModel {
         self.renew_learned()
     }
 
-    /// Compiles again what learned strategies see, where the model is analysed anew: code and
-    /// places of variables are others then.
+    /// Compiles again what learned strategies and shields see, where the model is analysed anew:
+    /// code and places of variables are others then.
     pub(in crate::engine) fn renew_learned(&mut self) -> Result<(), Rejection> {
         self.renew_policies()?;
         for index in 0..self.strategies.len() {
+            if let Some(shield) = self.strategies[index].shield.take() {
+                self.expect_stochastic()?;
+                self.strategies[index].shield = self.renewed(&shield);
+            }
             let Some(learned) = self.strategies[index].learned.take() else {
                 continue;
             };
@@ -177,7 +181,7 @@ impl LoadedModel {
 
     /// What a text stands for: an expression, or the name of a variable that no expression can be
     /// about, such as one of a scalar set.
-    fn feature_of(&mut self, text: &str, is_discrete: bool) -> Result<Feature, String> {
+    pub(super) fn feature_of(&mut self, text: &str, is_discrete: bool) -> Result<Feature, String> {
         let span = syntax::add_query_text(text, &mut self.sources);
         let (expr, mut found) = syntax::parse_expression(span, &self.sources);
         let compiled = self.stochastic.as_mut().expect(ANALYSED);

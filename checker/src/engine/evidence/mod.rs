@@ -8,6 +8,7 @@ mod learned_files;
 pub mod named_strategies;
 mod permitted;
 mod policies;
+mod shield_files;
 pub(super) mod shown_states;
 pub mod strategy_check;
 pub(super) mod strategy_place;

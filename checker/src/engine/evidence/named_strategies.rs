@@ -16,11 +16,13 @@ use crate::diagnostics::Span;
 use crate::game::strategy::Strategy;
 use crate::game::strategy::freedom::Freedom;
 
+use super::learned_files::Meaning;
+use super::shield_files::ShieldMeaning;
 use super::strategy_place::{self, Refusal};
 use crate::engine::answer::{Answer, Evidence, Verdict};
 use crate::engine::codes;
 use crate::engine::format::json_reader::Mismatch;
-use crate::engine::format::{learned_json, strategy_json};
+use crate::engine::format::{learned_json, shield_json, strategy_json};
 use crate::engine::limits::{LimitWatch, ended_text, stop_text};
 use crate::engine::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::Options;
@@ -30,10 +32,19 @@ use crate::ir::{FeatureTexts, Query};
 use crate::learning::LearnedStrategy;
 use crate::search::limits::Counters;
 use crate::semantics::Reading;
+use crate::shield::Shield;
+
+/// What the file of a strategy is about.
+enum FileMeaning {
+    Learned(Meaning),
+    Shield(ShieldMeaning),
+    InZones,
+}
 
 /// What the file of a strategy has.
 enum Loaded {
     Learned(Arc<LearnedStrategy>),
+    Shield(Arc<Shield>),
     InZones {
         query: String,
         strategy: Arc<Strategy>,
@@ -57,7 +68,14 @@ impl LoadedModel {
             return Err(self.only_in_runs(name, span));
         }
         let Some(definition) = named.and_then(|one| one.definition.clone()) else {
-            return Err(self.no_strategy(name, span, "its query gave none"));
+            let reason = match named {
+                Some(one) if one.learned.is_some() => {
+                    "it is a learned one, and one of a game is needed"
+                }
+                Some(one) if one.shield.is_some() => "it is a shield, and one of a game is needed",
+                _ => "its query gave none",
+            };
+            return Err(self.no_strategy(name, span, reason));
         };
         match self.made_by(&definition, None, span, options)? {
             Ok(strategy) => {
@@ -122,17 +140,20 @@ impl LoadedModel {
         span: Span,
         options: &Options,
     ) -> Result<Answer, Rejection> {
-        let learned = self.strategy(name).and_then(|one| one.learned.clone());
-        let known = match learned {
-            Some(_) => None,
-            None => Some(self.existing_strategy(name, span, options)?),
+        let named = self.strategy(name);
+        let learned = named.and_then(|one| one.learned.clone());
+        let shield = named.and_then(|one| one.shield.clone());
+        let known = match (&learned, &shield) {
+            (None, None) => Some(self.existing_strategy(name, span, options)?),
+            _ => None,
         };
         let query = self.strategy(name).map_or("", |one| one.query.as_str());
         let mut watch = LimitWatch::new(options.limits.clone());
-        let written = watch.bound(|_| match (&known, &learned) {
-            (Some(strategy), _) => Ok(strategy_json::text(self.network(), strategy, query)),
-            (None, Some(learned)) => self.learned_text(learned),
-            (None, None) => unreachable!("there is a strategy, or an error"),
+        let written = watch.bound(|_| match (&known, &learned, &shield) {
+            (Some(strategy), _, _) => Ok(strategy_json::text(self.network(), strategy, query)),
+            (None, Some(learned), _) => self.learned_text(learned),
+            (None, None, Some(shield)) => Ok(self.shield_text(shield, query)),
+            (None, None, None) => unreachable!("there is a strategy, or an error"),
         });
         let path = self.strategy_path(file, options);
         let text = match written {
@@ -187,43 +208,33 @@ impl LoadedModel {
             Err(stopped) => return cut(stopped),
         };
         drop(bytes);
-        let is_learned = learned_json::is_one(&file);
         // What is compiled for the file must not be cut off.
-        let meaning = is_learned.then(|| self.meaning_of(&file, features, span, options));
-        let meaning = match meaning.transpose()?.transpose() {
-            Ok(meaning) => meaning,
-            Err(mismatch) => return Err(self.mismatched(span, &from, &mismatch)),
-        };
-        let read = watch.bound(|_| match &meaning {
-            Some(meaning) => {
-                let learned = self.read_learned(&file, meaning);
-                learned.map(|learned| Loaded::Learned(Arc::new(learned)))
-            }
-            None => self.read_zones(&file),
-        });
-        let loaded = match read {
+        let meaning = self.meaning(&file, features, span, options)?;
+        let meaning = meaning.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?;
+        let loaded = match watch.bound(|_| self.loaded(&file, &meaning)) {
             Ok(read) => read.map_err(|mismatch| self.mismatched(span, &from, &mismatch))?,
             Err(stopped) => return cut(stopped),
         };
         let mut evidence = Evidence::default();
-        let (what, named) = match loaded {
+        let mut named = NamedStrategy::new(name.to_owned(), unnamed(&query.text).to_owned(), None);
+        let what = match loaded {
             Loaded::Learned(learned) => {
                 evidence.learned = Some(Arc::clone(&learned));
-                let text = unnamed(&query.text).to_owned();
                 let what = format!("{} leaves", learned.leaves());
-                let named = NamedStrategy {
-                    learned: Some(learned),
-                    ..NamedStrategy::new(name.to_owned(), text, None)
-                };
-                (what, named)
+                named.learned = Some(learned);
+                what
+            }
+            Loaded::Shield(shield) => {
+                evidence.shield = Some(Arc::clone(&shield));
+                let what = format!("{} safe cells", shield.safe_cells());
+                named.shield = Some(shield);
+                what
             }
             Loaded::InZones { query, strategy } => {
                 evidence.strategy = Some(Arc::clone(&strategy));
                 let what = format!("{} states", strategy.states.len());
-                (
-                    what,
-                    NamedStrategy::new(name.to_owned(), query, Some(strategy)),
-                )
+                named = NamedStrategy::new(name.to_owned(), query, Some(strategy));
+                what
             }
         };
         self.keep_strategy(named);
@@ -233,6 +244,40 @@ impl LoadedModel {
             evidence,
             ..Answer::new(Verdict::Satisfied, Counters::default())
         })
+    }
+
+    /// What the file of a strategy is about in this model.
+    fn meaning(
+        &mut self,
+        file: &Json,
+        features: Option<&FeatureTexts>,
+        span: Span,
+        options: &Options,
+    ) -> Result<Result<FileMeaning, Mismatch>, Rejection> {
+        Ok(if learned_json::is_one(file) {
+            let meaning = self.meaning_of(file, features, span, options)?;
+            meaning.map(FileMeaning::Learned)
+        } else if shield_json::is_one(file) {
+            let meaning = self.shield_meaning(file, span, options)?;
+            meaning.map(FileMeaning::Shield)
+        } else {
+            Ok(FileMeaning::InZones)
+        })
+    }
+
+    /// Reads the file of a strategy.
+    fn loaded(&self, file: &Json, meaning: &FileMeaning) -> Result<Loaded, Mismatch> {
+        match meaning {
+            FileMeaning::Learned(meaning) => {
+                let learned = self.read_learned(file, meaning)?;
+                Ok(Loaded::Learned(Arc::new(learned)))
+            }
+            FileMeaning::Shield(meaning) => {
+                let shield = self.read_shield(file, meaning)?;
+                Ok(Loaded::Shield(Arc::new(shield)))
+            }
+            FileMeaning::InZones => self.read_zones(file),
+        }
     }
 
     /// Reads the file of a strategy in zones. It sees the whole state, whatever features are named.

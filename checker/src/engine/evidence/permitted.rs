@@ -128,6 +128,7 @@ impl LoadedModel {
             level: None,
             under: Some(Arc::new(under)),
             decider: None,
+            shield: None,
         };
         self.answer_in_zones(&asked, None).verdict
     }

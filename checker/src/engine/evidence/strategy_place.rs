@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::engine::format::json_reader::MACHINE_FORMAT;
-use crate::engine::format::strategy_json;
+use crate::engine::format::{shield_json, strategy_json};
 
 /// The largest file that is loaded.
 const MOST_BYTES: u64 = 2 << 30;
@@ -111,12 +111,12 @@ fn is_free(place: &Path) -> io::Result<bool> {
     Ok(start.is_empty() || is_strategy(&String::from_utf8_lossy(&start)))
 }
 
-/// Whether a file that begins so is a strategy: of ours, in both forms, or of UPPAAL's, learned
+/// Whether a file that begins so is a strategy: of ours, in all forms, or of UPPAAL's, learned
 /// ones and those in zones.
 fn is_strategy(start: &str) -> bool {
     let has = |name: &str| start.contains(&format!("\"{name}\""));
     if start.trim_start().starts_with('{') {
-        let ours = [strategy_json::FORMAT, MACHINE_FORMAT];
+        let ours = [strategy_json::FORMAT, MACHINE_FORMAT, shield_json::FORMAT];
         let is_ours = has("format") && ours.iter().any(|format| has(format));
         return is_ours || (has("version") && has("type") && has("representation"));
     }

@@ -18,7 +18,7 @@ use crate::verify::choices::Choice;
 use crate::verify::replay::{End, Run};
 
 use super::text::{self, Value};
-use crate::engine::answer::{Optimised, Values};
+use crate::engine::answer::{Optimised, Shielded, Values};
 use crate::engine::evidence::witness::{Proof, Witness, WitnessKind};
 
 /// An edge.
@@ -189,6 +189,26 @@ pub fn optimised(optimised: &Optimised) -> Json {
         "comparison": comparison,
         "is_complete": optimised.is_complete,
         "leaves": optimised.leaves,
+    })
+}
+
+/// What is known of a shield. `trial` says in how many fresh runs under it what it must keep was
+/// broken.
+pub fn shielded(shielded: &Shielded) -> Json {
+    let trial = shielded.tried.as_ref().map(|tried| {
+        let mut object = estimate(tried);
+        object["value"] = real(tried.value);
+        object
+    });
+    let facts = &shielded.facts;
+    json!({
+        "cells": facts.cells,
+        "safe_cells": facts.safe_cells,
+        "choice_cells": facts.seen_cells,
+        "unseen_pairs": facts.unseen_pairs,
+        "stuck_runs": facts.stuck,
+        "moves": shielded.moves,
+        "trial": trial,
     })
 }
 

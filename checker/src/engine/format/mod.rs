@@ -13,6 +13,8 @@ pub mod machine_c;
 pub mod machine_json;
 pub mod model_json;
 pub mod network_json;
+pub mod shield_code;
+pub mod shield_json;
 pub mod strategy_c;
 pub mod strategy_json;
 pub mod strategy_text;

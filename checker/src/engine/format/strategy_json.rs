@@ -23,8 +23,8 @@ use crate::zones::{Bound, Federation, Zone};
 
 use super::json;
 use super::json_reader::{At, MACHINE_FORMAT, Mismatch, SEE_FORMAT, WRITE_ONE, integer};
-use super::learned_json;
 use super::text::{self, ValuePlace};
+use super::{learned_json, shield_json};
 use crate::engine::query::time_clock;
 use crate::engine::query_form::without_under;
 
@@ -177,6 +177,11 @@ fn read_whole(network: &Network, whole: &At<'_>) -> Result<(String, Strategy), M
     }
     if learned_json::is_one(file) {
         let message = "this is a learned strategy, which says what actions are worth";
+        let help = "the query strategy S = loadStrategy(\"…\") reads it";
+        return Err(whole.wrong(message, help));
+    }
+    if shield_json::is_one(file) {
+        let message = "this is a shield, which allows moves by cells of a grid";
         let help = "the query strategy S = loadStrategy(\"…\") reads it";
         return Err(whole.wrong(message, help));
     }

@@ -158,6 +158,7 @@ fn dispatch(problem: Problem<'_>, query: &QueryKind, watch: &mut LimitWatch) -> 
         QueryKind::SaveStrategy { .. }
         | QueryKind::LoadStrategy { .. }
         | QueryKind::Optimum(_)
+        | QueryKind::Shield(_)
         | QueryKind::Statistical(_) => {
             unreachable!("neither files nor random runs need zones")
         }

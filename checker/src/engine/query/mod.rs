@@ -19,6 +19,7 @@ pub(crate) mod problem;
 pub(super) mod reachable;
 mod restriction;
 mod run_failure;
+mod shield;
 mod splitting;
 pub(super) mod statistical;
 pub mod time_clock;

@@ -20,7 +20,7 @@ use crate::learning::{
 use crate::search::limits::{Counters, StopReason, Watch as _};
 use crate::stochastic::statistics::{Interval, Method};
 use crate::stochastic::{
-    Behaviour, ControllerMove, Estimate, Failure, Guidance, NotFinite, Runner, Stand,
+    Behaviour, ControllerMove, Estimate, Failure, Fence, Guidance, NotFinite, Runner, Stand,
 };
 
 /// The numbers of the runs that say what a strategy is worth: learning never uses them.
@@ -40,7 +40,11 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         let start = Instant::now();
         let restriction = self.restriction(prepared)?;
-        let behaviour = self.behaviour(restriction.as_ref(), options);
+        let barrier = prepared.shield.as_ref().map(|one| self.barrier(one));
+        let behaviour = Behaviour {
+            fence: barrier.as_ref().map(|one| one as &dyn Fence),
+            ..self.behaviour(restriction.as_ref(), options)
+        };
         let mut watch = LimitWatch::new(options.limits.left_since(start));
         let result = watch.bound(|watch| found(behaviour, prepared, asked, watch));
         let (answer, strategy) = match result {
@@ -71,6 +75,7 @@ impl LoadedModel {
         self.keep_strategy(NamedStrategy {
             learned: strategy,
             within: prepared.under.clone(),
+            shield: prepared.shield.clone(),
             ..NamedStrategy::new(name.to_owned(), text, None)
         });
     }
@@ -242,6 +247,7 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
             }
             NotFinite::Demand => "the strategy that is refined demands moves in time".to_owned(),
         },
+        Inexact::Shield => "a shield is known on cells only".to_owned(),
         Inexact::Library => "functions of libraries may be of any kind".to_owned(),
         Inexact::TooLarge => {
             "there are more than 10 million states, or they take more than 4 GiB".to_owned()

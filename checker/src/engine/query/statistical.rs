@@ -16,8 +16,8 @@ use crate::ir::{RunTimeErrorKind, Statistical};
 use crate::search::limits::{Counters, StopReason};
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Behaviour, Failure, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block, compare,
-    estimate, estimate_rare, simulate,
+    Behaviour, Failure, Fence, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block,
+    compare, estimate, estimate_rare, simulate,
 };
 
 /// What is said if the first run takes too long.
@@ -35,8 +35,10 @@ impl LoadedModel {
         let restriction = self.restriction(prepared)?;
         let decider = prepared.decider.as_ref();
         let followed = decider.map(|one| self.followed_in_runs(one));
+        let barrier = prepared.shield.as_ref().map(|one| self.barrier(one));
         let behaviour = Behaviour {
             guidance: followed.as_deref(),
+            fence: barrier.as_ref().map(|one| one as &dyn Fence),
             ..self.behaviour(restriction.as_ref(), options)
         };
         let may_have_more_room = self.pool < GREATEST_POOL;
@@ -83,6 +85,7 @@ impl LoadedModel {
             executor: compiled.executor(),
             restriction,
             guidance: None,
+            fence: None,
             fixed_step: options.precision.discretisation,
         }
     }

@@ -24,7 +24,7 @@ use crate::engine::query::libraries::Hooks;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Aim, FeatureTexts, Observation, Optimum, QueryKind, RunLimit};
 use crate::learning::{Policy, SeeingPolicy, Situation, seen_values, whole_state};
-use crate::stochastic::{Behaviour, Ended, Failure, RunId, Runner, StateView};
+use crate::stochastic::{Behaviour, Ended, Failure, Fence, RunId, Runner, StateView};
 use crate::syntax;
 
 /// The controller waits for so many parts of the bound, if nobody says it.
@@ -315,8 +315,10 @@ fn serve(model: &LoadedModel, asked: Asked, outside: &Arc<Outside>) {
     });
     let moves = model.moves_of_controller();
     let guidance = policy.followed(&moves);
+    let barrier = prepared.shield.as_ref().map(|one| model.barrier(one));
     let behaviour = Behaviour {
         guidance: Some(&guidance),
+        fence: barrier.as_ref().map(|one| one as &dyn Fence),
         ..model.behaviour(restriction.as_ref(), &prepared.options)
     };
     let _hooks = Hooks::new(behaviour.network);

@@ -66,6 +66,8 @@ pub enum Inexact {
     NotFinite(NotFinite),
     /// What functions of libraries do is not known.
     Library,
+    /// A shield goes by words that make no other difference.
+    Shield,
     /// There are too many states.
     TooLarge,
     /// A limit was reached.
@@ -96,6 +98,9 @@ pub fn solve_exactly(
     let network = behaviour.network;
     if !network.externals.is_empty() {
         return Ok(ExactAnswer::Left(Inexact::Library));
+    }
+    if behaviour.fence.is_some() {
+        return Ok(ExactAnswer::Left(Inexact::Shield));
     }
     if behaviour.restriction.is_some() && asked.bound.limit != RunLimit::Time {
         // It may look at the time, which is then no part of the state.

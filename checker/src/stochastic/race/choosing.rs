@@ -87,16 +87,21 @@ impl Race<'_> {
         let may_wait = self.may_wait(program, &moves, others)?;
         let (time, is_straight) = (self.time, !self.motion.is_flowing());
         let control = self.control.as_mut().expect("somebody decides");
+        let mut state = self.machine.view_of_state();
+        let allowed = self.fence.map(|fence| {
+            let mut allowed = moves.clone();
+            fence.keep_allowed(&state, &mut allowed);
+            allowed
+        });
         let moment = Moment {
-            moves: &moves,
+            moves: allowed.as_deref().unwrap_or(&moves),
             may_wait,
             is_straight,
             time,
         };
-        let mut state = self.machine.view_of_state();
         let chosen = control.chooser.choose(&mut state, moment)?;
         let chosen = match chosen {
-            Chosen::Move(place) => Some(moves[place]),
+            Chosen::Move(place) => Some(moment.moves[place]),
             Chosen::Wait(time) => {
                 let is_moving = self.can_time_pass(program, &moves)?;
                 let control = self.control.as_mut().expect("somebody decides");
@@ -119,19 +124,34 @@ impl Race<'_> {
         let Some(entry) = chosen else {
             return Ok(None);
         };
-        // Of legs that are edges, one is taken by weight.
+        self.output_of(program, entry).map(Some)
+    }
+
+    /// Lets the controller make one of its moves that are enabled now, whoever decides.
+    pub(in crate::stochastic) fn take_entry(
+        &mut self,
+        program: &Program<'_>,
+        entry: u32,
+    ) -> Result<(), Failure> {
+        let chosen = self.output_of(program, entry)?;
+        let process = program.instance(chosen).process as usize;
+        self.make(program, process, chosen)
+    }
+
+    /// The output by which a move is made: of legs that are edges, one by weight.
+    fn output_of(&mut self, program: &Program<'_>, entry: u32) -> Result<u32, Failure> {
         let process = program.instance(entry).process as usize;
         self.find_outputs(program, process)?;
         let legs = self.choices.iter().copied();
         let legs: Vec<u32> = legs
             .filter(|&one| program.instance(one).entry == entry)
             .collect();
-        Ok(Some(self.one_of(program, &legs)?))
+        self.one_of(program, &legs)
     }
 
     /// The moves that the controller can make now, by their entries, and whether the environment
     /// can move, too: one of its processes whose delay is over.
-    pub(super) fn moves_of_controller(
+    pub(in crate::stochastic) fn moves_of_controller(
         &mut self,
         program: &Program<'_>,
         winner: usize,

@@ -45,7 +45,7 @@ use super::advice::Advice;
 use super::behaviour::Behaviour;
 use super::condition::Condition;
 use super::constants::{MOVES_OF_A_PLAN, TOLERANCE, ZENO_MOVES, ZENO_TIME};
-use super::control::Control;
+use super::control::{Control, Fence, Guidance, Uniform};
 use super::failure::{Failure, Stand};
 use super::machine::{Machine, Mask};
 use super::motion::{Followed, Motion};
@@ -117,6 +117,8 @@ pub(in crate::stochastic) struct Race<'a> {
     advice: Option<Advice<'a>>,
     /// Who decides for the controller, if somebody does.
     pub(in crate::stochastic) control: Option<Control>,
+    /// What keeps the controller from some of its moves.
+    fence: Option<&'a dyn Fence>,
     /// The first time at which an urgent channel stops time for a move that the strategy forbids,
     /// and who could make it.
     standstill: Option<(f64, usize)>,
@@ -133,8 +135,10 @@ impl<'a> Race<'a> {
             executor,
             restriction,
             guidance,
+            fence,
             fixed_step,
         } = behaviour;
+        let guidance = guidance.or(fence.map(|_| &Uniform as &dyn Guidance));
         let processes = network.processes.len();
         Race {
             machine: Machine::new(network, executor),
@@ -162,6 +166,7 @@ impl<'a> Race<'a> {
             has_moved: false,
             advice: restriction.map(Advice::new),
             control: guidance.map(Control::new),
+            fence,
             standstill: None,
             longest_stay: f64::INFINITY,
             drawn: None,
@@ -431,6 +436,12 @@ impl<'a> Race<'a> {
             };
             chosen = decided;
         }
+        self.make(program, process, chosen)
+    }
+
+    /// Makes a move with an output that is enabled, if the strategy does not wait, now that the
+    /// delay of a process is over.
+    fn make(&mut self, program: &Program<'_>, process: usize, chosen: u32) -> Result<(), Failure> {
         self.movers.clear();
         self.movers.push((chosen, 0));
         let sender = program.instance(chosen);

@@ -55,6 +55,20 @@ impl Race<'_> {
         Ok(())
     }
 
+    /// Where all have to plan: lets those who look along the motion of clocks do it last, so that
+    /// they need not look far.
+    pub(in crate::stochastic) fn plan_flows_last(&mut self, program: &Program<'_>) {
+        if !self.motion.is_flowing() {
+            return;
+        }
+        self.attempts.fill(f64::INFINITY);
+        for process in 0..self.locations.len() {
+            let outputs = program.spot(process, self.locations[process]).outputs;
+            let mut outputs = program.range(outputs).iter();
+            self.is_stepped[process] = outputs.any(|output| self.steps(program, output.guard));
+        }
+    }
+
     /// Where time stands still, no process plans that may have to, but the invariants hold.
     pub(super) fn put_plans_off(&mut self, program: &Program<'_>) -> Result<(), Failure> {
         if self.until_renewal == 0 {

@@ -13,7 +13,7 @@ use super::race_writer::{Ids, RaceWriter};
 use super::rounds::Round;
 use super::writer::Writer;
 use crate::ir::{
-    BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Urgency,
+    BlockId, Function, FunctionId, IntegerOperator, Register, RegisterType, Relation, Sync, Urgency,
 };
 use crate::stochastic::condition::Condition;
 use crate::stochastic::constants::TOLERANCE;
@@ -61,7 +61,7 @@ pub(super) fn knows_decisions(program: &Program<'_>) -> bool {
     };
     // Where somebody is committed, a sender who is not can move if somebody who is receives.
     let joins_committed = |instance: &Instance<'_>| {
-        let channels = instance.edge.sync.map_or(0..0, |sync| sync.channels());
+        let channels = instance.edge.sync.map_or(0..0, Sync::channels);
         let mut receivers = channels.flat_map(|channel| program.receivers(channel));
         receivers.any(|&receiver| receiver != instance.process && commits(receiver))
     };
@@ -125,7 +125,6 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Lets the controller make the move that the words say.
     pub(super) fn let_chosen_move(
-        &self,
         w: &mut Writer<'_>,
         ids: &Ids,
         decisions: &Decisions,
@@ -148,7 +147,6 @@ impl<'a> RaceWriter<'_, 'a> {
 
     /// Returns to ask the controller, now that the delay of a process is over.
     pub(super) fn ask(
-        &self,
         w: &mut Writer<'_>,
         possible_moves: FunctionId,
         decisions: &Decisions,

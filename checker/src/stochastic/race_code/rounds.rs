@@ -228,7 +228,7 @@ impl RaceWriter<'_, '_> {
         self.let_move(w, round, ways);
         if let Some(decisions) = &self.layout.decisions {
             w.at(round.chosen);
-            self.let_chosen_move(w, round.ids, decisions, ways);
+            Self::let_chosen_move(w, round.ids, decisions, ways);
         }
         for (block, next) in [(ways.moved, round.racing), (ways.put_off, round.settling)] {
             w.at(block);
@@ -315,7 +315,7 @@ impl RaceWriter<'_, '_> {
             if let (Some((block, possible_moves)), Some(decisions)) = (asks, &self.layout.decisions)
             {
                 w.at(block);
-                self.ask(w, possible_moves, decisions, process);
+                Self::ask(w, possible_moves, decisions, process);
             }
         }
         w.at(wrong);

@@ -80,7 +80,7 @@ impl RaceWriter<'_, '_> {
     pub(super) fn watch(&self, w: &mut Writer<'_>, watched: &Watched, delay: Option<Register>) {
         match *watched {
             Watched::Eventually(goal) | Watched::End(goal, _) => {
-                self.watch_for(w, Condition::Always, goal, delay)
+                self.watch_for(w, Condition::Always, goal, delay);
             }
             Watched::Always(keep) => self.watch_for(w, keep, Condition::Never, delay),
             Watched::Until(keep, goal) => self.watch_for(w, keep, goal, delay),

@@ -402,7 +402,11 @@ impl<R: Copy> Planning<'_, '_, R> {
                 if output.may_be_urgent {
                     return ask_at_end(b);
                 }
-                b.choose(is_over, |b| self.push_window(b, window, low), ask_at_end)
+                let push = |b: &mut B| {
+                    self.push_window(b, window, low);
+                    Ok(())
+                };
+                b.choose(is_over, push, ask_at_end)
             },
             |b| {
                 let is_later = b.compare_real_to(low, Relation::Greater, 0.0);
@@ -433,17 +437,17 @@ impl<R: Copy> Planning<'_, '_, R> {
             b.set_real(moment, first);
             return Ok(());
         }
-        self.push_window(b, window, low)
+        self.push_window(b, window, low);
+        Ok(())
     }
 
-    fn push_window<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, low: R) -> Flow<B> {
+    fn push_window<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, low: R) {
         let end = self.cut(b, window);
         let end = end.unwrap_or_else(|| b.real(f64::INFINITY));
         let number = b.window_count();
         b.set_window(number, low, end);
         let count = b.plus(number, 1);
         b.set_window_count(count);
-        Ok(())
     }
 
     /// Lets the moment come not later than a delay that is drawn in the windows.

@@ -1,0 +1,185 @@
+"""`ntagen plan --optimise`: learns a policy, and says how it compares with the best plan."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from ntagen.cli.needle.odds import Wanted
+from ntagen.cli.terminal import echo
+from ntagen.errors import InputError
+from ntagen.files import read_file, write_files
+
+if TYPE_CHECKING:
+    from ntagen.drive.settings import Settings
+    from ntagen.nsl import Task
+    from ntagen.plan.anytime import Best
+    from ntagen.plan.policy import Aim, Policy
+    from ntagen.plan.steering import Comparison, Mean, Steered
+    from ntagen.render import Seen
+    from ntagen.scene import Scene
+
+DEFAULT_RUNS: Final = 100_000
+"""From so many runs a policy is learned. A tenth of them compares it with the plan."""
+
+BUDGET_S: Final = 20.0
+"""The search for plans ends after this time, which is enough to end by itself: so the same seed
+gives the same policy."""
+
+_COMPARED_PART: Final = 10
+_PLANS: Final = 10
+"""A policy is learned around the best of so many plans."""
+
+_WORDS: Final = {
+    "probability": "reaches the target, and touches nothing",
+    "miss": "misses the target by",
+    "cut": "cuts",
+}
+_NONE: Final = 1
+_STOPPED: Final = 3
+
+
+def optimise(
+    task: Task,
+    aim: Aim,
+    wanted: Wanted,
+    budget_s: float | None,
+    output: Path | None,
+    *,
+    as_json: bool,
+) -> int:
+    """Learns a policy, prints what it is worth, and writes it; the exit code."""
+    from ntagen.drive.configure import configure
+    from ntagen.plan.chance import Sampling
+    from ntagen.plan.steering import steer
+
+    scene = task.scene
+    if not scene.tissue.is_stochastic:
+        raise InputError(
+            f"there is nothing to optimise in a tissue that is {scene.tissue.kind}\n"
+            "hint: write `tissue stochastic`, with its spreads if you know them"
+        )
+    settings = configure(task.given, scene).settings
+    best = _plans(scene, settings, BUDGET_S if budget_s is None else budget_s)
+    if best.verdict != "found":
+        return _say_none(best.verdict, as_json=as_json)
+    runs = DEFAULT_RUNS if wanted.runs is None else wanted.runs
+    sampling = Sampling(max(2, runs // _COMPARED_PART), wanted.seed, learning_runs=runs)
+    start_s = time.monotonic()
+    plans = [one.plan for one in best.candidates]
+    steered = steer(plans, scene, aim, seen_by(settings, scene), sampling)
+    seconds = time.monotonic() - start_s
+    if output is not None:
+        write_files({output: steered.policy.text()})
+    if as_json:
+        echo(json.dumps(_record(steered, aim, seconds)))
+        return 0
+    _show(steered, aim, wanted.seed, seconds)
+    if output is not None:
+        echo(f"policy written to {output}")
+    return 0
+
+
+def seen_by(settings: Settings, scene: Scene) -> Seen:
+    """How exactly the driver knows the tip when it asks a policy.
+
+    Of the bevel it knows no more than what the last roll may have erred.
+    """
+    from ntagen.render import Seen
+
+    priors = settings.priors
+    bevel_rad = math.hypot(priors.bevel_rad, scene.tissue.roll_rad)
+    return Seen(priors.noise_mm, priors.heading_rad, bevel_rad)
+
+
+def load_policy(path: Path, scene: Scene) -> Policy:
+    """The policy of a file for a task.
+
+    Raises:
+        InputError: There is none for it in the file.
+    """
+    from ntagen.plan.policy import MOST_BYTES, read_policy
+
+    try:
+        return read_policy(read_file(path, MOST_BYTES), scene)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _plans(scene: Scene, settings: Settings, budget_s: float) -> Best:
+    """The best plans by reserve, as for `--rank probability`."""
+    from ntagen.drive.settings import engine_for
+    from ntagen.plan.anytime import best_plans
+    from ntagen.plan.rank import split_ranking
+
+    _, criteria = split_ranking("probability")
+    engine = replace(engine_for(settings), ranking=criteria)
+    *_, last = best_plans(scene, engine, clock=time.monotonic, count=_PLANS, budget_s=budget_s)
+    return last
+
+
+def _say_none(verdict: str, *, as_json: bool) -> int:
+    is_proved = verdict == "none"
+    if as_json:
+        echo(json.dumps({"verdict": verdict}))
+    elif is_proved:
+        echo("no plan: it is proved that the model has none that holds, so there is no policy")
+    else:
+        echo("unknown: the budget ended before a plan was found, or proved not to exist")
+        echo("hint: give more time with --within")
+    return _NONE if is_proved else _STOPPED
+
+
+def _record(steered: Steered, aim: Aim, seconds: float) -> dict[str, object]:
+    return {
+        "verdict": "found",
+        "optimised": aim,
+        "plan": str(steered.plan),
+        "is_better": steered.aims[aim].is_better,
+        "aims": {name: asdict(one) for name, one in steered.aims.items()},
+        "learning_runs": steered.learning_runs,
+        "seconds": seconds,
+    }
+
+
+def _show(steered: Steered, aim: Aim, seed: int, seconds: float) -> None:
+    chosen = steered.aims[aim]
+    echo(f"the best plan: {steered.plan}")
+    echo(
+        f"a policy was learned around it from {steered.learning_runs:,} runs with seed {seed} "
+        f"in {seconds:.1f} s"
+    )
+    echo(
+        f"{chosen.runs:,} tissues that learning has not seen, the same for both; each interval "
+        f"holds at {chosen.confidence:.4g} confidence:"
+    )
+    for name, one in steered.aims.items():
+        mark = " (optimised)" if name == aim else ""
+        echo(f"  {_WORDS[name]}{mark}")
+        echo(f"    the plan:   {_span(one.plan, name)}")
+        echo(f"    the policy: {_span(one.policy, name)}")
+        echo(f"    difference: {_span(_signed(one, name), name, sign='+')}, {_judged(one)}")
+
+
+def _signed(one: Comparison, aim: str) -> Mean:
+    """The policy's value less the plan's."""
+    gain = one.difference
+    if aim == "probability":
+        return gain
+    return replace(gain, value=-gain.value, lower=-gain.upper, upper=-gain.lower)
+
+
+def _judged(one: Comparison) -> str:
+    if one.is_better:
+        return "better"
+    return "worse" if one.difference.upper < 0.0 else "not better"
+
+
+def _span(mean: Mean, aim: str, sign: str = "") -> str:
+    scale, unit = (100.0, " %") if aim == "probability" else (1.0, " mm")
+    value, lower, upper = (scale * one for one in (mean.value, mean.lower, mean.upper))
+    return f"{value:{sign}.4g}{unit} (from {lower:{sign}.4g} to {upper:{sign}.4g}{unit})"

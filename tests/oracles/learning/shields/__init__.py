@@ -1,0 +1,1 @@
+"""Hybrid models for which others have made shields, written afresh."""
