@@ -37,6 +37,8 @@ myst_heading_anchors = 4
 myst_fence_as_directive = ["mermaid"]
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
+# The reference can be made without what is optional.
+autodoc_mock_imports = ["gymnasium"]
 suppress_warnings = ["myst.header"]
 
 _ARCHITECTURE = "checker/ARCHITECTURE.md"

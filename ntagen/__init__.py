@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ntagen import build as build
+    from ntagen import gymnasium as gymnasium
     from ntagen.checker import Answer, Model, RejectedError
     from ntagen.checker.strategy import Strategy
     from ntagen.drive.reading import read_log
@@ -51,6 +52,7 @@ _HOMES = {
         "ntagen.checker": ("Answer", "Model", "RejectedError"),
         "ntagen.checker.strategy": ("Strategy",),
         "ntagen.drive.reading": ("read_log",),
+        "ntagen.gymnasium": ("gymnasium",),
         "ntagen.errors": ("InputError", "ModelError", "NtagenError", "UndecidedError"),
         "ntagen.experiment.scripting": ("campaign",),
         "ntagen.loading": ("load", "load_strategy"),

@@ -1,6 +1,6 @@
 """Stub of the Rust engine's Python module; see ``checker/src/python.rs`` and the files below it."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Literal, final
 
@@ -9,12 +9,14 @@ from ntagen.checker.options import Options
 __all__ = [
     "PARTS",
     "Answer",
+    "Environment",
     "ExactWalk",
     "FailedError",
     "InterruptedError",
     "LearnedStrategy",
     "LongText",
     "Model",
+    "Moment",
     "Plans",
     "Play",
     "RejectedError",
@@ -24,6 +26,7 @@ __all__ = [
     "check",
     "check_jointly",
     "explanations",
+    "follow",
     "form_of_query",
     "load",
     "simulate",
@@ -216,6 +219,31 @@ class LearnedStrategy:
     def keep(self, name: str) -> None: ...
 
 @final
+class Moment:
+    @property
+    def values(self) -> list[float]: ...
+    @property
+    def possible(self) -> list[bool]: ...
+    @property
+    def time(self) -> float: ...
+    @property
+    def worth(self) -> float: ...
+    @property
+    def end(self) -> Literal["goal", "bound"] | None: ...
+
+@final
+class Environment:
+    def __new__(
+        cls, model: Model, query: str, before: list[str], wait: float | None
+    ) -> Environment: ...
+    def actions(self) -> list[str]: ...
+    def features(self) -> tuple[list[str], list[str]]: ...
+    @property
+    def is_greatest(self) -> bool: ...
+    def begin(self, seed: int, run: int) -> Moment: ...
+    def act(self, action: int) -> Moment: ...
+
+@final
 class Play:
     @property
     def length(self) -> int: ...
@@ -235,6 +263,13 @@ def check_jointly(
 def block_of_runs(model: Model, query: str, options: Options, first: int, count: int) -> bytes: ...
 def simulate(model: Model, engine: str) -> Simulation: ...
 def walk_exactly(model: Model) -> ExactWalk: ...
+def follow(
+    model: Model,
+    name: str,
+    features: str,
+    wait: float | None,
+    decide: Callable[[list[float], list[bool]], int],
+) -> list[str]: ...
 def form_of_query(text: str) -> tuple[str, str | None, str | None, bool] | None: ...
 def explanations() -> list[tuple[str, str, str, str]]: ...
 def load(path: str, pieces: Iterable[bytes], allow_external: Sequence[Path]) -> Model: ...

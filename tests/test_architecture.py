@@ -77,9 +77,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
+    "checker.policy": {"errors"},
+    "checker.stepwise": {"errors", "checker.errors", "_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
-    | {"checker.constants"}
+    | {"checker.constants", "checker.policy", "checker.stepwise"}
     | {"checker.options", "checker.queries", "checker.states"}
     | {"checker.state_space", "checker.strategy"},
     "checker": {"checker.answer", "checker.edges", "checker.errors", "checker.model"}
@@ -89,6 +91,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
+    "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "serve": {"errors"},
     "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
@@ -184,6 +187,7 @@ ONLY_IN: dict[str, set[str]] = {
     "matplotlib": {"checker.picture", "experiment", "plot"},
     "scipy": {"experiment", "imaging", "needle", "plan", "traces"},
     "nibabel": {"imaging"},
+    "gymnasium": {"gymnasium"},
     "dask": {"cluster"},
     "distributed": {"cluster"},
     "mcap": {"drive"},
@@ -368,6 +372,7 @@ def test_the_compiled_engine_has_one_door(module: str) -> None:
         "checker.learned",
         "checker.play",
         "checker.queries",
+        "checker.stepwise",
         "checker.strategy",
     }
 

@@ -11,6 +11,7 @@ mod model;
 mod options;
 mod plans;
 mod play;
+mod policies;
 mod walks;
 
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ use crate::tuning::PARTS;
 use answer::{Answer, InterruptedError, block_of_runs, check, check_jointly};
 use convert::{FailedError, RejectedError, rejected, until_signal_apart};
 use model::Model;
+use policies::follow;
 use walks::{ExactWalk, Simulation, simulate, walk_exactly};
 
 /// Loads a model from its bytes, which come in pieces so that they are in memory once; `path` names
@@ -81,6 +83,8 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<play::Strategy>()?;
     module.add_class::<play::Play>()?;
     module.add_class::<learned::LearnedStrategy>()?;
+    module.add_class::<policies::Environment>()?;
+    module.add_class::<policies::Moment>()?;
     module.add_class::<plans::Plans>()?;
     module.add_class::<long_text::LongText>()?;
     module.add("FailedError", module.py().get_type::<FailedError>())?;
@@ -95,6 +99,7 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(block_of_runs, module)?)?;
     module.add_function(wrap_pyfunction!(simulate, module)?)?;
     module.add_function(wrap_pyfunction!(walk_exactly, module)?)?;
+    module.add_function(wrap_pyfunction!(follow, module)?)?;
     module.add_function(wrap_pyfunction!(form_of_query, module)?)?;
     module.add_function(wrap_pyfunction!(load, module)?)?;
     module.add_function(wrap_pyfunction!(explanations, module)?)

@@ -30,9 +30,11 @@ if TYPE_CHECKING:
         Template,
         Variable,
     )
+    from ntagen.checker.policy import Follower, Policy
     from ntagen.checker.runs import Choose, Run
     from ntagen.checker.state_space import StateSpace
     from ntagen.checker.states import Simulation, SymbolicState
+    from ntagen.checker.stepwise import StepwiseRuns
     from ntagen.checker.strategy import ForcedRule, PriorityRule, Strategy, Verification
 
 OverflowRule = Literal["wrap", "error"]
@@ -57,6 +59,7 @@ class Model:
         self._raw = raw
         self._edges = EdgeTable(raw.edges)
         self._facts: Facts | None = None
+        self._followers: dict[str, Follower] = {}
 
     @property
     def overflow(self) -> OverflowRule:
@@ -233,13 +236,82 @@ class Model:
 
     def answer(self, query: str, options: Options) -> Answer:
         """Answers a query as `check` does, with all options as one value."""
+        if any(one.is_asked for one in self._followers.values()):
+            # The model answers a query until the policy has decided.
+            raise InputError("a policy must not ask the model that is asked under it")
         try:
             with rejecting():
                 raw = _checker.check(self._raw, query, options)
         except _checker.InterruptedError as interrupted:
             answer = Answer(interrupted.args[0], query, self._edges, options)
             raise Interrupted(answer) from None
+        except RejectedError as error:
+            form = form_of(query) if self._followers else None
+            follower = self._followers.get(form.uses or "") if form else None
+            raised = follower.taken() if follower else None
+            if raised is None:
+                raise
+            if not isinstance(raised, Exception):
+                # The user has interrupted the policy.
+                raise raised from None
+            raise error from raised
         return Answer(raw, query, self._edges, options)
+
+    def stepwise(
+        self, query: str, *, strategies: Sequence[str] = (), wait: float | None = None
+    ) -> StepwiseRuns:
+        """Random runs in which the caller decides for the controller.
+
+        `ntagen.gymnasium.Environment`, which is made of them, explains the arguments.
+
+        Raises:
+            RejectedError: A query is wrong, or nothing is there to be decided.
+            InputError: `wait` is no positive number.
+        """
+        from ntagen.checker.policy import checked_wait
+        from ntagen.checker.stepwise import StepwiseRuns
+
+        checked_wait(wait)
+        with rejecting():
+            return StepwiseRuns(_checker.Environment(self._raw, query, list(strategies), wait))
+
+    def follow(
+        self, name: str, policy: Policy, features: str, *, wait: float | None = None
+    ) -> tuple[str, ...]:
+        """Makes a policy available to later queries: ``Pr[<=9](<> p) under Agent``.
+
+        In their runs the policy decides for the controller, as an agent does in
+        `ntagen.gymnasium.Environment` with the same features: it gets an observation, and returns
+        the number of an action. ``Pr``, ``E`` and ``simulate`` can be asked under it, and all other
+        queries are refused. Runs take one thread, and come in the order of their numbers. The
+        policy must not ask this model anything.
+
+        Args:
+            name: The name of the policy in queries, such as ``"Agent"``.
+            policy: An object with ``predict(observation, deterministic=True)``, which returns the
+                action and something else, as the policies and algorithms of stable-baselines3; or
+                a function of the observation and the mask of actions, which returns the action.
+            features: What it sees: ``"{exact} -> {intervals}"``.
+            wait: After how many units of time it is asked again at the latest, if a clock is among
+                the features; then it must be given.
+
+        Returns:
+            The texts of the actions, by their numbers; the last one is ``WAIT``.
+
+        Raises:
+            RejectedError: The features are wrong, `wait` is missing, or there is nothing to decide.
+            InputError: The name is no name, `wait` is no positive number, or this is no policy.
+        """
+        from ntagen.checker.policy import Follower, checked_wait
+
+        if not (name.isascii() and name.isidentifier()):
+            raise InputError(f"{name!r} is no name: use letters, digits and underscores")
+        checked_wait(wait)
+        follower = Follower(policy)
+        with rejecting():
+            actions = _checker.follow(self._raw, name, features, wait, follower)
+        self._followers[name] = follower
+        return tuple(actions)
 
     def block_of_runs(self, query: str, first: int, count: int, options: Options) -> bytes:
         """Makes random runs of ``Pr`` or ``E``, for whoever answers the query elsewhere.

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::answer::{Answer, Verdict};
 use super::limits::LimitWatch;
-use super::loaded_model::{LoadedModel, NamedStrategy, PreparedQuery};
+use super::loaded_model::{Decider, LoadedModel, NamedStrategy, PreparedQuery};
 use super::options::Options;
 use super::query_form::unnamed;
 use super::rejection::Rejection;
@@ -14,7 +14,6 @@ use crate::diagnostics::Span;
 use crate::exec::RunTimeError;
 use crate::game::strategy::Under;
 use crate::ir::{Overflow, Query, QueryKind, RunTimeErrorKind, SiteId};
-use crate::learning::LearnedStrategy;
 use crate::network::Failure;
 use crate::semantics::Reading;
 use crate::shield::Shield;
@@ -25,11 +24,14 @@ use crate::syntax::ast::QueryText;
 struct FollowedStrategies {
     /// The strategy that the controller stays within.
     under: Option<Arc<Under>>,
-    /// The learned one that it follows.
-    learned: Option<Arc<LearnedStrategy>>,
+    /// Who decides in random runs.
+    decider: Option<Decider>,
     /// The shield that it stays within.
     shield: Option<Arc<Shield>>,
 }
+
+/// A query whose code is ready, with its warnings; or the answer if a limit came before.
+type Ready = Result<(PreparedQuery, Vec<String>), Box<Answer>>;
 
 impl LoadedModel {
     /// Answers a query.
@@ -55,6 +57,18 @@ impl LoadedModel {
     }
 
     fn check_once(&mut self, span: Span, options: &Options) -> Result<Answer, Rejection> {
+        let (prepared, warnings) = match self.make_ready(span, options)? {
+            Ok(ready) => ready,
+            Err(answer) => return Ok(*answer),
+        };
+        let mut answer = self.answer(&prepared)?;
+        answer.warnings = warnings;
+        answer.load_seconds = self.load_seconds;
+        Ok(answer)
+    }
+
+    /// Compiles a query, and makes its code ready.
+    pub(super) fn make_ready(&mut self, span: Span, options: &Options) -> Result<Ready, Rejection> {
         let start = Instant::now();
         let (reading, names) = (self.reading_of(span), self.strategy_names());
         let (query, warnings) = self.compile_in(reading, span, &names)?;
@@ -67,35 +81,37 @@ impl LoadedModel {
         let start = Instant::now();
         let FollowedStrategies {
             under,
-            learned,
+            decider,
             shield,
         } = match self.followed(&query, options)? {
             Ok(followed) => followed,
             Err(answer) => {
-                return Ok(Answer {
+                return Ok(Err(Box::new(Answer {
                     warnings,
                     load_seconds: self.load_seconds,
                     ..*answer
-                });
+                })));
             }
         };
+        let mut options = options.left_since(start);
+        if matches!(decider, Some(Decider::Policy(_))) {
+            // It may remember what it was asked: it is asked in the order of runs.
+            options.threads = 1;
+        }
         let prepared = PreparedQuery {
             query,
-            options: options.left_since(start),
+            options,
             guide,
             level,
             under,
-            learned,
+            decider,
             shield,
         };
         self.refuse_unsupported(&prepared)?;
-        let mut answer = match self.prepare_in_time(reading, span, &prepared.options)? {
-            Some(cut) => return Ok(cut),
-            None => self.answer(&prepared)?,
-        };
-        answer.warnings = warnings;
-        answer.load_seconds = self.load_seconds;
-        Ok(answer)
+        match self.prepare_in_time(reading, span, &prepared.options)? {
+            Some(cut) => Ok(Err(Box::new(cut))),
+            None => Ok(Ok((prepared, warnings))),
+        }
     }
 
     /// What a query under a strategy follows.
@@ -107,13 +123,19 @@ impl LoadedModel {
         let Some(name) = &query.under else {
             return Ok(Ok(FollowedStrategies::default()));
         };
+        let is_symbolic = !matches!(
+            query.kind,
+            QueryKind::Statistical(_) | QueryKind::Optimum(_)
+        );
+        if let Some(policy) = self.policy(name, query, is_symbolic)? {
+            return Ok(Ok(FollowedStrategies {
+                decider: Some(Decider::Policy(policy)),
+                ..FollowedStrategies::default()
+            }));
+        }
         if let Some(named) = self.strategy(name)
             && (named.learned.is_some() || named.shield.is_some())
         {
-            let is_symbolic = !matches!(
-                query.kind,
-                QueryKind::Statistical(_) | QueryKind::Optimum(_)
-            );
             if let (true, Some(learned), None) = (is_symbolic, &named.learned, &named.shield) {
                 let learned = Arc::clone(learned);
                 let in_zones = self.learned_in_zones(name, &learned, query, options)?;
@@ -124,7 +146,7 @@ impl LoadedModel {
             }
             return Ok(Ok(FollowedStrategies {
                 under: named.within.clone(),
-                learned: named.learned.clone(),
+                decider: named.learned.clone().map(Decider::Learned),
                 shield: named.shield.clone(),
             }));
         }

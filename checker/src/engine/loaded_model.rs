@@ -15,7 +15,7 @@ use crate::exec::{Executor, Libraries};
 use crate::game::strategy::freedom::Freedom;
 use crate::game::strategy::{Strategy, Under};
 use crate::ir::{FunctionId, Measure, Network, Overflow, Query};
-use crate::learning::LearnedStrategy;
+use crate::learning::{LearnedStrategy, SeeingPolicy};
 use crate::semantics::{self, FIRST_POOL, Reading};
 use crate::shield::Shield;
 use crate::syntax::{
@@ -408,6 +408,8 @@ pub struct NamedStrategy {
     pub(crate) permitted: Option<Permitted>,
     /// The strategy, if it was learned.
     pub learned: Option<Arc<LearnedStrategy>>,
+    /// The policy, if somebody else decides.
+    pub(crate) policy: Option<Arc<SeeingPolicy>>,
     /// The strategy that a learned one refines.
     pub(crate) within: Option<Arc<Under>>,
     /// The shield, if it is one; or the one that a learned strategy refines.
@@ -427,10 +429,17 @@ pub(crate) struct PreparedQuery {
     pub(crate) level: Option<FunctionId>,
     /// What the query is asked under.
     pub(crate) under: Option<Arc<Under>>,
-    /// The learned strategy that it is asked under.
-    pub(crate) learned: Option<Arc<LearnedStrategy>>,
+    /// Who decides in its runs, if it is asked under a learned strategy or a policy.
+    pub(crate) decider: Option<Decider>,
     /// The shield that it is asked under, or that the learned strategy refines.
     pub(crate) shield: Option<Arc<Shield>>,
+}
+
+/// Who decides for the controller in random runs.
+#[derive(Clone, Debug)]
+pub(crate) enum Decider {
+    Learned(Arc<LearnedStrategy>),
+    Policy(Arc<SeeingPolicy>),
 }
 
 /// What a query under a strategy follows.
@@ -451,6 +460,7 @@ impl NamedStrategy {
             definition: None,
             permitted: None,
             learned: None,
+            policy: None,
             within: None,
             shield: None,
             in_zones: None,

@@ -34,11 +34,11 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         self.refuse_contradiction(query, &options.precision)?;
         let control = match &query.kind {
-            QueryKind::Optimum(_) if prepared.learned.is_some() => {
+            QueryKind::Optimum(_) if prepared.decider.is_some() => {
                 return Err(self.refusal(
                     codes::UNSUPPORTED_QUERY,
                     query.span,
-                    "a best strategy within a learned one is not supported",
+                    "a best strategy within a learned one, or within a policy, is not supported",
                     "ask under the strategy that the learned one refines, or without `under`",
                 ));
             }

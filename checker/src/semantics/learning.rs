@@ -59,7 +59,7 @@ impl Checker<'_> {
     }
 
     /// Checks and lowers what a strategy sees.
-    fn features(&mut self, features: &ast::Features) -> Option<Observation> {
+    pub(super) fn features(&mut self, features: &ast::Features) -> Option<Observation> {
         let mut seen = |list: &[ast::Expr], is_discrete| {
             let all: Vec<_> = list
                 .iter()

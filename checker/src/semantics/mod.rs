@@ -236,6 +236,15 @@ impl Model {
         self.compile(sources, |checker| checker.feature(expr, is_discrete))
     }
 
+    /// Checks and lowers all that a strategy sees, in the stochastic reading.
+    pub(crate) fn compile_features(
+        &mut self,
+        features: &ast::Features,
+        sources: &SourceMap,
+    ) -> (Option<ir::Observation>, Vec<Diagnostic>) {
+        self.compile(sources, |checker| checker.features(features))
+    }
+
     /// Adds what a query brings to the network.
     fn compile<T>(
         &mut self,

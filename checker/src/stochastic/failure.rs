@@ -50,6 +50,8 @@ pub enum Failure {
     ValueOutOfBounds(f64),
     /// The strategy demands a move that is not possible.
     ImpossibleDemand,
+    /// Who decides for the controller has not decided.
+    NoDecision,
     /// The same run went another way when it was made again.
     NotRepeatable,
     /// A comparison changes more often than numbers can tell apart.

@@ -60,7 +60,7 @@ pub use race::NotFinite;
 pub use rare::{Rare, Splitting, estimate_rare};
 pub use repeatable::is_repeatable;
 pub use restriction::{Restriction, UnderChoice, Unfit};
-pub use run::{Runner, Trajectory};
+pub use run::{Ended, Runner, Trajectory};
 pub use run_id::RunId;
 pub use run_watch::{RunWatch, Shown};
 pub use samples::{Distribution, Histogram, MOST_BINS, MOST_VALUES, Samples};

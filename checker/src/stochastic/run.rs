@@ -8,11 +8,11 @@ use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
-use super::control::{Chooser, Control, ControllerMove};
+use super::control::{Chooser, Control, ControllerMove, StateView};
 use super::entry::entry;
 use super::failure::Failure;
 use super::machine::Machine;
-use super::observer::{Observer, Outcome, watched};
+use super::observer::{Observer, Outcome, aim_of, watched};
 use super::program::Program;
 use super::race::Race;
 use super::race_code::{RaceCode, Stages, Watched};
@@ -20,7 +20,7 @@ use super::restriction::Entry;
 use super::run_id::RunId;
 use crate::cancellation;
 use crate::exec::Executor;
-use crate::ir::{Asked, Network, Part, Path, RunBound, RunLimit, Simulation};
+use crate::ir::{Asked, Network, Optimum, Part, Path, RunBound, RunLimit, Simulation};
 
 /// The values of expressions during a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +36,19 @@ pub struct Trajectory {
 
 /// Values that are not linear are shown so many times over a run.
 const SAMPLES: f64 = 300.0;
+
+/// The end of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended<T> {
+    /// Whether its goal is reached.
+    pub is_reached: bool,
+    /// What it is worth.
+    pub value: f64,
+    /// How long it has lasted.
+    pub time: f64,
+    /// What is seen of its last state.
+    pub seen: T,
+}
 
 /// From so many moments of an expression on, every second one is left out.
 const MOST_POINTS: usize = 100_000;
@@ -190,12 +203,7 @@ impl<'a> Runner<'a> {
             return Ok(outcome);
         }
         let mut observer = Observer::new(&self.program, asked);
-        let mut decided = None;
-        self.until_bound(id, bound, &mut |race, delay| {
-            decided = observer.look(race, delay)?;
-            Ok(decided.is_some())
-        })?;
-        let (value, ahead) = match decided {
+        let (value, ahead) = match self.until_decided(id, bound, &mut observer)? {
             Some((satisfied, ahead)) => {
                 (observer.decided(&mut self.race, satisfied, ahead)?, ahead)
             }
@@ -209,6 +217,44 @@ impl<'a> Runner<'a> {
             time: self.race.time + ahead,
             moves: self.race.moves,
             at: position(&self.race, bound, ahead),
+        })
+    }
+
+    /// Makes a run until what is asked of it is decided: whether it has that, and how much later
+    /// than the state says.
+    fn until_decided(
+        &mut self,
+        id: RunId,
+        bound: &RunBound,
+        observer: &mut Observer<'_>,
+    ) -> Result<Option<(bool, f64)>, Failure> {
+        let mut decided = None;
+        self.until_bound(id, bound, &mut |race, delay| {
+            decided = observer.look(race, delay)?;
+            Ok(decided.is_some())
+        })?;
+        Ok(decided)
+    }
+
+    /// A run until its goal or its bound, and what is seen of its last state.
+    ///
+    /// # Errors
+    /// The run failed.
+    pub fn to_end<T>(
+        &mut self,
+        id: RunId,
+        asked: &Optimum,
+        see: impl FnOnce(&mut StateView<'_>) -> Result<T, Failure>,
+    ) -> Result<Ended<T>, Failure> {
+        let mut observer = Observer::new(&self.program, Asked::End(asked));
+        let decided = self.until_decided(id, &asked.bound, &mut observer)?;
+        let (is_reached, ahead) = decided.unwrap_or((false, 0.0));
+        let race = &mut self.race;
+        Ok(Ended {
+            is_reached,
+            value: aim_of(race, asked.aim, is_reached, ahead)?,
+            time: race.time + ahead,
+            seen: race.look_ahead(ahead, |machine| see(&mut machine.view_of_state()))?,
         })
     }
 

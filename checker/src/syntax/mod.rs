@@ -70,8 +70,8 @@ use crate::diagnostics::{Diagnostic, Source, SourceMap, Span, Text};
 
 pub use prelude::prelude;
 pub use print::{print_dimension, print_expr, print_type};
-pub(crate) use queries::parse_expression;
 pub use queries::{add_query_text, parse_query};
+pub(crate) use queries::{parse_expression, parse_features};
 pub use tables::{Piece, TableReader};
 
 /// A model as read: the tree is complete where no diagnostic says otherwise.

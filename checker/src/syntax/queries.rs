@@ -2,7 +2,8 @@
 //! by name only.
 
 use super::ast::{
-    Control, Expr, ExprKind, Extremum, Name, Objective, ObservedPredicate, Query, QueryKind,
+    Control, Expr, ExprKind, Extremum, Features, Name, Objective, ObservedPredicate, Query,
+    QueryKind,
 };
 use super::codes;
 use super::expressions::{join_all, level};
@@ -45,6 +46,21 @@ pub(crate) fn parse_expression(span: Span, sources: &SourceMap) -> (Option<Expr>
     }
     let is_right = !diagnostics.iter().any(Diagnostic::is_error);
     (is_right.then_some(expr), diagnostics)
+}
+
+/// Parses the features that stand at `span`, `{d} -> {c}`; there is no tree if anything was wrong.
+pub(crate) fn parse_features(
+    span: Span,
+    sources: &SourceMap,
+) -> (Option<Features>, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let mut parser = Parser::new(span, sources, Dialect::Query, &mut diagnostics);
+    let features = parser.features();
+    if features.is_none() || !parser.at_end() {
+        parser.expected("features such as `{a, P.location} -> {x}`, and nothing else");
+    }
+    let is_right = !diagnostics.iter().any(Diagnostic::is_error);
+    (features.filter(|_| is_right), diagnostics)
 }
 
 /// Adds a query given as bare text as a source of its own and returns its span.

@@ -21,7 +21,6 @@ use crate::engine::rejection::Rejection;
 use crate::ir::{Feature, FeatureTexts, Network, Observation, Part, Seen, Shape};
 use crate::learning::LearnedStrategy;
 use crate::semantics::Reading;
-use crate::stochastic::{Behaviour, Runner};
 use crate::syntax;
 
 const SEE_FEATURES: &str =
@@ -71,6 +70,13 @@ impl LoadedModel {
         learned_code::write(network, strategy, language, name, query)
     }
 
+    /// The texts of all actions of the controller; the last one is to wait.
+    pub(in crate::engine) fn all_actions(&self) -> Vec<String> {
+        let moves = self.moves_of_controller();
+        let parts: Vec<Part> = moves.iter().map(|one| one.part).collect();
+        learned_actions::texts(self.network_of_runs(), &parts)
+    }
+
     /// The texts of the actions of a learned strategy.
     pub fn learned_actions(&self, strategy: &LearnedStrategy) -> Vec<String> {
         learned_actions::texts(self.network_of_runs(), &strategy.moves)
@@ -95,9 +101,7 @@ impl LoadedModel {
             Err(mismatch) => return Ok(Err(mismatch)),
         };
         self.prepare_code(Reading::Stochastic, options.code, options.tuning, span)?;
-        let compiled = self.stochastic.as_ref().expect(ANALYSED);
-        let runner = Runner::of(Behaviour::new(compiled.network(), compiled.executor()));
-        let moves = runner.moves_of_controller();
+        let moves = self.moves_of_controller();
         Ok(Ok(Meaning {
             observation,
             moves: moves.iter().map(|one| one.part).collect(),
@@ -119,7 +123,7 @@ impl LoadedModel {
     }
 
     /// What the features of a file are in this model.
-    fn observation_of(&mut self, texts: &FeatureTexts) -> Result<Observation, Mismatch> {
+    pub(super) fn observation_of(&mut self, texts: &FeatureTexts) -> Result<Observation, Mismatch> {
         let mut seen = |texts: &[String], list: &str, is_discrete: bool| {
             let features = texts.iter().enumerate().map(|(index, text)| {
                 self.feature_of(text, is_discrete).map_err(|why| Mismatch {
@@ -154,6 +158,7 @@ impl LoadedModel {
     /// Compiles again what learned strategies and shields see, where the model is analysed anew:
     /// code and places of variables are others then.
     pub(in crate::engine) fn renew_learned(&mut self) -> Result<(), Rejection> {
+        self.renew_policies()?;
         for index in 0..self.strategies.len() {
             if let Some(shield) = self.strategies[index].shield.take() {
                 self.expect_stochastic()?;

@@ -64,6 +64,9 @@ impl LoadedModel {
         if let Some(strategy) = named.and_then(|one| one.strategy.clone()) {
             return Ok(strategy);
         }
+        if named.is_some_and(|one| one.policy.is_some()) {
+            return Err(self.only_in_runs(name, span));
+        }
         let Some(definition) = named.and_then(|one| one.definition.clone()) else {
             let reason = match named {
                 Some(one) if one.learned.is_some() => {

@@ -127,7 +127,7 @@ impl LoadedModel {
             guide: None,
             level: None,
             under: Some(Arc::new(under)),
-            learned: None,
+            decider: None,
             shield: None,
         };
         self.answer_in_zones(&asked, None).verdict

@@ -30,10 +30,10 @@ pub(super) fn has_libraries(network: &Network) -> bool {
 /// Calls the hooks of libraries that begin runs, and when it is dropped those that end them: also
 /// where runs are cut off.
 #[must_use]
-pub(super) struct Hooks<'n>(&'n Network);
+pub(in crate::engine) struct Hooks<'n>(&'n Network);
 
 impl Hooks<'_> {
-    fn new(network: &Network) -> Hooks<'_> {
+    pub(in crate::engine) fn new(network: &Network) -> Hooks<'_> {
         let begin = network.externals.iter().filter_map(|one| one.begin);
         begin.for_each(call_hook);
         Hooks(network)

@@ -9,7 +9,7 @@ pub(super) mod game;
 pub(super) mod game_zones;
 pub mod joint;
 mod learned_zones;
-mod libraries;
+pub(super) mod libraries;
 pub(super) mod liveness;
 pub(super) mod optimal_trace;
 mod optimum;

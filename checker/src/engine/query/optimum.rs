@@ -8,7 +8,7 @@ use super::statistical::{precision_of, without_runs};
 use super::watched_runs::SHOW_EVERY;
 use crate::engine::answer::{Answer, Optimised, Verdict};
 use crate::engine::limits::LimitWatch;
-use crate::engine::loaded_model::{ANALYSED, LoadedModel, NamedStrategy, PreparedQuery};
+use crate::engine::loaded_model::{ANALYSED, Decider, LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::{RunObserver, RunsSoFar};
 use crate::engine::query_form::unnamed;
 use crate::engine::rejection::Rejection;
@@ -19,7 +19,9 @@ use crate::learning::{
 };
 use crate::search::limits::{Counters, StopReason, Watch as _};
 use crate::stochastic::statistics::{Interval, Method};
-use crate::stochastic::{Behaviour, Estimate, Failure, Fence, NotFinite, Runner, Stand};
+use crate::stochastic::{
+    Behaviour, ControllerMove, Estimate, Failure, Fence, Guidance, NotFinite, Runner, Stand,
+};
 
 /// The numbers of the runs that say what a strategy is worth: learning never uses them.
 const FRESH: u64 = 1 << 41;
@@ -78,11 +80,20 @@ impl LoadedModel {
         });
     }
 
-    /// A learned strategy, prepared to be followed in random runs.
-    pub(super) fn followed_in_runs(&self, strategy: &Arc<LearnedStrategy>) -> Followed {
+    /// Who decides, prepared to be followed in random runs.
+    pub(super) fn followed_in_runs(&self, decider: &Decider) -> Box<dyn Guidance> {
+        let moves = self.moves_of_controller();
+        match decider {
+            Decider::Learned(strategy) => Box::new(Followed::new(strategy, &moves)),
+            Decider::Policy(policy) => Box::new(policy.followed(&moves)),
+        }
+    }
+
+    /// The moves that the controller may make in random runs; the code is ready.
+    pub(in crate::engine) fn moves_of_controller(&self) -> Vec<ControllerMove> {
         let compiled = self.stochastic.as_ref().expect(ANALYSED);
         let behaviour = Behaviour::new(compiled.network(), compiled.executor());
-        Followed::new(strategy, &Runner::of(behaviour).moves_of_controller())
+        Runner::of(behaviour).moves_of_controller()
     }
 }
 

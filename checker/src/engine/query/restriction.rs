@@ -7,7 +7,7 @@ use crate::stochastic::{Restriction, Unfit};
 
 impl LoadedModel {
     /// What the strategy of a statistical query allows; `None` if the query names none.
-    pub(super) fn restriction(
+    pub(in crate::engine) fn restriction(
         &self,
         prepared: &PreparedQuery,
     ) -> Result<Option<Restriction>, Rejection> {

@@ -37,7 +37,7 @@ impl LoadedModel {
     }
 
     /// Why a random run has no result.
-    fn run_fails(&self, failure: &Failure, query: &Query) -> Rejection {
+    pub(in crate::engine) fn run_fails(&self, failure: &Failure, query: &Query) -> Rejection {
         let network = self.stochastic.as_ref().expect(ANALYSED).network();
         let span = span_of(network, failure, query);
         let kind = match failure {
@@ -47,7 +47,8 @@ impl LoadedModel {
         let (message, help) = match kind {
             Some(RunTimeErrorKind::NoRoom) => (
                 format!(
-                    "a random run has more than {GREATEST_POOL} instances of '{}' at a time",
+                    "a random run has more than {} instances of '{}' at a time",
+                    self.pool,
                     self.sources.text(span)
                 ),
                 "let instances end with exit(), or bound the run: spawn seems to have no end"
@@ -56,6 +57,10 @@ impl LoadedModel {
             Some(RunTimeErrorKind::NotLoaded) => (
                 "a random run calls this function of a library that is not allowed".to_owned(),
                 self.how_to_allow(network),
+            ),
+            None if *failure == Failure::NoDecision => (
+                self.why_undecided(query),
+                help_for(failure, query).to_owned(),
             ),
             _ => (
                 message_of(network, failure),
@@ -112,6 +117,7 @@ fn span_of(network: &Network, failure: &Failure, query: &Query) -> Span {
         | Failure::NoBest
         | Failure::NeverEnds
         | Failure::NoNumber
+        | Failure::NoDecision
         | Failure::NotRepeatable => query.span,
     }
 }
@@ -182,6 +188,7 @@ fn message_of(network: &Network, failure: &Failure) -> String {
         Failure::NoNumber => {
             "the value of the expression is no finite number in some run".to_owned()
         }
+        Failure::NoDecision => "who decides for the controller has not decided".to_owned(),
         Failure::NotRepeatable => {
             let functions = network.externals.iter().flat_map(|one| &one.functions);
             let names: Vec<String> = functions.map(|name| format!("'{name}'")).collect();
@@ -236,6 +243,9 @@ fn help_for(failure: &Failure, query: &Query) -> &'static str {
         }
         Failure::NoNumber => {
             "keep arguments of functions in their domains, and divisors away from 0"
+        }
+        Failure::NoDecision => {
+            "let the policy return the number of an action, as for ntagen.gymnasium.Environment"
         }
         Failure::NotRepeatable => {
             "let functions of libraries return the same for the same arguments"

@@ -121,7 +121,7 @@ impl LoadedModel {
     }
 
     /// A shield, prepared for random runs.
-    pub(super) fn barrier(&self, shield: &Arc<Shield>) -> Barrier {
+    pub(in crate::engine) fn barrier(&self, shield: &Arc<Shield>) -> Barrier {
         let compiled = self.stochastic.as_ref().expect(ANALYSED);
         let behaviour = Behaviour::new(compiled.network(), compiled.executor());
         Barrier::new(shield, &Runner::of(behaviour).moves_of_controller())

@@ -16,8 +16,8 @@ use crate::ir::{RunTimeErrorKind, Statistical};
 use crate::search::limits::{Counters, StopReason};
 use crate::stochastic::statistics::{Decision, Method};
 use crate::stochastic::{
-    Behaviour, Failure, Fence, Guidance, MeanMethod, Precision, Restriction, RunWatch as _, Runs,
-    block, compare, estimate, estimate_rare, simulate,
+    Behaviour, Failure, Fence, MeanMethod, Precision, Restriction, RunWatch as _, Runs, block,
+    compare, estimate, estimate_rare, simulate,
 };
 
 /// What is said if the first run takes too long.
@@ -33,13 +33,11 @@ impl LoadedModel {
         let PreparedQuery { query, options, .. } = prepared;
         let start = Instant::now();
         let restriction = self.restriction(prepared)?;
-        let followed = prepared
-            .learned
-            .as_ref()
-            .map(|one| self.followed_in_runs(one));
+        let decider = prepared.decider.as_ref();
+        let followed = decider.map(|one| self.followed_in_runs(one));
         let barrier = prepared.shield.as_ref().map(|one| self.barrier(one));
         let behaviour = Behaviour {
-            guidance: followed.as_ref().map(|one| one as &dyn Guidance),
+            guidance: followed.as_deref(),
             fence: barrier.as_ref().map(|one| one as &dyn Fence),
             ..self.behaviour(restriction.as_ref(), options)
         };
@@ -76,7 +74,7 @@ impl LoadedModel {
     }
 
     /// What makes runs; the code is ready.
-    pub(super) fn behaviour<'a>(
+    pub(in crate::engine) fn behaviour<'a>(
         &'a self,
         restriction: Option<&'a Restriction>,
         options: &Options,
