@@ -286,8 +286,12 @@ impl Learner<'_> {
     /// was ended.
     fn judge(&mut self, watch: &mut dyn FnMut(&Progress) -> bool) -> Result<Option<Mean>, Failure> {
         let count = self.options.judging(self.progress.steps_of_run);
+        let first = match self.options.judging_runs {
+            None => count / FIRST_PART,
+            Some(_) => count,
+        };
         let mut episodes = Vec::new();
-        for part in [0..count / FIRST_PART, count / FIRST_PART..count] {
+        for part in [0..first, first..count] {
             let runs = JUDGING + part.start..JUDGING + part.end;
             if !self.made(runs, 0.0, false, &mut episodes, watch)? {
                 return Ok(None);
@@ -325,6 +329,7 @@ impl Learner<'_> {
             Ok(explorer(runner).ended(outcome.value, outcome.time))
         };
         let before = self.progress;
+        let known = episodes.len();
         let made = runs_by(
             &mut self.runners,
             runs,
@@ -339,7 +344,7 @@ impl Learner<'_> {
             explorer(runner).set(None);
         }
         self.partition = Arc::into_inner(partition).expect("no explorer has it any more");
-        self.progress.runs += episodes.len() as u64;
+        self.progress.runs += (episodes.len() - known) as u64;
         made
     }
 }
