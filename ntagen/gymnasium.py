@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ntagen.checker import Model
+import ntagen
 from ntagen.checker.policy import action_number
 from ntagen.checker.stepwise import Moment
 from ntagen.errors import InputError
@@ -78,7 +78,7 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
 
     def __init__(
         self,
-        model: Model | str | os.PathLike[str],
+        model: ntagen.Model | str | os.PathLike[str],
         query: str,
         *,
         wait: float | None = None,
@@ -100,7 +100,7 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
             RejectedError: The model or a query is wrong, or nothing is there to be decided.
             InputError: The file cannot be read, or `wait` is no positive number.
         """
-        loaded = model if isinstance(model, Model) else load(os.fspath(model))
+        loaded = model if isinstance(model, ntagen.Model) else load(os.fspath(model))
         self._runs = loaded.stepwise(query, strategies=strategies, wait=wait)
         self._sign = 1.0 if self._runs.maximises else -1.0
         self.actions = self._runs.actions
