@@ -136,8 +136,9 @@ impl Experience {
             samples: Vec::with_capacity(self.memories.len()),
             points: Vec::with_capacity(self.memories.len() * self.dimension),
             slot_parts: Vec::new(),
-            slots: FxHashMap::default(),
-            stands: FxHashMap::default(),
+            slots: vec![Vec::new(); partition.cells.len()],
+            stands: vec![Vec::new(); partition.cells.len()],
+            before: Vec::new(),
             sets: &self.sets,
             stand_parts: vec![(u32::MAX, u32::MAX)],
         };
@@ -169,8 +170,11 @@ struct Builder<'e> {
     points: Vec<f64>,
     /// By slot: its cell and its action.
     slot_parts: Vec<(u32, u32)>,
-    slots: FxHashMap<(u32, u32), u32>,
-    stands: FxHashMap<(u32, u32), u32>,
+    /// By cell: its few actions with their slots, and its sets with their stands.
+    slots: Vec<Vec<(u32, u32)>>,
+    stands: Vec<Vec<(u32, u32)>>,
+    /// Where a wait is before it leaves a cell.
+    before: Vec<f64>,
     sets: &'e [Box<[u32]>],
     /// By stand: its cell and its set.
     stand_parts: Vec<(u32, u32)>,
@@ -178,19 +182,11 @@ struct Builder<'e> {
 
 impl Builder<'_> {
     fn slot(&mut self, cell: u32, action: u32) -> u32 {
-        let slots = &mut self.slot_parts;
-        *self.slots.entry((cell, action)).or_insert_with(|| {
-            slots.push((cell, action));
-            slots.len() as u32 - 1
-        })
+        numbered(&mut self.slots, &mut self.slot_parts, cell, action)
     }
 
     fn stand(&mut self, cell: u32, set: u32) -> u32 {
-        let parts = &mut self.stand_parts;
-        *self.stands.entry((cell, set)).or_insert_with(|| {
-            parts.push((cell, set));
-            parts.len() as u32 - 1
-        })
+        numbered(&mut self.stands, &mut self.stand_parts, cell, set)
     }
 
     fn add(&mut self, slot: u32, next: u32, cost: f64, point: &[f64], at: f64) {
@@ -221,13 +217,16 @@ impl Builder<'_> {
                 self.add(slot, next, cost, here, at);
                 return;
             }
-            let before = here.to_vec();
+            let mut before = std::mem::take(&mut self.before);
+            before.clear();
+            before.extend_from_slice(here);
             for (value, rate) in here.iter_mut().zip(rates) {
                 *value += rate * exit;
             }
             cell = self.partition.cell(memory.observation, here);
             let stand = self.stand(cell, memory.set);
             self.add(slot, stand, cost_rate * exit, &before, at);
+            self.before = before;
             left -= exit;
             at += exit;
         }
@@ -237,10 +236,31 @@ impl Builder<'_> {
         let actions = |set: u32| self.sets.get(set as usize).map_or(&[][..], |set| set);
         let stands = self.stand_parts.iter().map(|&(cell, set)| {
             let slots = actions(set).iter();
-            let slots = slots.filter_map(|&action| self.slots.get(&(cell, action)).copied());
+            let known = self.slots.get(cell as usize).map_or(&[][..], |known| known);
+            let slots = slots.filter_map(|action| {
+                let found = known.iter().find(|one| one.0 == *action);
+                found.map(|one| one.1)
+            });
             (cell, slots.collect())
         });
         let stands = stands.collect();
         Process::new(self.samples, self.points, self.slot_parts, stands)
     }
+}
+
+/// The number of a part of a cell, by its own number there; a new one gets the next number.
+fn numbered(
+    by_cell: &mut [Vec<(u32, u32)>],
+    parts: &mut Vec<(u32, u32)>,
+    cell: u32,
+    own: u32,
+) -> u32 {
+    let known = &mut by_cell[cell as usize];
+    if let Some(&(_, number)) = known.iter().find(|one| one.0 == own) {
+        return number;
+    }
+    let number = parts.len() as u32;
+    known.push((own, number));
+    parts.push((cell, own));
+    number
 }
