@@ -23,6 +23,7 @@ import ntagen
 from ntagen.checker.learned import LearnedStrategy
 from ntagen.checker.policy import action_number
 from ntagen.errors import InputError
+from tests.choices import TANK
 from tests.oracles.learning.cases import HERE
 from tests.oracles.learning.published.cases import HERE as PUBLISHED
 
@@ -286,20 +287,6 @@ def test_a_safe_strategy_restricts_what_is_possible() -> None:
     runs = [played(env, at_random(k), k) for k in range(30)]
     assert {run.value for run in runs} == {-4.0}
     assert all(run.is_terminated for run in runs)
-
-
-TANK = """
-double level = 5;
-process Tank() {
-  state Choose, Done;
-  commit Choose, Done;
-  init Choose;
-  trans Choose -> Done { assign level = level + 2.5; },
-        Choose -> Done { assign level = level - 5; },
-        Done -u-> Choose { };
-}
-system Tank;
-"""
 
 
 def test_a_shield_restricts_what_is_possible() -> None:

@@ -13,6 +13,7 @@ import pytest
 from ntagen import checker
 from ntagen.checker import LearnedStrategy, RejectedError
 from ntagen.errors import InputError
+from tests.choices import ACTIONS
 
 SHOP = """
 int[0,2] parts = 2;
@@ -47,8 +48,6 @@ process P() {
 }
 system P;
 """
-
-ACTIONS = [*(f"P.A->P.B {{ 1, tau, n = {i} }}" for i in range(5)), "P.B->P.A { 1, tau, 1 }", "WAIT"]
 
 
 def learned(text: str = SHOP, query: str = QUERY, **options: Any) -> LearnedStrategy:  # noqa: ANN401

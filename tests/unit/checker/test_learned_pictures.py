@@ -20,6 +20,7 @@ from ntagen.checker.picture.page import Svg, colors_of
 from ntagen.checker.picture.patches import Axis, Panel
 from ntagen.cli import main
 from ntagen.errors import InputError
+from tests.choices import ACTIONS
 
 MODEL = """
 clock x, y;
@@ -31,7 +32,6 @@ process P() {
 }
 system P;
 """
-ACTIONS = [*(f"P.A->P.B {{ 1, tau, n = {i} }}" for i in range(5)), "P.B->P.A { 1, tau, 1 }", "WAIT"]
 LOAD = 'strategy S = loadStrategy("S.json")'
 
 LEAVE = """

@@ -8,19 +8,7 @@ from pathlib import Path
 import pytest
 
 from ntagen.cli import main
-
-TANK = """
-double level = 5;
-process Tank() {
-  state Choose, Done;
-  commit Choose, Done;
-  init Choose;
-  trans Choose -> Done { assign level = level + 2.5; },
-        Choose -> Done { assign level = level - 5; },
-        Done -u-> Choose { };
-}
-system Tank;
-"""
+from tests.choices import TANK
 
 QUERY = "strategy S = acontrol: A[] level >= 0 && level < 8 { level[0,10]:4 }"
 WIDE = "strategy S = acontrol: A[] level >= 0 && level < 11 { level[0,7.5]:3 }"
