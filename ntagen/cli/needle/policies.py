@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ntagen.scene import Scene
 
 DEFAULT_RUNS: Final = 100_000
-"""From so many runs a policy is learned. A tenth of them compares it with the plan."""
+"""A policy is learned from this number of runs. A tenth of it compares it with the plan."""
 
 BUDGET_S: Final = 20.0
 """The search for plans ends after this time, which is enough to end by itself: so the same seed
@@ -32,7 +32,7 @@ gives the same policy."""
 
 _COMPARED_PART: Final = 10
 _PLANS: Final = 10
-"""A policy is learned around the best of so many plans."""
+"""A policy is learned around the best of this number of plans."""
 
 _WORDS: Final = {
     "probability": "reaches the target, and touches nothing",
