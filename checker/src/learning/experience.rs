@@ -138,7 +138,6 @@ impl Experience {
             slot_parts: Vec::new(),
             slots: vec![Vec::new(); partition.cells.len()],
             stands: vec![Vec::new(); partition.cells.len()],
-            before: Vec::new(),
             sets: &self.sets,
             stand_parts: vec![(u32::MAX, u32::MAX)],
         };
@@ -173,8 +172,6 @@ struct Builder<'e> {
     /// By cell: its few actions with their slots, and its sets with their stands.
     slots: Vec<Vec<(u32, u32)>>,
     stands: Vec<Vec<(u32, u32)>>,
-    /// Where a wait is before it leaves a cell.
-    before: Vec<f64>,
     sets: &'e [Box<[u32]>],
     /// By stand: its cell and its set.
     stand_parts: Vec<(u32, u32)>,
@@ -217,16 +214,13 @@ impl Builder<'_> {
                 self.add(slot, next, cost, here, at);
                 return;
             }
-            let mut before = std::mem::take(&mut self.before);
-            before.clear();
-            before.extend_from_slice(here);
+            let before = here.to_vec();
             for (value, rate) in here.iter_mut().zip(rates) {
                 *value += rate * exit;
             }
             cell = self.partition.cell(memory.observation, here);
             let stand = self.stand(cell, memory.set);
             self.add(slot, stand, cost_rate * exit, &before, at);
-            self.before = before;
             left -= exit;
             at += exit;
         }

@@ -11,13 +11,12 @@ use crate::diagnostics::Span;
 use crate::engine::format::json_reader::Mismatch;
 use crate::engine::format::learned_code::Language;
 use crate::engine::format::{shield_code, shield_json};
-use crate::engine::loaded_model::{ANALYSED, LoadedModel};
+use crate::engine::loaded_model::LoadedModel;
 use crate::engine::options::Options;
 use crate::engine::rejection::Rejection;
 use crate::ir::{Axis, Feature, Part};
 use crate::semantics::Reading;
 use crate::shield::{Grid, Shield};
-use crate::stochastic::{Behaviour, Runner};
 
 const SEE_NAMES: &str = "the names of the axes must have a meaning in this model";
 
@@ -61,9 +60,7 @@ impl LoadedModel {
             Err(mismatch) => return Ok(Err(mismatch)),
         };
         self.prepare_code(Reading::Stochastic, options.code, options.tuning, span)?;
-        let compiled = self.stochastic.as_ref().expect(ANALYSED);
-        let runner = Runner::of(Behaviour::new(compiled.network(), compiled.executor()));
-        let moves = runner.moves_of_controller();
+        let moves = self.moves_of_controller();
         Ok(Ok(ShieldMeaning {
             features,
             moves: moves.iter().map(|one| one.part).collect(),

@@ -17,7 +17,7 @@ use crate::shield::{
     BYTES_OF_CELL, Barrier, CHOICES, Facts, Grid, Left, MOST_MOVES, Made, Manner, Shield, shield,
     trial,
 };
-use crate::stochastic::{Behaviour, Estimate, Failure, Runner};
+use crate::stochastic::{Behaviour, Estimate, Failure};
 
 impl LoadedModel {
     /// Answers a query for a shield whose code is ready.
@@ -87,9 +87,7 @@ impl LoadedModel {
             let help = "write fewer or coarser axes, or allow more memory with --memory";
             return Err(self.refusal(codes::GRID_TOO_LARGE, span, message, help));
         }
-        let compiled = self.stochastic.as_ref().expect(ANALYSED);
-        let behaviour = Behaviour::new(compiled.network(), compiled.executor());
-        let moves = Runner::of(behaviour).moves_of_controller().len();
+        let moves = self.moves_of_controller().len();
         if moves > MOST_MOVES {
             let message = format!(
                 "a shield tells at most {MOST_MOVES} moves of the controller apart, and here are {moves}"
@@ -122,9 +120,7 @@ impl LoadedModel {
 
     /// A shield, prepared for random runs.
     pub(in crate::engine) fn barrier(&self, shield: &Arc<Shield>) -> Barrier {
-        let compiled = self.stochastic.as_ref().expect(ANALYSED);
-        let behaviour = Behaviour::new(compiled.network(), compiled.executor());
-        Barrier::new(shield, &Runner::of(behaviour).moves_of_controller())
+        Barrier::new(shield, &self.moves_of_controller())
     }
 }
 

@@ -380,16 +380,10 @@ impl<R: Copy> Planning<'_, '_, R> {
         moment: &Cell<R>,
         next: B::Exit,
     ) -> Flow<B> {
-        let window = span(b, self.program, output.guard, &output.values, next)?;
-        let zero = b.real(0.0);
-        let low = window.low.unwrap_or(zero);
-        if window.low.is_some() {
-            self.require_in_time(b, low, next)?;
-        }
+        let (window, low) = self.window_in_time(b, output, next)?;
         let Held { time, draws } = b.held();
         let ask = |b: &mut B, at: R| {
-            let first = b.least(moment.get(), at);
-            b.set_real(moment, first);
+            come_not_later(b, moment, at);
             Ok(())
         };
         let ask_at_end = |b: &mut B| {
@@ -428,6 +422,23 @@ impl<R: Copy> Planning<'_, '_, R> {
         moment: &Cell<R>,
         next: B::Exit,
     ) -> Flow<B> {
+        let (window, low) = self.window_in_time(b, output, next)?;
+        if output.may_be_urgent {
+            come_not_later(b, moment, low);
+            return Ok(());
+        }
+        self.push_window(b, window, low);
+        Ok(())
+    }
+
+    /// The window of an output, and when it begins; leaves if it has none while the process may
+    /// stay.
+    fn window_in_time<B: Backend<Real = R>>(
+        &self,
+        b: &mut B,
+        output: &Instance<'_>,
+        next: B::Exit,
+    ) -> Flow<B, (Span<R>, R)> {
         let window = span(b, self.program, output.guard, &output.values, next)?;
         let low = match window.low {
             None => b.real(0.0),
@@ -436,13 +447,7 @@ impl<R: Copy> Planning<'_, '_, R> {
                 low
             }
         };
-        if output.may_be_urgent {
-            let first = b.least(moment.get(), low);
-            b.set_real(moment, first);
-            return Ok(());
-        }
-        self.push_window(b, window, low);
-        Ok(())
+        Ok((window, low))
     }
 
     fn push_window<B: Backend<Real = R>>(&self, b: &mut B, window: Span<R>, low: R) {
@@ -477,6 +482,12 @@ impl<R: Copy> Planning<'_, '_, R> {
             }
         }
     }
+}
+
+/// Lets a moment come at this time, if it does not come before.
+fn come_not_later<B: Backend>(b: &mut B, moment: &Cell<B::Real>, at: B::Real) {
+    let first = b.least(moment.get(), at);
+    b.set_real(moment, first);
 }
 
 /// The rate of the exponential delay, which is greater than 0; leaves if it is 0, and ends the run
