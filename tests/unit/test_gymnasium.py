@@ -511,6 +511,52 @@ def test_an_interruption_in_a_policy_goes_on() -> None:
         model.check("E[<=1; 100](max: cost) under Agent")
 
 
+LINGERING = """
+int[0,20] steps;
+process Worker() {
+  clock x;
+  state Ready, Works { x <= 1 };
+  urgent Ready;
+  init Ready;
+  trans Ready -> Works { guard steps < 20; assign steps = steps + 1, x = 0; },
+        Works -u-> Ready { guard x >= 1; };
+}
+process Bell() {
+  clock y;
+  state Rings, Silent { y <= 1 };
+  urgent Rings;
+  init Rings;
+  trans Rings -u-> Silent { assign y = 0; },
+        Silent -u-> Rings { guard y >= 1; };
+}
+W = Worker();
+B = Bell();
+system W, B;
+"""
+
+
+def test_a_policy_is_asked_once_about_each_moment() -> None:
+    """Where it waits although time stands still, code gives the run up, which begins anew."""
+    asked: dict[str, list[float]] = {}
+    for engine in ("jit", "interpreter"):
+        seen = asked.setdefault(engine, [])
+
+        def wait_if_possible(
+            values: NDArray[np.float64], mask: NDArray[np.int8], seen: list[float] = seen
+        ) -> int:
+            seen.append(float(values[0]))
+            return 1 if mask[1] else 0
+
+        model = ntagen.load(LINGERING)
+        model.follow("Agent", wait_if_possible, "{steps} -> {}")
+        answer = model.check("E[<=15; 1500](max: steps) under Agent", engine=engine, seed=3)
+        assert answer.verdict == "satisfied"
+    # Runs that are made ahead are asked about, too, as many as there is time for.
+    least = min(map(len, asked.values()))
+    assert least > 30_000
+    assert asked["jit"][:least] == asked["interpreter"][:least]
+
+
 def test_a_policy_must_not_ask_its_model() -> None:
     model = ntagen.load(HERE / "parts.xta")
 

@@ -88,6 +88,11 @@ impl Guidance for Asking {
     fn chooser(&self) -> Box<dyn Chooser> {
         Box::new(Asker(self.clone()))
     }
+
+    fn can_begin_anew(&self) -> bool {
+        // It may remember what it was asked.
+        false
+    }
 }
 
 struct Asker(Asking);

@@ -139,6 +139,12 @@ pub trait Chooser: Any + Send {
 pub trait Guidance: Sync {
     /// One of them.
     fn chooser(&self) -> Box<dyn Chooser>;
+
+    /// Whether they decide the same if a run is made again from its begin, as happens where code
+    /// gives one up.
+    fn can_begin_anew(&self) -> bool {
+        true
+    }
 }
 
 /// Keeps the controller from some of its moves, whoever decides.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::behaviour::Behaviour;
 use super::constants::{MOVES_WITHOUT_RISE, TOLERANCE, UNITS_FOR_MOVE};
-use super::control::{Chooser, Control, ControllerMove, StateView};
+use super::control::{Chooser, Control, ControllerMove, Guidance, StateView};
 use super::entry::entry;
 use super::failure::Failure;
 use super::machine::Machine;
@@ -112,7 +112,10 @@ impl<'a> Runner<'a> {
         let program = Program::new(behaviour.network, behaviour.executor);
         let mut runner = Runner::with(Arc::new(program), behaviour, None);
         let sees_time = runner.race.control.as_ref().map(Control::sees_time);
-        let is_free = behaviour.restriction.is_none() && behaviour.fence.is_none();
+        let guidance = behaviour.guidance;
+        let is_free = behaviour.restriction.is_none()
+            && behaviour.fence.is_none()
+            && guidance.is_none_or(Guidance::can_begin_anew);
         runner.stages = is_free.then(|| Stages::new(behaviour.executor, sees_time));
         runner
     }
