@@ -92,7 +92,8 @@ class Options:
     """The risk that ``Pr[…](…) >= p`` is accepted wrongly."""
 
     epsilon: float = 0.05
-    """A probability is estimated until both ends of its interval are so near to the estimate."""
+    """A probability is estimated until both ends of its interval are so near to the estimate. ``E``
+    without a number of runs makes as many runs as that takes for a probability of 1/2."""
 
     anytime: bool = False
     """Whether the intervals of ``Pr`` and ``E`` hold all together, after every run: then you may

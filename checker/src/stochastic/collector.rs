@@ -48,8 +48,8 @@ const RUNS_FOR_A_LOOK: u64 = 1000;
 impl Collector {
     /// One for a query whose answer is an estimate.
     pub(super) fn new(query: &Statistical, precision: &Precision) -> Collector {
-        let (bound, kind) = match query {
-            Statistical::Probability(bound, _) => (bound, Collector::probability(precision)),
+        let (wanted, kind) = match query {
+            Statistical::Probability(bound, _) => (bound.runs, Collector::probability(precision)),
             Statistical::Hypothesis {
                 bound,
                 at_least,
@@ -69,11 +69,12 @@ impl Collector {
                     at_least: *at_least,
                     decision: None,
                 };
-                (bound, kind)
+                (bound.runs, kind)
             }
             Statistical::Expectation { bound, range, .. } => {
-                let wanted = precision.runs.or(bound.runs);
-                (bound, Collector::mean(precision, *range, wanted))
+                let said = precision.runs.or(bound.runs);
+                let wanted = said.or_else(|| precision.assumed_runs(bound));
+                (wanted, Collector::mean(precision, *range, wanted))
             }
             Statistical::Comparison { .. } => {
                 unreachable!("probabilities are compared by `compare`")
@@ -82,7 +83,7 @@ impl Collector {
         };
         Collector {
             precision: *precision,
-            wanted: precision.runs.or(bound.runs),
+            wanted: precision.runs.or(wanted),
             runs: 0,
             satisfied: 0,
             mean: Expectation::default(),

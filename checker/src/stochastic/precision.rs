@@ -1,6 +1,10 @@
 //! What is asked of an estimate, and what it says.
 
-use super::statistics::{Decision, Method};
+use super::statistics::{Decision, FixedWidth, Method};
+use crate::ir::RunBound;
+
+/// No estimate makes more runs than this.
+pub(crate) const MOST_RUNS: u64 = 1_000_000_000_000_000;
 
 /// What an estimate is to promise, and how it is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +52,14 @@ pub enum MeanMethod {
 }
 
 impl Precision {
+    /// How many runs a mean takes if neither the user nor its query says it, nor how exact the mean
+    /// is to be: as many as a probability of one half; `None` if something of this is said.
+    pub(crate) fn assumed_runs(&self, bound: &RunBound) -> Option<u64> {
+        let is_said = self.runs.or(bound.runs).is_some() || self.relative.is_some();
+        let runs = || FixedWidth::runs_for_one_half(self.alpha, self.epsilon, MOST_RUNS);
+        (!is_said).then(runs)
+    }
+
     /// Whether the number of runs may depend on the results in any way.
     pub(super) fn is_sequential(&self) -> bool {
         self.anytime || self.relative.is_some()

@@ -220,7 +220,6 @@ fn bounds_and_runs_that_are_none_are_refused() {
             "bounded by time, by a clock, or by its moves",
         ),
         ("E[<=9; 0](max: x)", "the number of runs cannot be 0"),
-        ("E[<=9](max: x)", "needs a number of runs"),
     ] {
         refused(&model, query, &[found]);
     }

@@ -97,7 +97,8 @@ RUNS: Final = (
     Setting(
         "epsilon WIDTH",
         _SHARE,
-        "For Pr: make runs until both ends of the interval are so near to the estimate.  "
+        "For Pr: make runs until both ends of the interval are so near to the estimate. E without "
+        "a number of runs makes as many as a probability of 1/2 takes then.  "
         "[default: 0.05]",
     ),
     Setting(

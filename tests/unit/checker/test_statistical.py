@@ -87,6 +87,32 @@ def test_a_mean_has_an_interval(model: Model) -> None:
     assert estimate.method == "Student (asymptotic)"
 
 
+def test_a_mean_without_a_number_of_runs_has_as_many_as_a_probability_of_one_half(
+    model: Model,
+) -> None:
+    query = "E[<=3](max: Q.B ? 1 : 0)"
+    answer = model.check(query, seed=2)
+    assert answer.estimate is not None
+    assert answer.estimate.runs == 402
+    assert answer.message is not None
+    assert "the query names no number of runs: 402" in answer.message
+    assert answer.estimate == model.check(query.replace("3]", "3; 402]"), seed=2).estimate
+    for options in ({"alpha": 0.01}, {"epsilon": 0.01}):
+        found, near = (model.check(one, **options).estimate for one in (query, HALF))
+        assert found is not None
+        assert near is not None
+        assert found.runs == pytest.approx(near.runs, rel=0.01)
+    # What says how many there are counts.
+    for options in ({"runs": 30}, {"relative": 0.5}):
+        answer = model.check(query, **options)
+        assert answer.estimate is not None
+        assert answer.estimate.runs != 402
+        assert "names no number of runs" not in (answer.message or "")
+    assert model.check("E[<=3; 7](max: x)").message == (
+        "the interval is Student's: asymptotic, for many runs"
+    )
+
+
 def test_a_run_without_result_is_refused_with_its_place(tmp_path: Path) -> None:
     path = tmp_path / "model.xta"
     path.write_text("process P() { state A, B; init A; trans A -> B { }; } system P;", "utf-8")

@@ -106,7 +106,7 @@ impl LoadedModel {
                         estimate,
                         ..Answer::new(Verdict::Satisfied, Counters::default())
                     };
-                    let mut answer = concluded(answer, &member.asked, &watch);
+                    let mut answer = concluded(answer, &member.asked, &member.precision, &watch);
                     if let Some(together) = &together {
                         answer.remark(together);
                     }

@@ -67,7 +67,7 @@ impl LoadedModel {
         let mut answer = match result {
             Err((reason, counters)) => without_runs(reason, counters),
             Ok(Err(failure)) => self.after_failure(&failure, query, &watch)?,
-            Ok(Ok(answer)) => concluded(answer, asked, &watch),
+            Ok(Ok(answer)) => concluded(answer, asked, &options.precision, &watch),
         };
         answer.measure(&watch);
         Ok(answer)
@@ -153,7 +153,12 @@ pub(super) fn without_runs(reason: StopReason, counters: Counters) -> Answer {
 }
 
 /// An answer with what runs show, with its verdict and what the numbers do not say themselves.
-pub(super) fn concluded(mut answer: Answer, asked: &Statistical, watch: &LimitWatch) -> Answer {
+pub(super) fn concluded(
+    mut answer: Answer,
+    asked: &Statistical,
+    precision: &Precision,
+    watch: &LimitWatch,
+) -> Answer {
     let estimate = answer.estimate.as_ref();
     let method = estimate.map(|estimate| estimate.method);
     answer.verdict = match estimate.and_then(|estimate| estimate.decision) {
@@ -164,6 +169,13 @@ pub(super) fn concluded(mut answer: Answer, asked: &Statistical, watch: &LimitWa
     };
     if let Some(remark) = remark(asked, answer.verdict, method) {
         answer.remark(remark);
+    }
+    if let Statistical::Expectation { bound, .. } = asked
+        && let Some(runs) = precision.assumed_runs(bound)
+    {
+        answer.remark(format!(
+            "the query names no number of runs: {runs}, as many as a probability of 1/2 takes"
+        ));
     }
     let simulated = answer.simulated.as_ref();
     if simulated.is_some_and(|simulated| simulated.is_cut) {
@@ -207,15 +219,9 @@ pub(in crate::engine) fn contradiction(
     query: &Statistical,
     precision: &Precision,
 ) -> Option<(&'static str, &'static str)> {
-    let Statistical::Expectation { bound, range, .. } = query else {
+    let Statistical::Expectation { range, .. } = query else {
         return None;
     };
-    if precision.runs.or(bound.runs).is_none() && precision.relative.is_none() {
-        return Some((
-            "an expected value needs a number of runs",
-            "write it behind the bound, E[<=10; 1000](max: x), or give it: --runs 1000",
-        ));
-    }
     let has_bounds = precision.value_bounds.or(*range).is_some();
     let is_sequential = precision.anytime || precision.relative.is_some();
     match precision.mean_method {

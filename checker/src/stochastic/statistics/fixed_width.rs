@@ -40,6 +40,31 @@ impl FixedWidth {
         }
     }
 
+    /// After how many runs the rule stops if half of them are satisfied, at most so many.
+    pub fn runs_for_one_half(alpha: f64, epsilon: f64, most: u64) -> u64 {
+        let is_narrow = |pairs: u64| {
+            let state = FixedWidth {
+                runs: 2 * pairs,
+                satisfied: pairs,
+                ..FixedWidth::new(alpha, epsilon)
+            };
+            state.is_narrow()
+        };
+        let (mut low, mut high) = (0, 1);
+        while 2 * high < most && !is_narrow(high) {
+            (low, high) = (high, 2 * high);
+        }
+        while high - low > 1 {
+            let middle = low.midpoint(high);
+            if is_narrow(middle) {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        most.min(2 * high)
+    }
+
     /// Adds a run; returns whether it is the last one.
     pub fn push(&mut self, satisfied: bool) -> bool {
         self.runs += 1;
@@ -99,6 +124,33 @@ mod tests {
             assert!(!stops(successes, runs, 0.05), "{successes}/{runs}");
         }
         assert!(stops(0, 36_887, 1e-4) && !stops(0, 36_886, 1e-4));
+    }
+
+    #[test]
+    fn one_half_takes_as_many_runs_as_results_that_alternate() {
+        for (alpha, epsilon) in [(0.05, 0.05), (0.01, 0.05), (0.05, 0.01), (0.3, 0.2)] {
+            let mut rule = FixedWidth::new(alpha, epsilon);
+            let mut runs = 0;
+            loop {
+                runs += 2;
+                // Between the two there is one satisfied run more than others.
+                rule.push(true);
+                if rule.push(false) {
+                    break;
+                }
+            }
+            assert_eq!(
+                FixedWidth::runs_for_one_half(alpha, epsilon, 1 << 40),
+                runs,
+                "{alpha} {epsilon}"
+            );
+        }
+        assert_eq!(FixedWidth::runs_for_one_half(0.05, 0.05, 1 << 40), 402);
+        assert_eq!(FixedWidth::runs_for_one_half(0.05, 0.05, 100), 100);
+        // The normal distribution says 0.96 / epsilon^2.
+        let many = FixedWidth::runs_for_one_half(0.05, 1e-5, 1 << 40) as f64;
+        assert!((many / 0.960_365e10 - 1.0).abs() < 1e-4, "{many}");
+        assert_eq!(FixedWidth::runs_for_one_half(0.05, 1e-9, 1 << 40), 1 << 40);
     }
 
     /// At which numbers of runs and of satisfied ones the rule stops, up to the number at which it
