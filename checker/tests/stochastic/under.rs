@@ -3,8 +3,11 @@
 
 use std::fmt::Write as _;
 use std::fs;
+use std::sync::Arc;
 
-use checker::engine::{CodeEngine, LoadedModel, Options, Verdict};
+use checker::engine::{CodeEngine, Limits, LoadedModel, Options, Verdict};
+use checker::learning::Learning;
+use checker::search::limits::StopReason;
 use checker::stochastic::{Estimate, Precision, UnderChoice};
 
 use crate::checks::{ask, interpreted, load, try_ask};
@@ -26,6 +29,16 @@ fn estimate(model: &mut LoadedModel, query: &str, options: &Options) -> Estimate
     let answer = ask(model, query, options);
     answer.estimate.expect("there is an estimate")
 }
+
+/// What chooses between two doors and a pit at once.
+const PIT: &str = "
+    process P() {
+        state start, left, right, pit;
+        commit start;
+        init start;
+        trans start -> left { }, start -> right { }, start -> pit { };
+    }
+    system P;";
 
 /// The model, with the strategy S that this query gives.
 #[track_caller]
@@ -113,15 +126,7 @@ fn weighed(part: f64, moves: u32) -> f64 {
 
 #[test]
 fn a_choice_without_time_is_uniform_among_what_is_allowed() {
-    let model = "
-        process P() {
-            state start, left, right, pit;
-            commit start;
-            init start;
-            trans start -> left { }, start -> right { }, start -> pit { };
-        }
-        system P;";
-    let mut model = with_strategy(model, "control: A[] not P.pit");
+    let mut model = with_strategy(PIT, "control: A[] not P.pit");
     for choice in [UnderChoice::Race, UnderChoice::Eager] {
         expect(&mut model, choice, "Pr[<=1](<> P.pit)", 0.0);
         expect(&mut model, choice, "Pr[<=1](<> P.left)", 0.5);
@@ -585,4 +590,50 @@ fn strategies_keep_their_promises_in_random_runs() {
         kept > 20 && reached > 5,
         "{kept} are kept, {reached} reached"
     );
+}
+
+#[test]
+fn learning_that_is_cut_off_leaves_no_strategy() {
+    let text = "
+        double level = 5;
+        clock x;
+        process Tank() {
+            state Choose { x <= 1 }, Wait { x <= 1 };
+            init Choose;
+            trans Choose -> Wait { guard x >= 1; assign level = level + 2.5, x = 0; },
+                Choose -> Wait { guard x >= 1; assign level = level - 5, x = 0; },
+                Wait -u-> Choose { guard x >= 1; assign x = 0; };
+        }
+        system Tank;";
+    let mut model = load(text);
+    let shield = "strategy Shield = acontrol: A[] level >= 0 && level < 8 { level[0,10]:4 }";
+    ask(&mut model, shield, &interpreted());
+    let cut = Options {
+        limits: Limits {
+            // The counters of an iteration are those of its runs.
+            observer: Some(Arc::new(|counters| {
+                (counters.explored > 0).then_some(StopReason::Interrupted)
+            })),
+            ..Limits::default()
+        },
+        learning: Learning {
+            learning_runs: Some(10_000_000),
+            ..Learning::default()
+        },
+        ..interpreted()
+    };
+    let query = "strategy S = minE(level)[<=1000] {} -> {level}: <> false under Shield";
+    let answer = ask(&mut model, query, &cut);
+    assert_eq!(
+        answer.verdict,
+        Verdict::Unknown(StopReason::Interrupted),
+        "{answer:?}"
+    );
+    let few = options(UnderChoice::Race, 10);
+    ask(&mut model, "Pr[<=9](<> level < 0) under Shield", &few);
+    let refused = try_ask(&mut model, "Pr[<=9](<> level < 0) under S", &few);
+    let refused = refused.expect_err("there is no S");
+    let message = &refused.rendered[0];
+    assert!(message.contains("there is no strategy 'S'"), "{message}");
+    assert!(message.contains("minE(level)"), "{message}");
 }

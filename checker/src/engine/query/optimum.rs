@@ -72,11 +72,16 @@ impl LoadedModel {
         strategy: Option<Arc<LearnedStrategy>>,
     ) {
         let text = unnamed(&query.text).to_owned();
-        self.keep_strategy(NamedStrategy {
-            learned: strategy,
-            within: prepared.under.clone(),
-            shield: prepared.shield.clone(),
-            ..NamedStrategy::new(name.to_owned(), text, None)
+        let none = NamedStrategy::new(name.to_owned(), text, None);
+        self.keep_strategy(match strategy {
+            Some(learned) => NamedStrategy {
+                learned: Some(learned),
+                within: prepared.under.clone(),
+                shield: prepared.shield.clone(),
+                ..none
+            },
+            // What it was to refine is no strategy of this name.
+            None => none,
         });
     }
 
