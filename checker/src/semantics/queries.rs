@@ -43,6 +43,25 @@ impl Checker<'_> {
         for name in query.under.iter().chain(&query.imitate) {
             self.known_strategy(name, strategies);
         }
+        if let Some(first) = query.kind.first_under() {
+            self.known_strategy(first, strategies);
+            let second = query.under.as_ref();
+            if second.is_none_or(|second| second.text != first.text) {
+                let other = second.map_or_else(
+                    || String::from("no strategy"),
+                    |second| format!("'{}'", second.text),
+                );
+                self.error(
+                    codes::QUERY_UNSUPPORTED,
+                    first.span,
+                    format!(
+                        "the first probability is under '{}' and the second under {other}: such comparisons are not supported",
+                        first.text
+                    ),
+                    "compare both under the same strategy, or ask for each probability on its own",
+                );
+            }
+        }
         if let Some(name) = &query.imitate {
             self.error(
                 codes::QUERY_UNSUPPORTED,

@@ -726,6 +726,26 @@ pub struct ShieldAxis {
     pub span: Span,
 }
 
+impl QueryKind {
+    /// The strategy that is named behind the first of two probabilities.
+    pub fn first_under(&self) -> Option<&Name> {
+        match self {
+            QueryKind::Statistical(Statistical::Comparison { left, .. }) => left.under.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// The strategy that is named between a probability and the number that it is compared with.
+    pub fn hypothesis_under(&self) -> Option<&Name> {
+        match self {
+            QueryKind::Statistical(Statistical::Hypothesis { estimated, .. }) => {
+                estimated.under.as_ref()
+            }
+            _ => None,
+        }
+    }
+}
+
 /// A statistical query.
 #[derive(Clone, Debug)]
 pub enum Statistical {
@@ -785,6 +805,8 @@ pub struct Estimated {
     pub bound: Option<RunBound>,
     /// What is asked of a run.
     pub path: Path,
+    /// `under name`, before what it is compared with.
+    pub under: Option<Name>,
 }
 
 /// `[<=10; 100]`

@@ -105,6 +105,7 @@ impl Parser<'_> {
             );
         }
         let under = self.strategy_behind("under");
+        let under = under.or_else(|| kind.hypothesis_under().cloned());
         let imitate = self.strategy_behind("imitate");
         if matches!(kind, QueryKind::Unsupported(_)) {
             while !self.at_end() {
@@ -135,7 +136,7 @@ impl Parser<'_> {
     }
 
     /// `under S` or `imitate S`
-    fn strategy_behind(&mut self, word: &str) -> Option<Name> {
+    pub(super) fn strategy_behind(&mut self, word: &str) -> Option<Name> {
         self.eat_word(word)
             .then(|| self.name("the name of a strategy"))
     }

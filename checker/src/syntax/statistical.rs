@@ -29,7 +29,10 @@ impl Parser<'_> {
 
     /// `[bound](path)`, with what it is compared with.
     fn probability(&mut self) -> Statistical {
-        let estimated = self.estimated();
+        let mut estimated = self.estimated();
+        if self.at_word("under") && is_comparison(self.peek(2).kind) {
+            estimated.under = self.strategy_behind("under");
+        }
         let at_least = self.at(TokenKind::GreaterEqual);
         if !(at_least || self.at(TokenKind::LessEqual)) {
             self.expect_no_other_comparison();
@@ -53,15 +56,7 @@ impl Parser<'_> {
     /// `>`, `==`, `=` are no tests; `?` was how older versions asked for an estimate.
     fn expect_no_other_comparison(&mut self) {
         let old_mark = self.eat(TokenKind::Question);
-        let is_comparison = matches!(
-            self.kind(),
-            TokenKind::Less
-                | TokenKind::Greater
-                | TokenKind::EqualEqual
-                | TokenKind::Assign
-                | TokenKind::NotEqual
-        );
-        if is_comparison && !old_mark {
+        if is_comparison(self.kind()) && !old_mark {
             let (span, found) = (self.here(), self.found());
             let message = format!("a probability is not compared by {found}");
             self.report(
@@ -94,7 +89,11 @@ impl Parser<'_> {
         } else {
             self.skip_rest();
         }
-        Estimated { bound, path }
+        Estimated {
+            bound,
+            path,
+            under: None,
+        }
     }
 
     /// `[bound; runs](max: e)`
@@ -231,4 +230,18 @@ impl Parser<'_> {
             }
         }
     }
+}
+
+/// Whether a probability might be compared by this.
+fn is_comparison(token: TokenKind) -> bool {
+    matches!(
+        token,
+        TokenKind::Less
+            | TokenKind::LessEqual
+            | TokenKind::Greater
+            | TokenKind::GreaterEqual
+            | TokenKind::EqualEqual
+            | TokenKind::Assign
+            | TokenKind::NotEqual
+    )
 }

@@ -593,6 +593,47 @@ fn strategies_keep_their_promises_in_random_runs() {
 }
 
 #[test]
+fn comparisons_may_name_their_strategy_behind_both_probabilities() {
+    let mut model = with_strategy(PIT, "control: A[] not P.pit");
+    ask(&mut model, "strategy T = control: A[] true", &interpreted());
+    let options = options(UnderChoice::Race, 3000);
+    let [once, twice] = ["", "under S "].map(|first| {
+        let query = format!("Pr[<=1](<> P.pit) {first}>= Pr[<=1](<> P.left) under S");
+        let answer = ask(&mut model, &query, &options);
+        assert_eq!(answer.verdict, Verdict::NotSatisfied, "{query}");
+        answer.estimate.expect("there is one")
+    });
+    assert_eq!(once, twice);
+    assert_eq!(twice.satisfied_runs, Some(0));
+    // A number has no strategy: the only one may stand on either side of it.
+    for query in [
+        "Pr[<=1](<> P.left) under S >= 0.4",
+        "Pr[<=1](<> P.left) >= 0.4 under S",
+    ] {
+        assert_eq!(
+            ask(&mut model, query, &options).verdict,
+            Verdict::Satisfied,
+            "{query}"
+        );
+    }
+    for (second, words) in [
+        (" under T", "under 'S' and the second under 'T'"),
+        ("", "under 'S' and the second under no strategy"),
+    ] {
+        let query = format!("Pr[<=1](<> P.pit) under S <= Pr[<=1](<> P.left){second}");
+        let refused = try_ask(&mut model, &query, &options).expect_err("it is refused");
+        let message = &refused.rendered[0];
+        assert!(message.contains("E0274"), "{message}");
+        assert!(message.contains(words), "{message}");
+        assert!(message.contains("query:1:25"), "{message}");
+    }
+    let unknown = "Pr[<=1](<> P.pit) under U >= Pr[<=1](<> P.left) under U";
+    let refused = try_ask(&mut model, unknown, &options).expect_err("it is refused");
+    assert!(refused.rendered[0].contains("E0275"), "{refused:?}");
+    assert_eq!(refused.rendered.len(), 2, "{refused:?}");
+}
+
+#[test]
 fn learning_that_is_cut_off_leaves_no_strategy() {
     let text = "
         double level = 5;
