@@ -12,6 +12,7 @@ It needs the package gymnasium: ``pip install 'ntagen[gymnasium]'``. An example:
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Sequence
 from typing import Any, Final
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import ntagen
-from ntagen.checker.policy import action_number
+from ntagen.checker.policy import Training, action_number
 from ntagen.checker.stepwise import Moment
 from ntagen.errors import InputError
 from ntagen.loading import load
@@ -108,6 +109,12 @@ class Environment(gymnasium.Env[NDArray[np.float64], np.int64]):
         self.action_space = gymnasium.spaces.Discrete(len(self.actions))
         count = len(self.discrete) + len(self.continuous)
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (count,), np.float64)
+        # Agents are saved with the space of what they see, so their files know where they belong.
+        vars(self.observation_space)["ntagen"] = Training(
+            features=f"{{{', '.join(self.discrete)}}} -> {{{', '.join(self.continuous)}}}",
+            wait=self._runs.wait if math.isfinite(self._runs.wait) else None,
+            actions=list(self.actions),
+        )
         self._moment: Moment | None = None
         self._worth = 0.0
         self._seed: int | None = None

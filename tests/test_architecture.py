@@ -78,6 +78,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
     "checker.policy": {"errors"},
+    "checker.agents": {"errors", "checker.policy"},
     "checker.stepwise": {"errors", "checker.errors", "_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
@@ -150,7 +151,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture", "system"}
     | {"editor", "serve", "verifyta"}
-    | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"},
+    | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
+    | {"checker.agents"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},
 }

@@ -276,7 +276,7 @@ class Model:
             return StepwiseRuns(_checker.Environment(self._raw, query, list(strategies), wait))
 
     def follow(
-        self, name: str, policy: Policy, features: str, *, wait: float | None = None
+        self, name: str, policy: Policy, features: str | None = None, *, wait: float | None = None
     ) -> tuple[str, ...]:
         """Makes a policy available to later queries: ``Pr[<=9](<> p) under Agent``.
 
@@ -291,7 +291,8 @@ class Model:
             policy: An object with ``predict(observation, deterministic=True)``, which returns the
                 action and something else, as the policies and algorithms of stable-baselines3; or
                 a function of the observation and the mask of actions, which returns the action.
-            features: What it sees: ``"{exact} -> {intervals}"``.
+            features: What it sees: ``"{exact} -> {intervals}"``. An agent that was trained in
+                `ntagen.gymnasium.Environment` knows this, its `wait` and its actions by itself.
             wait: After how many units of time it is asked again at the latest, if a clock is among
                 the features; then it must be given.
 
@@ -299,17 +300,31 @@ class Model:
             The texts of the actions, by their numbers; the last one is ``WAIT``.
 
         Raises:
-            RejectedError: The features are wrong, `wait` is missing, or there is nothing to decide.
-            InputError: The name is no name, `wait` is no positive number, or this is no policy.
+            RejectedError: The features are wrong, `wait` is missing, there is nothing to decide, or
+                the policy was trained for other actions.
+            InputError: The name is no name, `wait` is no positive number, this is no policy, or
+                nobody says what it sees.
         """
-        from ntagen.checker.policy import Follower, checked_wait
+        from ntagen.checker.policy import Follower, checked_wait, trained_in
 
         if not (name.isascii() and name.isidentifier()):
             raise InputError(f"{name!r} is no name: use letters, digits and underscores")
         checked_wait(wait)
         follower = Follower(policy)
+        known: list[str] | None = None
+        if features is None:
+            training = trained_in(policy)
+            if training is None:
+                raise InputError(
+                    f"it is not known what the policy '{name}' sees: it was not trained in an "
+                    "environment of ntagen, or what it sees was changed on the way\n"
+                    'hint: train it in ntagen.gymnasium.Environment, or call model.follow("'
+                    f'{name}", policy, "{{exact}} -> {{intervals}}") in Python'
+                )
+            features, known = training["features"], training["actions"]
+            wait = training["wait"] if wait is None else wait
         with rejecting():
-            actions = _checker.follow(self._raw, name, features, wait, follower)
+            actions = _checker.follow(self._raw, name, (features, wait, known), follower)
         self._followers[name] = follower
         return tuple(actions)
 

@@ -6,14 +6,22 @@ import inspect
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.errors import InputError
 
-__all__ = ["Follower", "Policy", "Predicting", "action_number", "checked_wait"]
+__all__ = [
+    "Follower",
+    "Policy",
+    "Predicting",
+    "Training",
+    "action_number",
+    "checked_wait",
+    "trained_in",
+]
 
 Observation = NDArray[np.float64]
 Mask = NDArray[np.int8]
@@ -30,6 +38,18 @@ class Predicting(Protocol):
         deterministic: bool = False,
     ) -> tuple[Any, Any]:
         """The action for an observation, and the state of the policy."""
+
+
+class Training(TypedDict):
+    """The environment in which a policy was trained.
+
+    It is an attribute of the observation space, ``ntagen``, since agents are saved with that. It
+    has plain values only, so agents can be loaded where ntagen is not installed.
+    """
+
+    features: str
+    wait: float | None
+    actions: list[str]
 
 
 Policy = Predicting | Callable[[Observation, Mask], Any]
@@ -65,6 +85,12 @@ def checked_wait(wait: float | None) -> None:
     """
     if wait is not None and (math.isnan(wait) or wait <= 0):
         raise InputError(f"wait={wait}: it must be a positive number of units of time")
+
+
+def trained_in(policy: object) -> Training | None:
+    """The environment of ntagen in which a policy was trained; ``None`` if it does not say so."""
+    training = getattr(getattr(policy, "observation_space", None), "ntagen", None)
+    return training if isinstance(training, dict) else None  # type: ignore[return-value]
 
 
 class Follower:

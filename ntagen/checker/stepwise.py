@@ -21,6 +21,8 @@ class StepwiseRuns:
 
     Attributes:
         maximises: Whether the greatest value is the best.
+        wait: After how many units of time the controller is asked again at the latest; infinite if
+            no clock is seen.
         actions: The texts of all actions; the last one is ``WAIT``.
         discrete: The texts of what is seen exactly.
         continuous: The texts of what is seen in intervals.
@@ -29,6 +31,7 @@ class StepwiseRuns:
     def __init__(self, raw: _checker.Environment) -> None:
         self._raw: _checker.Environment | None = raw
         self.maximises = raw.is_greatest
+        self.wait = raw.wait
         self.actions = tuple(raw.actions())
         discrete, continuous = raw.features()
         self.discrete, self.continuous = tuple(discrete), tuple(continuous)

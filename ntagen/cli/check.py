@@ -22,6 +22,7 @@ from ntagen.cli.models.idle_options import idle_options, unwritten
 from ntagen.cli.models.options import SETTINGS, engine_options
 from ntagen.cli.models.outcomes import Outcome, exit_code
 from ntagen.cli.models.plan_lists import LINES, ListLimits
+from ntagen.cli.models.policies import NamedAgent, follow_agents, policy_option
 from ntagen.cli.models.queries import is_used_by, queries_of, with_strategies
 from ntagen.cli.models.spread_runs import Spreading, joint_answers
 from ntagen.cli.options import (
@@ -147,6 +148,7 @@ class _CheckCommand(Renamed):
     "in exact kinematics. FILE.jsonl has one plan on each line, in the order of the model: it is "
     "written while the plans are certified, and millions of them take no memory.",
 )
+@policy_option()
 @engine_options
 @settings_option(SETTINGS, "levels Queue.length")
 @overflow_rule()
@@ -166,6 +168,7 @@ def command(
     certificate: Path | None,
     strategy: str | None,
     plans: str | None,
+    policies: tuple[NamedAgent, ...],
     given: dict[str, Any],
     settings: dict[str, Any],
     overflow: Any,  # noqa: ANN401  click gives a str where the engine wants literals
@@ -190,6 +193,7 @@ def command(
       ntagen check game.xml --query "{Gate.Shut, x >= 2} control: A<> Main.Won" --strategy -
       ntagen check game.xml --query "strategy Safe = control: A[] not Main.Lost" \\
                             --query "control: A<> Main.Won under Safe" --strategy -
+      ntagen check game.xml --policy Agent=PPO:agent.zip --query "Pr[<=10](<> Main.Won) under Agent"
       ntagen check model.xml --query "bounds{Gate.Open}: x"
       ntagen check model.xml --query "E<> Gate.Open" --trace open.json --set "trace fastest"
       ntagen check model.xml --query "A[] not deadlock" --certificate safe.jsonl
@@ -229,15 +233,17 @@ def command(
     with _rejections_in(shown), pointing_to_explanations(is_human):
         with doing("loading the model"):
             loaded = load_model(model_path, include, overflow, constants, allow_external)
-        todo = _queries(loaded, asked, query_path)
+        todo = _queries(loaded, asked, query_path, [one.name for one in policies])
         if expect == "file" and not any(query.expected is not None for query in todo):
             raise InputError(_NOTHING_EXPECTED)
+        forms = [query.form for query in todo if query.form]
+        with doing("loading policies"):
+            say(follow_agents(loaded.model, policies, forms))
     questions = _questions_about(loaded)
-    forms = [query.form for query in todo if query.form]
     values = click.get_current_context().params | settings
     named = given_options()
     say(idle_options(named, values, forms, ranks=questions.ranks_plans))
-    spreading = Spreading(dask, todo, options, _why_not_spread(joint, allow_external))
+    spreading = Spreading(dask, todo, options, _why_not_spread(joint, allow_external, policies))
     shown.loaded(loaded.model)
     together = (
         joint_answers(loaded.model, todo, options, named, quiet=not is_human) if joint else {}
@@ -281,10 +287,12 @@ def _options(outputs: Outputs, given: dict[str, Any], settings: dict[str, Any]) 
     return replace(options, **settings)
 
 
-def _queries(loaded: Loaded, asked: Sequence[str], path: Path | None) -> list[Asked]:
+def _queries(
+    loaded: Loaded, asked: Sequence[str], path: Path | None, policies: Collection[str]
+) -> list[Asked]:
     """The queries to answer; prints the warnings about them."""
     shown_already = len(loaded.model.warnings)
-    todo = with_strategies(loaded.model, queries_of(loaded.model, asked, path))
+    todo = with_strategies(loaded.model, queries_of(loaded.model, asked, path), policies)
     show_warnings(loaded.model.warnings[shown_already:])
     # The generated model is no file of the user's.
     return [replace(one, place=None) for one in todo] if loaded.task else todo
@@ -438,10 +446,14 @@ def _require_one_output(targets: Mapping[str, str | None], option_given: str) ->
             )
 
 
-def _why_not_spread(joint: bool, allow_external: Sequence[Path]) -> str:
+def _why_not_spread(
+    joint: bool, allow_external: Sequence[Path], policies: Sequence[NamedAgent]
+) -> str:
     """Why no cluster can make the runs of these queries; empty if one can."""
     if joint:
         return "queries that are answered jointly share their runs"
+    if policies:
+        return "policies decide on this machine only"
     return "libraries are loaded by this machine only" if allow_external else ""
 
 

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 use super::convert::{rejected, until_signal_apart};
 use super::model::Model;
+use crate::engine::evidence::policies::Interface;
 use crate::engine::session::environment::{self, End, Question, Report};
 use crate::learning::{Policy, Situation};
 use crate::stochastic::{Failure, RunId, StateView};
@@ -114,6 +115,12 @@ impl Environment {
         self.with(|inner| inner.is_greatest)
     }
 
+    /// For how long the controller waits at most.
+    #[getter]
+    fn wait(&self) -> f64 {
+        self.with(|inner| inner.wait)
+    }
+
     /// Begins a run.
     fn begin(&self, py: Python<'_>, seed: u64, run: u64) -> PyResult<Moment> {
         self.with(|inner| inner.begin(RunId { seed, run }));
@@ -155,21 +162,27 @@ impl Policy for PythonPolicy {
     }
 }
 
-/// Lets queries of a model be asked under a policy by a name; returns the texts of the actions.
+/// Lets queries of a model be asked under a policy by a name; returns the texts of the actions. The
+/// policy sees features, waits at most for a time, and may say between which actions it decides.
 #[pyfunction]
 pub(super) fn follow(
     model: &Bound<'_, Model>,
     name: &str,
-    features: &str,
-    wait: Option<f64>,
+    interface: (String, Option<f64>, Option<Vec<String>>),
     decide: Py<PyAny>,
 ) -> PyResult<Vec<String>> {
     let policy = Arc::new(PythonPolicy {
         decide,
         failure: Mutex::new(String::new()),
     });
+    let (features, wait, actions) = interface;
+    let interface = Interface {
+        features,
+        wait,
+        actions,
+    };
     let kept = model
         .get()
-        .with(|model| model.keep_policy(name, features, wait, policy));
+        .with(|model| model.keep_policy(name, &interface, policy));
     kept.map_err(rejected)
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,15 +59,17 @@ def queries_of(model: Model, asked: Sequence[str], file: Path | None) -> list[As
     return from_file or known
 
 
-def with_strategies(model: Model, asked: Sequence[Asked]) -> list[Asked]:
+def with_strategies(
+    model: Model, asked: Sequence[Asked], known: Collection[str] = ()
+) -> list[Asked]:
     """Queries, each after the query of the model that defines the strategy that it is asked under.
 
-    A strategy that is defined by one of the queries before, or nowhere, adds none.
+    A strategy that is known, or defined by one of the queries before, or nowhere, adds none.
     """
     definitions = {
         query.form.defines: query
         for query in map(_asked, model.queries)
-        if query.form and query.form.defines
+        if query.form and query.form.defines not in (None, *known)
     }
     complete: list[Asked] = []
     added: list[Asked] = []

@@ -7,7 +7,7 @@ pub mod evidence_file;
 mod learned_files;
 pub mod named_strategies;
 mod permitted;
-mod policies;
+pub mod policies;
 mod shield_files;
 pub(super) mod shown_states;
 pub mod strategy_check;

@@ -13,22 +13,38 @@ use crate::learning::{Policy, SeeingPolicy};
 use crate::semantics::Reading;
 use crate::syntax;
 
+/// What a policy sees, and what it chooses from.
+#[derive(Clone, Debug)]
+pub struct Interface {
+    /// What it sees, written `{a} -> {x}`.
+    pub features: String,
+    /// For how long it waits at most, if clocks are among the features.
+    pub wait: Option<f64>,
+    /// The texts of the actions between which it decides, if they are known: those of the model.
+    pub actions: Option<Vec<String>>,
+}
+
 impl LoadedModel {
-    /// Keeps a policy under a name. It sees these features, written `{a} -> {x}`; if clocks are
-    /// among them, it waits at most for this time. Returns the texts of the actions.
+    /// Keeps a policy under a name. Returns the texts of the actions.
     pub fn keep_policy(
         &mut self,
         name: &str,
-        features: &str,
-        wait: Option<f64>,
+        interface: &Interface,
         policy: Arc<dyn Policy>,
     ) -> Result<Vec<String>, Rejection> {
-        let span = syntax::add_query_text(features, &mut self.sources);
+        let wait = interface.wait;
+        let span = syntax::add_query_text(&interface.features, &mut self.sources);
         self.expect_stochastic()?;
         let observation = Arc::new(self.observation_at(span)?);
         let options = Options::default();
         self.prepare_code(Reading::Stochastic, options.code, options.tuning, span)?;
         self.expect_moves(span)?;
+        let actions = self.all_actions();
+        if let Some(known) = &interface.actions
+            && *known != actions
+        {
+            return Err(self.other_actions(known, &actions, span));
+        }
         let Some(wait) = wait.or((!observation.has_clocks()).then_some(f64::INFINITY)) else {
             return Err(self.no_wait(span));
         };
@@ -41,7 +57,24 @@ impl LoadedModel {
             policy: Some(Arc::new(policy)),
             ..NamedStrategy::new(name.to_owned(), String::from("a policy"), None)
         });
-        Ok(self.all_actions())
+        Ok(actions)
+    }
+
+    /// The refusal of a policy that decides between other actions than those of the model.
+    fn other_actions(&self, known: &[String], actions: &[String], span: Span) -> Rejection {
+        let differ = known.iter().zip(actions).position(|(one, own)| one != own);
+        let place = differ.unwrap_or(known.len().min(actions.len()));
+        let text = |list: &[String]| {
+            let text = list.get(place).map(|text| format!("`{text}`"));
+            text.unwrap_or_else(|| String::from("none"))
+        };
+        let message = format!(
+            "the policy is for another model: its action {place} is {}, and that of this model {}",
+            text(known),
+            text(actions)
+        );
+        let help = "train it in an environment of this model";
+        self.refusal(codes::UNSUPPORTED_QUERY, span, message, help)
     }
 
     /// The features at a span.

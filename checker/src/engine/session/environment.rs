@@ -88,6 +88,8 @@ pub struct Environment {
     pub features: FeatureTexts,
     /// Whether the greatest value is the best.
     pub is_greatest: bool,
+    /// For how long the controller waits at most.
+    pub wait: f64,
     commands: Sender<Command>,
     reports: Receiver<Reported>,
     is_over: Arc<AtomicBool>,
@@ -116,6 +118,7 @@ impl Environment {
             actions: model.all_actions(),
             features: learned_json::texts(&asked.observation),
             is_greatest: asked.optimum.is_greatest,
+            wait: asked.wait,
             commands,
             reports,
             is_over: Arc::clone(&is_over),
