@@ -104,6 +104,11 @@ impl Experience {
         new
     }
 
+    /// How many decisions are remembered.
+    pub(super) fn len(&self) -> usize {
+        self.memories.len()
+    }
+
     /// Forgets the oldest decisions, whole runs of them, so that at most so many are left.
     pub(super) fn forget(&mut self, most: usize) {
         if self.memories.len() <= most {

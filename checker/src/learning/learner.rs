@@ -33,6 +33,9 @@ const JUDGING: u64 = 1 << 40;
 const FIRST_PART: u64 = 5;
 const SURE: f64 = 0.002;
 
+/// A decision that gives more samples counts for more than one, so that it takes no more time.
+const MANY_SAMPLES: f64 = 4.0;
+
 /// A better strategy counts as such if it gains so many standard errors.
 const NOTABLE: f64 = 0.2;
 
@@ -122,6 +125,7 @@ pub fn learn(
         experience: Experience::new(width, observation.continuous.len()),
         dimension: observation.continuous.len(),
         next_run: 0,
+        samples_of_step: 1.0,
         spread: 0.0,
         progress: Progress {
             runs: 0,
@@ -150,6 +154,8 @@ struct Learner<'a> {
     experience: Experience,
     dimension: usize,
     next_run: u64,
+    /// How many samples a decision gives: a wait gives one in each cell that it passes through.
+    samples_of_step: f64,
     /// The standard deviation of what runs cost when all was random.
     spread: f64,
     progress: Progress,
@@ -222,7 +228,8 @@ impl Learner<'_> {
         iteration: u64,
         watch: &mut dyn FnMut(&Progress) -> bool,
     ) -> Result<bool, Failure> {
-        let count = self.options.runs(iteration, self.progress.steps_of_run);
+        let steps_of_run = self.progress.steps_of_run * self.weight();
+        let count = self.options.runs(iteration, steps_of_run);
         let runs = self.next_run..self.next_run + count;
         self.next_run += count;
         let randomness = if iteration == 0 {
@@ -243,8 +250,14 @@ impl Learner<'_> {
         for episode in &episodes {
             self.experience.add(&mut self.partition, episode);
         }
-        self.experience.forget(self.options.memory);
+        let most = self.options.memory as f64 / self.weight();
+        self.experience.forget(most as usize);
         Ok(is_whole)
+    }
+
+    /// By how much a decision counts more than one, since it gives many samples.
+    fn weight(&self) -> f64 {
+        (self.samples_of_step / MANY_SAMPLES).max(1.0)
     }
 
     /// Cuts the partition further, and computes all values.
@@ -280,6 +293,7 @@ impl Learner<'_> {
             }
         }
         process.note(&mut self.partition.cells);
+        self.samples_of_step = process.len() as f64 / self.experience.len() as f64;
     }
 
     /// The mean value of runs under the strategy that takes the best action everywhere; none if it

@@ -75,13 +75,13 @@ impl Process {
     /// The process of some samples. Slots are cells with actions, stands are cells with slots; the
     /// first stand is the end.
     pub(super) fn new(
-        mut samples: Vec<Sample>,
+        samples: Vec<Sample>,
         points: Vec<f64>,
         slots: Vec<(u32, u32)>,
         stands: Vec<(u32, Box<[u32]>)>,
     ) -> Process {
         let trail = samples.clone();
-        samples.sort_by_key(|sample| (sample.slot, sample.next));
+        let samples = by_slots(&samples, slots.len());
         let (mut first_samples, mut first_ways) = (Vec::new(), Vec::new());
         let mut ways: Vec<Way> = Vec::new();
         for (place, of_way) in samples
@@ -155,6 +155,11 @@ impl Process {
             .into_iter()
             .map(|cell| std::mem::take(&mut groups[cell]));
         self.groups = groups.collect();
+    }
+
+    /// How many samples there are.
+    pub(super) fn len(&self) -> usize {
+        self.samples.len()
     }
 
     /// The samples of a slot.
@@ -312,4 +317,29 @@ impl Process {
             self.appraise(stand);
         }
     }
+}
+
+/// Samples in the order of their slots, and those of a slot in the order of the stands behind them.
+/// They are many, so they are counted first, and each is put where it belongs.
+fn by_slots(samples: &[Sample], slots: usize) -> Vec<Sample> {
+    let mut ends = vec![0; slots + 1];
+    for sample in samples {
+        ends[sample.slot as usize + 1] += 1;
+    }
+    for slot in 0..slots {
+        ends[slot + 1] += ends[slot];
+    }
+    let Some(&any) = samples.first() else {
+        return Vec::new();
+    };
+    let mut sorted = vec![any; samples.len()];
+    for &sample in samples {
+        let place = &mut ends[sample.slot as usize];
+        sorted[*place] = sample;
+        *place += 1;
+    }
+    for of_slot in sorted.chunk_by_mut(|one, other| one.slot == other.slot) {
+        of_slot.sort_by_key(|sample| sample.next);
+    }
+    sorted
 }
