@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from ntagen.cli.needle.odds import Wanted
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, echo_message
 from ntagen.errors import InputError
 from ntagen.files import read_file, write_files
 
 if TYPE_CHECKING:
-    from ntagen.drive.settings import Settings
     from ntagen.nsl import Task
-    from ntagen.plan.anytime import Best
     from ntagen.plan.policy import Aim, Policy
     from ntagen.plan.steering import Comparison, Mean, Steered
-    from ntagen.render import Seen
     from ntagen.scene import Scene
 
 DEFAULT_RUNS: Final = 100_000
 """A policy is learned from this number of runs. A tenth of it compares it with the plan."""
-
-BUDGET_S: Final = 20.0
-"""The search for plans ends after this time, which is enough to end by itself: so the same seed
-gives the same policy."""
-
-_COMPARED_PART: Final = 10
-_PLANS: Final = 10
-"""A policy is learned around the best of this number of plans."""
 
 _WORDS: Final = {
     "probability": "reaches the target, and touches nothing",
@@ -53,28 +41,19 @@ def optimise(
     as_json: bool,
 ) -> int:
     """Learns a policy, prints what it is worth, and writes it; the exit code."""
-    from ntagen.drive.configure import configure
-    from ntagen.plan.chance import Sampling
-    from ntagen.plan.steering import steer
+    from ntagen.drive.best_policy import BUDGET_S, best_policy, sampling_of
 
-    scene = task.scene
-    if not scene.tissue.is_stochastic:
-        raise InputError(
-            f"there is nothing to optimise in a tissue that is {scene.tissue.kind}\n"
-            "hint: write `tissue stochastic`, with its spreads if you know them"
-        )
-    settings = configure(task.given, scene).settings
-    best = _plans(scene, settings, BUDGET_S if budget_s is None else budget_s)
-    if best.verdict != "found":
-        return _say_none(best.verdict, as_json=as_json)
     runs = DEFAULT_RUNS if wanted.runs is None else wanted.runs
-    sampling = Sampling(max(2, runs // _COMPARED_PART), wanted.seed, learning_runs=runs)
     start_s = time.monotonic()
-    plans = [one.plan for one in best.candidates]
-    steered = steer(plans, scene, aim, seen_by(settings, scene), sampling)
+    sampling = sampling_of(runs, wanted.seed)
+    best, steered = best_policy(task, aim, sampling, BUDGET_S if budget_s is None else budget_s)
+    if steered is None:
+        return _say_none(best.verdict, as_json=as_json)
     seconds = time.monotonic() - start_s
     if output is not None:
         write_files({output: steered.policy.text()})
+    if steered.policy.is_silent:
+        _warn_silent(steered, aim)
     if as_json:
         echo(json.dumps(_record(steered, aim, seconds)))
         return 0
@@ -82,18 +61,6 @@ def optimise(
     if output is not None:
         echo(f"policy written to {output}")
     return 0
-
-
-def seen_by(settings: Settings, scene: Scene) -> Seen:
-    """How exactly the driver knows the tip when it asks a policy.
-
-    Of the bevel it knows no more than what the last roll may have erred.
-    """
-    from ntagen.render import Seen
-
-    priors = settings.priors
-    bevel_rad = math.hypot(priors.bevel_rad, scene.tissue.roll_rad)
-    return Seen(priors.noise_mm, priors.heading_rad, bevel_rad)
 
 
 def load_policy(path: Path, scene: Scene) -> Policy:
@@ -108,18 +75,6 @@ def load_policy(path: Path, scene: Scene) -> Policy:
         return read_policy(read_file(path, MOST_BYTES), scene)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-
-
-def _plans(scene: Scene, settings: Settings, budget_s: float) -> Best:
-    """The best plans by reserve, as for `--rank probability`."""
-    from ntagen.drive.settings import engine_for
-    from ntagen.plan.anytime import best_plans
-    from ntagen.plan.rank import split_ranking
-
-    _, criteria = split_ranking("probability")
-    engine = replace(engine_for(settings), ranking=criteria)
-    *_, last = best_plans(scene, engine, clock=time.monotonic, count=_PLANS, budget_s=budget_s)
-    return last
 
 
 def _say_none(verdict: str, *, as_json: bool) -> int:
@@ -139,7 +94,9 @@ def _record(steered: Steered, aim: Aim, seconds: float) -> dict[str, object]:
         "verdict": "found",
         "optimised": aim,
         "plan": str(steered.plan),
-        "is_better": steered.aims[aim].is_better,
+        "is_silent": steered.policy.is_silent,
+        "is_better": steered.aims[aim].verdict == "better",
+        "guard": asdict(steered.guard),
         "aims": {name: asdict(one) for name, one in steered.aims.items()},
         "learning_runs": steered.learning_runs,
         "seconds": seconds,
@@ -162,7 +119,18 @@ def _show(steered: Steered, aim: Aim, seed: int, seconds: float) -> None:
         echo(f"  {_WORDS[name]}{mark}")
         echo(f"    the plan:   {_span(one.plan, name)}")
         echo(f"    the policy: {_span(one.policy, name)}")
-        echo(f"    difference: {_span(_signed(one, name), name, sign='+')}, {_judged(one)}")
+        echo(f"    difference: {_span(_signed(one, name), name, sign='+')}, {one.verdict}")
+
+
+def _warn_silent(steered: Steered, aim: Aim) -> None:
+    guard = steered.guard
+    difference = _span(_signed(guard, aim), aim, sign="+")
+    echo_message(
+        f"warning: what was learned is not better than the plan in {guard.runs:,} other tissues: "
+        f"difference {difference}\n"
+        "note: so the policy is silent: it never differs from the plan\n"
+        "hint: drive without a policy, or learn from more --runs"
+    )
 
 
 def _signed(one: Comparison, aim: str) -> Mean:
@@ -171,12 +139,6 @@ def _signed(one: Comparison, aim: str) -> Mean:
     if aim == "probability":
         return gain
     return replace(gain, value=-gain.value, lower=-gain.upper, upper=-gain.lower)
-
-
-def _judged(one: Comparison) -> str:
-    if one.is_better:
-        return "better"
-    return "worse" if one.difference.upper < 0.0 else "not better"
 
 
 def _span(mean: Mean, aim: str, sign: str = "") -> str:
