@@ -1,10 +1,10 @@
 """Learns a policy around the best plan of a task with chance, and compares both.
 
 The engine learns in the model of `ntagen.render.render_policy`: the tip moves by chance and is seen
-with errors, and the policy decides when to roll. Only there, a part of the runs is led on its first
-way (`IS_LEARNING` in templates/uppaal/policy.c.jinja). Then the policy and the plan meet the same
-tissues, which learning has never seen: run 17 has the same factors and errors, whatever is done. So
-the difference of each pair of runs counts, and its mean has a narrow interval.
+with errors, and the policy decides when to roll. Only there, a part of the runs follows the plan
+until some push (`IS_LEARNING` in templates/uppaal/policy.c.jinja). Then the policy and the plan
+meet the same tissues, which learning has never seen: run 17 has the same factors and errors,
+whatever is done. So the difference of each pair of runs counts, and its mean has a narrow interval.
 
 The plan is a candidate, too: if the policy is not better for certain in some tissues, it becomes
 silent. What is reported comes from others, so that it is no better than the truth.
@@ -237,6 +237,9 @@ def _learned(model: Model, around: Around, scene: Scene, aim: Aim, sampling: Sam
         good_runs=runs,
         eval_runs=max(2, runs // 3),
         max_iterations=ITERATIONS,
+        reset_no_better=ITERATIONS,
+        # What it is worth is estimated below, beside the plan.
+        runs=2,
         seed=sampling.seed,
         threads=sampling.threads,
     )

@@ -98,7 +98,6 @@ class PolicyValues:
         bevel_rad: That of the bevel's angle.
         most_pushes: So many pushes are made at most.
         apart: So many pushes must lie between two rolls.
-        window: A roll may come so many pushes before or after its place.
         first: By roll: from how many pushes on it may be made.
         last: By roll: after how many it must be made.
         places: By roll: after how many the plan makes it.
@@ -114,7 +113,6 @@ class PolicyValues:
     bevel_rad: str
     most_pushes: int
     apart: int
-    window: int
     first: tuple[int, ...]
     last: tuple[int, ...]
     places: tuple[int, ...]
@@ -229,7 +227,6 @@ def _policy(scene: Scene, around: Around, vector: Callable[[Vector], str]) -> Po
         bevel_rad=_double(around.seen.bevel_rad),
         most_pushes=around.most_pushes,
         apart=apart(scene),
-        window=around.window,
         first=around.first,
         last=around.last,
         places=tuple(place for place, _ in around.rolls),

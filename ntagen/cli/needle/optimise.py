@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -16,7 +16,7 @@ from ntagen.files import read_file, write_files
 if TYPE_CHECKING:
     from ntagen.nsl import Task
     from ntagen.plan.policy import Aim, Policy
-    from ntagen.plan.steering import Comparison, Mean, Steered
+    from ntagen.plan.steering import Mean, Steered
     from ntagen.scene import Scene
 
 DEFAULT_RUNS: Final = 100_000
@@ -117,14 +117,14 @@ def _show(steered: Steered, aim: Aim, seed: int, seconds: float) -> None:
     for name, one in steered.aims.items():
         mark = " (optimised)" if name == aim else ""
         echo(f"  {_WORDS[name]}{mark}")
-        echo(f"    the plan:   {_span(one.plan, name)}")
-        echo(f"    the policy: {_span(one.policy, name)}")
-        echo(f"    difference: {_span(_signed(one, name), name, sign='+')}, {one.verdict}")
+        echo(f"    the plan:   {span(one.plan, name)}")
+        echo(f"    the policy: {span(one.policy, name)}")
+        echo(f"    difference: {span(signed(one.difference, name), name, sign='+')}, {one.verdict}")
 
 
 def _warn_silent(steered: Steered, aim: Aim) -> None:
     guard = steered.guard
-    difference = _span(_signed(guard, aim), aim, sign="+")
+    difference = span(signed(guard.difference, aim), aim, sign="+")
     echo_message(
         f"warning: what was learned is not better than the plan in {guard.runs:,} other tissues: "
         f"difference {difference}\n"
@@ -133,15 +133,15 @@ def _warn_silent(steered: Steered, aim: Aim) -> None:
     )
 
 
-def _signed(one: Comparison, aim: str) -> Mean:
-    """The policy's value less the plan's."""
-    gain = one.difference
+def signed(gain: Mean, aim: str) -> Mean:
+    """The policy's value less the plan's, of a gain."""
     if aim == "probability":
         return gain
-    return replace(gain, value=-gain.value, lower=-gain.upper, upper=-gain.lower)
+    return Mean(-gain.value, -gain.upper, -gain.lower)
 
 
-def _span(mean: Mean, aim: str, sign: str = "") -> str:
+def span(mean: Mean, aim: str, sign: str = "") -> str:
+    """A mean and its interval, in the unit of what is optimised."""
     scale, unit = (100.0, " %") if aim == "probability" else (1.0, " mm")
     value, lower, upper = (scale * one for one in (mean.value, mean.lower, mean.upper))
     return f"{value:{sign}.4g}{unit} (from {lower:{sign}.4g} to {upper:{sign}.4g}{unit})"

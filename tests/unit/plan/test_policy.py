@@ -224,18 +224,23 @@ def test_the_needle_bounds_the_pushes() -> None:
     assert around_of(PLAN, short, SEEN).most_pushes == 26
 
 
-def test_random_starts_are_for_learning_only() -> None:
-    """Without them, all runs of the plan's own model are those of the plan: it rolls in place."""
+def test_only_learning_follows_the_plan_at_first() -> None:
     model = checker.load(render_policy(SCENE, around_of(PLAN, SCENE, SEEN)))
-    query = "simulate [<=60; 40] {rolled_at, led_pushes}"
-    places = {}
+    query = "simulate [<=60; 60] {rolled_at, led_pushes}"
+    led = {}
     for learns in ("false", "true"):
         answer = model.with_constants(IS_LEARNING=learns).check(query, seed=1)
-        runs = [one.values for one in answer.trajectories]
-        places[learns] = {run["led_pushes"][-1] for run in runs}
-    assert places["false"] == {0.0}
-    assert 0.0 in places["true"]
-    assert len(places["true"]) > 5
+        ends = [
+            (run.values["led_pushes"][-1], run.values["rolled_at"][-1])
+            for run in answer.trajectories
+        ]
+        led[learns] = {one for one, _ in ends}
+        # The plan rolls after 9 pushes, its window begins after 4.
+        assert all(rolled == 9.0 for one, rolled in ends if one > 9.0)
+        assert any(rolled == 4.0 for one, rolled in ends if one <= 4.0)
+    assert led["false"] == {0.0}
+    assert 0.0 in led["true"]
+    assert len(led["true"]) > 5
     fixed = model.with_constants(IS_FIXED="true").check(query, seed=1)
     assert {run.values["rolled_at"][-1] for run in fixed.trajectories} == {9.0}
 
