@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import signal
+import subprocess
+import sys
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -235,3 +238,24 @@ def test_rows_do_not_depend_on_workers_and_policies_are_those_of_plan(tmp_path: 
     assert cli.main([*plan, "-o", str(alone)]) == 0
     assert alone.read_bytes() == data
     assert policy.is_silent == row["is_silent"]
+
+
+@pytest.mark.slow
+def test_ctrl_c_keeps_rows_and_ends_workers(tmp_path: Path) -> None:
+    wanted = ["policies", "--random", "40", "--seed", "2", "--runs", "200", "--json"]
+    words = [sys.executable, "-m", "ntagen", *wanted, "--workers", "1", "-o", str(tmp_path)]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        assert "1 of 40 tasks: random_2" in process.stderr.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert f"kept in {tmp_path}; go on with --resume" in err
+    rows = json.loads(out)["rows"]
+    assert 1 <= len(rows) < 40
+    # A row may be on the disk that nobody was told of.
+    kept = finished(tmp_path, campaign_of([], 40, 2, FEW))
+    assert rows == [asdict(kept[row["task"]]) for row in rows]
