@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -137,7 +137,7 @@ def signed(gain: Mean, aim: str) -> Mean:
     """The policy's value less the plan's, of a gain."""
     if aim == "probability":
         return gain
-    return Mean(-gain.value, -gain.upper, -gain.lower)
+    return replace(gain, value=-gain.value, lower=-gain.upper, upper=-gain.lower)
 
 
 def span(mean: Mean, aim: str, sign: str = "") -> str:
