@@ -224,8 +224,9 @@ ONLY_IN: dict[str, set[str]] = {
         "testing",
     },
     "datetime": {"drive", "cli"},
-    # What must not happen by itself: random numbers have a seed and are drawn by the simulation.
-    "random": {"needle", "drive", "checker.runs", "checker.play"},
+    # What must not happen by itself: random numbers have a seed, and are drawn by the simulation
+    # and for random tasks.
+    "random": {"needle", "drive", "experiment", "checker.runs", "checker.play"},
 }
 """By library: the rooms that may import it. Libraries that are not listed may be used anywhere."""
 

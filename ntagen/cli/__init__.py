@@ -47,6 +47,7 @@ COMMANDS: Final = {
     "drive": ("needle.drive", "Steer a needle to the target and log the run."),
     "experiment": ("needle.experiment", "Drive many simulated runs, and make a table of them."),
     "sweep": ("needle.sweep", "Show how much of an error a task stands."),
+    "policies": ("needle.policies", "Show what policies gain over plans, task by task."),
     "calibrate": ("needle.calibrate", "Find where a scene lies for a tracker, by pairs of points."),
     "device": ("needle.device", "Try a device before it drives a needle."),
     "match": ("needle.match", "Find the actions that explain measured traces of the tip."),

@@ -4,7 +4,7 @@ Whoever follows a plan asks the policy after each push of the model (`ntagen.pla
 plan goes on with the same move, nothing changes. If not, the rolls that the policy has still to
 make give plans that begin with its move; the best of those that hold for the newest estimate
 replaces the plan. They must pass what every plan of the driver must pass: its certificate, its
-tube, and the time that is left. Where the policy is silent, or none of its plans holds, the plan
+tube, and the time that is left. Where the policy says nothing, or none of its plans holds, the plan
 stays, which syntheses have found and go on to check.
 """
 
@@ -35,7 +35,7 @@ class Advice:
     """The policy of a run.
 
     Args:
-        policy: The policy; None to follow plans alone.
+        policy: The policy; None or a silent one to follow plans alone.
         scene: The a-priori scene.
         needle: The needle.
         journal: Records who decides.
@@ -44,7 +44,7 @@ class Advice:
     def __init__(
         self, policy: Policy | None, scene: Scene, needle: Steering, journal: Journal
     ) -> None:
-        self._policy = policy
+        self._policy = None if policy is None or policy.is_silent else policy
         self._scene = scene
         self._needle = needle
         self._journal = journal

@@ -347,7 +347,7 @@ class Advised(Record):
 
     Attributes:
         depth_mm: The insertion depth.
-        move: What it says: ``push`` or ``roll``; empty where it is silent.
+        move: What it says: ``push`` or ``roll``; empty where it says nothing.
         by: Who decided: ``policy``, or ``re-synthesis`` if the plan stays against it.
         reason: Why, in words; the new plan if there is one.
     """

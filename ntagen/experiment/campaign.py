@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from ntagen.cluster.identity import identity
-from ntagen.experiment.crew import Crew
+from ntagen.experiment.crew import Crew, Done, work_off
 from ntagen.experiment.description import Experiment, Row
 from ntagen.experiment.making import Block
 from ntagen.experiment.record import Run
@@ -58,7 +58,7 @@ class Progress:
 def carry_out(
     experiment: Experiment,
     folder: Path,
-    crew_of: Callable[[], Crew],
+    crew_of: Callable[[], Crew[Block]],
     *,
     resume: bool = False,
     logs: bool = True,
@@ -117,7 +117,7 @@ class _Work:
     reached: int = 0
     hits: int = 0
 
-    def make(self, crew_of: Callable[[], Crew]) -> None:
+    def make(self, crew_of: Callable[[], Crew[Block]]) -> None:
         """Makes what is missing."""
         self.before = len(self.runs)
         self.missing.update({row.id: len(row.seeds) for row in self.experiment.rows})
@@ -126,21 +126,14 @@ class _Work:
         if self.before == self.experiment.runs:
             return
         crew = crew_of()
-        try:
-            waiting = deque(self._blocks(crew.size))
-            busy = 0
-            while waiting or busy:
-                while waiting and crew.has_room:
-                    crew.start(waiting.popleft())
-                    busy += 1
-                for done in crew.wait():
-                    busy -= 1
-                    if done.runs is None:
-                        waiting.extendleft(self._left_by_death(done.block))
-                    else:
-                        self._add(done.runs)
-        finally:
-            crew.close()
+        work_off(crew, self._blocks(crew.size), self._take)
+
+    def _take(self, done: Done[Block]) -> list[Block]:
+        """Takes a block that is over, and gives what is to be made in its place."""
+        if done.made is None:
+            return self._left_by_death(done.job)
+        self._add(done.made)
+        return []
 
     def _blocks(self, workers: int) -> Iterator[Block]:
         """The missing runs, in blocks."""

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
-from ntagen.experiment.making import Block, make_block
-from ntagen.experiment.record import Run
+
+class Job(Protocol):
+    """What one worker does in one piece; it can be sent to another process."""
+
+    @property
+    def name(self) -> str:
+        """A name that no other job of the campaign has."""
+
+    def make(self) -> list[Any]:
+        """Does it; the results."""
+
+
+J = TypeVar("J", bound=Job)
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
-    """A block that is over.
+class Done(Generic[J]):
+    """A job that is over.
 
     Attributes:
-        block: The block.
-        runs: All its runs; None if its worker died.
+        job: The job.
+        made: All its results; None if its worker died.
     """
 
-    block: Block
-    runs: list[Run] | None
+    job: J
+    made: list[Any] | None
 
 
-class Crew(Protocol):
-    """Makes blocks."""
+class Crew(Protocol[J]):
+    """Does jobs."""
 
     @property
     def size(self) -> int:
@@ -31,43 +44,73 @@ class Crew(Protocol):
 
     @property
     def has_room(self) -> bool:
-        """Whether another block should be handed over."""
+        """Whether another job should be handed over."""
 
-    def start(self, block: Block) -> None:
-        """Hands a block over."""
+    def start(self, job: J) -> None:
+        """Hands a job over."""
 
-    def wait(self) -> list[Done]:
-        """Waits until at least one of the blocks is over; none if none was handed over.
+    def wait(self) -> list[Done[J]]:
+        """Waits until at least one of the jobs is over; none if none was handed over.
 
         Raises:
             InputError: A worker cannot work, or cannot write.
         """
 
     def close(self) -> None:
-        """Ends all workers at once, also in the middle of a run."""
+        """Ends all workers at once, also in the middle of a job."""
 
 
-class Here:
+def work_off(crew: Crew[J], jobs: Iterable[J], take: Callable[[Done[J]], Iterable[J]]) -> None:
+    """Has all jobs done, and lets the crew go.
+
+    Args:
+        crew: Who does them.
+        jobs: The jobs, the most urgent first.
+        take: Takes a job that is over, and gives those that are to be done in its place.
+
+    Raises:
+        InputError: A worker cannot work, or cannot write.
+    """
+    try:
+        waiting = deque(jobs)
+        busy = 0
+        while waiting or busy:
+            while waiting and crew.has_room:
+                crew.start(waiting.popleft())
+                busy += 1
+            for done in crew.wait():
+                busy -= 1
+                waiting.extendleft(take(done))
+    finally:
+        crew.close()
+
+
+def made_by(job: Job) -> list[Any]:
+    """The results of a job: what a worker does."""
+    return job.make()
+
+
+class Here(Generic[J]):
     """This process: for tests, and for looking into a run with a debugger."""
 
     size = 1
 
     def __init__(self) -> None:
-        self._blocks: list[Block] = []
+        self._jobs: list[J] = []
 
     @property
     def has_room(self) -> bool:
-        """Whether no block is waiting."""
-        return not self._blocks
+        """Whether no job is waiting."""
+        return not self._jobs
 
-    def start(self, block: Block) -> None:
-        """Keeps the block for `wait`."""
-        self._blocks.append(block)
+    def start(self, job: J) -> None:
+        """Keeps the job for `wait`."""
+        self._jobs.append(job)
 
-    def wait(self) -> list[Done]:
-        """Makes the blocks."""
-        blocks, self._blocks = self._blocks, []
-        return [Done(block, make_block(block)) for block in blocks]
+    def wait(self) -> list[Done[J]]:
+        """Does the jobs."""
+        jobs, self._jobs = self._jobs, []
+        return [Done(job, made_by(job)) for job in jobs]
 
     def close(self) -> None:
         """Does nothing."""

@@ -10,20 +10,19 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from typing import Any, Final
+import uuid
+from typing import Any, Final, Generic
 
 from ntagen.cluster.workers import Workers, as_messages, distributed
-from ntagen.experiment import making
-from ntagen.experiment.crew import Done
-from ntagen.experiment.making import Block
+from ntagen.experiment.crew import Done, J, made_by
 
-_BLOCKS_AHEAD: Final = 2
-"""So many blocks for each worker are handed over, so that none waits for this process."""
+_JOBS_AHEAD: Final = 2
+"""So many jobs for each worker are handed over, so that none waits for this process."""
 
 _ADVICE: Final = "finished runs are kept; start the cluster again, and go on with --resume"
 
 
-class DaskCrew:
+class DaskCrew(Generic[J]):
     """The workers of a scheduler.
 
     Args:
@@ -38,8 +37,10 @@ class DaskCrew:
         self._dask: Any = distributed()
         self._workers = Workers(address)
         self._client = self._workers.client
-        self._busy: dict[Any, Block] = {}
+        self._busy: dict[Any, J] = {}
         self._numbers = itertools.count()
+        # Two campaigns at one scheduler must not share results.
+        self._own = uuid.uuid4().hex[:12]
 
     @property
     def size(self) -> int:
@@ -48,33 +49,33 @@ class DaskCrew:
 
     @property
     def has_room(self) -> bool:
-        """Whether fewer blocks are handed over than the workers can take at once, and some more."""
-        return len(self._busy) < _BLOCKS_AHEAD * self.size
+        """Whether fewer jobs are handed over than the workers can take at once, and some more."""
+        return len(self._busy) < _JOBS_AHEAD * self.size
 
-    def start(self, block: Block) -> None:
-        """Hands a block to the scheduler."""
-        key = f"ntagen-{block.name}-{block.row.digest[:12]}-{next(self._numbers)}"
-        future = self._client.submit(making.make_block, block, key=key, pure=False)
-        self._busy[future] = block
+    def start(self, job: J) -> None:
+        """Hands a job to the scheduler."""
+        key = f"ntagen-{job.name}-{self._own}-{next(self._numbers)}"
+        future = self._client.submit(made_by, job, key=key, pure=False)
+        self._busy[future] = job
 
-    def wait(self) -> list[Done]:
-        """Waits until a block is over; one whose workers died again and again has no runs."""
+    def wait(self) -> list[Done[J]]:
+        """Waits until a job is over; one whose workers died again and again has no results."""
         if not self._busy:
             return []
         with as_messages(_ADVICE), self._client.as_current():
             ready = self._dask.wait(list(self._busy), return_when="FIRST_COMPLETED").done
         done = []
         for future in ready:
-            block = self._busy.pop(future)
+            job = self._busy.pop(future)
             try:
                 with as_messages(_ADVICE):
-                    done.append(Done(block, future.result()))
+                    done.append(Done(job, future.result()))
             except self._dask.KilledWorker:
-                done.append(Done(block, None))
+                done.append(Done(job, None))
         return done
 
     def close(self) -> None:
-        """Takes back all blocks that no worker has begun; the others are made, and do no harm."""
+        """Takes back all jobs that no worker has begun; the others are made, and do no harm."""
         with contextlib.suppress(Exception):
             self._client.cancel(list(self._busy), force=True)
         self._workers.close()

@@ -1,6 +1,6 @@
 """Workers that are processes of this machine.
 
-Each worker is a pool of one process, so that it is known which block a process had that died. The
+Each worker is a pool of one process, so that it is known which job a process had that died. The
 processes are started afresh, not forked: a fork copies locks and threads in any state.
 """
 
@@ -14,13 +14,11 @@ import signal
 import threading
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from typing import Final
+from typing import Any, Final, Generic
 
 from ntagen import system
 from ntagen.errors import InputError
-from ntagen.experiment.crew import Done
-from ntagen.experiment.making import Block, make_block
-from ntagen.experiment.record import Run
+from ntagen.experiment.crew import Done, J, Job, made_by
 
 _MOST_FAILED_STARTS: Final = 2
 
@@ -28,7 +26,7 @@ _MAIN: Final = "MainProcess"
 """The name that Python gives to a process that no other Python has started."""
 
 
-class LocalCrew:
+class LocalCrew(Generic[J]):
     """Worker processes.
 
     Args:
@@ -41,7 +39,7 @@ class LocalCrew:
     def __init__(self, count: int) -> None:
         require_main_process()
         self._idle = [_Worker() for _ in range(count)]
-        self._busy: dict[Future[list[Run]], tuple[_Worker, Block]] = {}
+        self._busy: dict[Future[list[Any]], tuple[_Worker, J]] = {}
         self.size = count
         self._failed_starts = 0
 
@@ -50,13 +48,13 @@ class LocalCrew:
         """Whether a worker has nothing to do."""
         return bool(self._idle)
 
-    def start(self, block: Block) -> None:
-        """Gives a block to a worker that has nothing to do."""
+    def start(self, job: J) -> None:
+        """Gives a job to a worker that has nothing to do."""
         worker = self._idle.pop()
-        self._busy[worker.start(block)] = worker, block
+        self._busy[worker.start(job)] = worker, job
 
-    def wait(self) -> list[Done]:
-        """Waits until a block is over; a worker that died is replaced.
+    def wait(self) -> list[Done[J]]:
+        """Waits until a job is over; a worker that died is replaced.
 
         Raises:
             InputError: Workers end before they begin.
@@ -64,18 +62,18 @@ class LocalCrew:
         ready, _ = wait(self._busy, return_when=FIRST_COMPLETED)
         done = []
         for future in ready:
-            worker, block = self._busy.pop(future)
+            worker, job = self._busy.pop(future)
             try:
-                runs = future.result()
+                made = future.result()
             except BrokenProcessPool:
                 self._count_start(worker)
                 worker.close()
                 self._idle.append(_Worker())
-                done.append(Done(block, None))
+                done.append(Done(job, None))
             else:
                 self._failed_starts = 0
                 self._idle.append(worker)
-                done.append(Done(block, runs))
+                done.append(Done(job, made))
         return done
 
     def _count_start(self, worker: _Worker) -> None:
@@ -96,7 +94,7 @@ class LocalCrew:
 
 
 class _Worker:
-    """A pool of one process, which starts with its first block."""
+    """A pool of one process, which starts with its first job."""
 
     def __init__(self) -> None:
         self._pool = ProcessPoolExecutor(
@@ -104,15 +102,15 @@ class _Worker:
         )
         self._pid: Future[int] | None = None
 
-    def start(self, block: Block) -> Future[list[Run]]:
-        """Gives it a block."""
+    def start(self, job: Job) -> Future[list[Any]]:
+        """Gives it a job."""
         try:
             if self._pid is None:
                 self._pid = self._pool.submit(os.getpid)
-            return self._pool.submit(make_block, block)
+            return self._pool.submit(made_by, job)
         except BrokenProcessPool as error:
-            # It died between two blocks.
-            failed: Future[list[Run]] = Future()
+            # It died between two jobs.
+            failed: Future[list[Any]] = Future()
             failed.set_exception(error)
             return failed
 

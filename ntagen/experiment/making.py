@@ -21,7 +21,7 @@ from ntagen.drive.simulate import Result, simulate, synthesiser_for
 from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.experiment.description import Row, digest_of
-from ntagen.experiment.record import Observer, Run, Synthesised
+from ntagen.experiment.record import Observer, Run, Synthesised, line_of
 from ntagen.experiment.store import Results, finished_in, new_log
 from ntagen.nsl import Task, load_task
 
@@ -54,6 +54,10 @@ class Block:
     def name(self) -> str:
         """A name that no block with other runs has."""
         return f"{self.row.id}-{self.seeds[0]}-{self.seeds[-1]}-{len(self.seeds)}"
+
+    def make(self) -> list[Run]:
+        """As `make_block`."""
+        return make_block(self)
 
 
 def make_block(block: Block, notify: Callable[[Run], None] = lambda _: None) -> list[Run]:
@@ -88,7 +92,7 @@ def make_block(block: Block, notify: Callable[[Run], None] = lambda _: None) -> 
         for seed in block.seeds:
             if seed not in made or (block.logs and not Path(block.folder, made[seed].log).exists()):
                 made[seed] = _made(block, task, seed)
-                results.add(made[seed])
+                results.add(line_of(made[seed]))
                 notify(made[seed])
     return [made[seed] for seed in block.seeds]
 

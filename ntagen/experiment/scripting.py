@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from ntagen import system
 from ntagen.errors import InputError
@@ -61,7 +62,7 @@ def campaign(
     )
 
 
-def crew_of(workers: int | None, dask: str | None = None) -> Callable[[], Crew]:
+def crew_of(workers: int | None, dask: str | None = None) -> Callable[[], Crew[Any]]:
     """Engages processes of this machine, or a cluster.
 
     Args:

@@ -20,15 +20,15 @@ import errno
 import json
 import os
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, Protocol
 
 from ntagen import system
 from ntagen.cluster.identity import identity
 from ntagen.errors import InputError
 from ntagen.experiment.description import Experiment
-from ntagen.experiment.record import Run, line_of, run_of
+from ntagen.experiment.record import Run, run_of
 from ntagen.files import lock, write_files
 
 FORMAT_VERSION: Final = 1
@@ -40,7 +40,7 @@ _PART: Final = ".part"
 
 
 @contextlib.contextmanager
-def taken(folder: Path, experiment: Experiment, *, resume: bool) -> Iterator[None]:
+def taken(folder: Path, experiment: Owner, *, resume: bool) -> Iterator[None]:
     """Takes a folder for an experiment: nobody else may until the context ends.
 
     Args:
@@ -71,6 +71,34 @@ def taken(folder: Path, experiment: Experiment, *, resume: bool) -> Iterator[Non
             _sweep(folder)
     finally:
         os.close(descriptor)
+
+
+class Named(Protocol):
+    """A row of what a folder is for."""
+
+    @property
+    def id(self) -> str:
+        """Its name."""
+
+    @property
+    def digest(self) -> str:
+        """Rows with the same digest give the same results."""
+
+
+class Owner(Protocol):
+    """What a folder is for."""
+
+    @property
+    def name(self) -> str:
+        """Its name, for people."""
+
+    @property
+    def digest(self) -> str:
+        """Of all rows."""
+
+    @property
+    def rows(self) -> Sequence[Named]:
+        """Its rows."""
 
 
 def finished(folder: Path, experiment: Experiment) -> dict[tuple[str, int], Run]:
@@ -108,8 +136,8 @@ class Results:
         if self._descriptor is not None:
             os.close(self._descriptor)
 
-    def add(self, run: Run) -> None:
-        """Adds a run; when this returns, the run is on the disk.
+    def add(self, line: bytes) -> None:
+        """Adds the line of what was made; when this returns, it is on the disk.
 
         Raises:
             InputError: It cannot be written.
@@ -118,7 +146,7 @@ class Results:
             if self._descriptor is None:
                 flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND | system.BINARY
                 self._descriptor = os.open(self._path, flags, 0o666)
-            rest = memoryview(line_of(run))
+            rest = memoryview(line)
             while rest:
                 rest = rest[os.write(self._descriptor, rest) :]
             os.fsync(self._descriptor)
@@ -157,6 +185,12 @@ def naming(path: Path) -> Iterator[None]:
         raise InputError(f"cannot write {path}: {reason}\nhint: {hint}") from error
 
 
+def lines_in(folder: Path) -> Iterator[bytes]:
+    """The lines of all that was made in a folder; the last one of a file may be torn."""
+    for path in sorted(Path(folder, RESULTS).glob("*.jsonl")):
+        yield from path.read_bytes().splitlines()
+
+
 def _read(paths: Iterable[Path]) -> Iterator[Run]:
     for path in sorted(paths):
         for line in path.read_bytes().splitlines():
@@ -171,7 +205,7 @@ def _sweep(folder: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def _claim(folder: Path, experiment: Experiment, *, resume: bool) -> None:
+def _claim(folder: Path, experiment: Owner, *, resume: bool) -> None:
     """Writes whose folder this is, or checks that it is that of this experiment."""
     path = folder / HEADER
     # What ended before its first run was finished has left nothing that could be lost.
@@ -207,7 +241,7 @@ def _claim(folder: Path, experiment: Experiment, *, resume: bool) -> None:
         )
 
 
-def _difference(rows: dict[str, str], experiment: Experiment) -> str:
+def _difference(rows: dict[str, str], experiment: Owner) -> str:
     """In which row an experiment differs from that of its folder."""
     for row in experiment.rows:
         if row.id not in rows:

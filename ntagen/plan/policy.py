@@ -6,7 +6,8 @@ target lies in the tip's frame, and where the tip is. `ntagen.plan.steering` lea
 engine; here are its file and its decisions.
 
 For each number of rolls and pushes there is a binary tree for each of the two moves. Its leaves say
-what the move costs. Where learning has never been, a policy is silent.
+what the move costs. Where learning has never been, a policy says nothing. A policy that is no
+better than its plan is *silent*: it says nothing anywhere, and has no trees.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ CONTINUOUS: Final = ("ahead", "beside", "above", "seen_x", "seen_y", "seen_z")
 """What is seen, by the names of variables in templates/uppaal/policy.c.jinja."""
 
 FORMAT: Final = "ntagen policy"
-VERSION: Final = 1
+VERSION: Final = 2
 MOST_BYTES: Final = 64 * 2**20
 """The largest file of a policy; 100,000 runs give one of 100 KB."""
 
@@ -73,6 +74,7 @@ class Policy:
         around: The plan whose rolls it makes, and how far it may deviate.
         strategy: What the engine has learned: JSON as ``saveStrategy`` writes it.
         values: What runs say of it and of the plan (`ntagen.plan.steering.Comparison`), as JSON.
+        is_silent: Whether it never differs from the plan.
         trees: For each number of rolls and of pushes the trees of both moves.
     """
 
@@ -81,6 +83,7 @@ class Policy:
     around: Around
     strategy: Mapping[str, Any]
     values: Mapping[str, Any]
+    is_silent: bool
     trees: Mapping[tuple[int, ...], Mapping[Move, Tree]]
 
     @staticmethod
@@ -96,7 +99,19 @@ class Policy:
         Raises:
             KeyError, TypeError, ValueError: The strategy is another one, or torn.
         """
-        return Policy(aim, digest, around, strategy, values, _trees(strategy))
+        return Policy(aim, digest, around, strategy, values, False, _trees(strategy))
+
+    @staticmethod
+    def silent(aim: Aim, digest: str, around: Around, values: Mapping[str, Any]) -> Policy:
+        """A policy that never differs from the plan.
+
+        Args:
+            aim: What it is the best for.
+            digest: That of the model around this plan.
+            around: The plan; the window is 0.
+            values: As in `Policy`.
+        """
+        return Policy(aim, digest, around, {}, values, True, {})
 
     def decide(self, scene: Scene, tip: Pose, depth_mm: float, rolls: int) -> Move | None:
         """What to do where the tip is seen.
@@ -108,9 +123,11 @@ class Policy:
             rolls: The rolls so far.
 
         Returns:
-            The move; None where the policy is silent: between two pushes of the model, after the
-            last roll, and where learning has never been.
+            The move; None where the policy says nothing: between two pushes of the model, after the
+            last roll, where learning has never been, and everywhere if it is silent.
         """
+        if self.is_silent:
+            return None
         around, steps = self.around, depth_mm / push_mm(scene)
         pushes = round(steps)
         if abs(steps - pushes) > WHOLE or rolls >= len(around.rolls):
@@ -138,6 +155,7 @@ class Policy:
             "version": VERSION,
             "aim": self.aim,
             "model_sha256": self.digest,
+            "is_silent": self.is_silent,
             "around": asdict(self.around),
             "values": self.values,
             "strategy": self.strategy,
@@ -214,8 +232,12 @@ def _policy(document: Mapping[str, Any]) -> Policy:
     if max(len(plan), *numbers.values()) > _MOST_PUSHES:
         raise ValueError(f"more than {_MOST_PUSHES} pushes")
     given = Around(plan, **numbers, inside_mm=float(around["inside_mm"]), seen=seen)
-    strategy, values = document["strategy"], dict(document["values"])
-    return Policy.of(aim, str(document["model_sha256"]), given, strategy, values)
+    digest, values = str(document["model_sha256"]), dict(document["values"])
+    if not isinstance(document["is_silent"], bool):
+        raise ValueError("is_silent is neither true nor false")
+    if document["is_silent"]:
+        return Policy.silent(aim, digest, given, values)
+    return Policy.of(aim, digest, given, document["strategy"], values)
 
 
 def _require_task(policy: Policy, scene: Scene) -> None:

@@ -1,19 +1,25 @@
 """Learns a policy around the best plan of a task with chance, and compares both.
 
 The engine learns in the model of `ntagen.render.render_policy`: the tip moves by chance and is seen
-with errors, and the policy decides when to roll. Then the policy and the plan meet the same
-tissues, which learning has never seen: run 17 has the same factors and errors, whatever is done. So
-the difference of each pair of runs counts, and its mean has a narrow interval.
+with errors, and the policy decides when to roll. Only there, a part of the runs follows the plan
+until some push (`IS_LEARNING` in templates/uppaal/policy.c.jinja). Then the policy and the plan
+meet the same tissues, which learning has never seen: run 17 has the same factors and errors,
+whatever is done. So the difference of each pair of runs counts, and its mean has a narrow interval.
+
+The plan is a candidate, too: if the policy is not better for certain in some tissues, it becomes
+silent. What is reported comes from others, so that it is no better than the truth.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from statistics import NormalDist, fmean, stdev
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen.errors import InputError, LimitError, ModelError
 from ntagen.plan.actions import Plan
@@ -34,6 +40,9 @@ SPARE_PUSHES: Final = 3
 ITERATIONS: Final = 10
 """A policy is learned in so many iterations."""
 
+GUARD_RATIO: Final = 2
+"""So many times more tissues than are reported decide whether a policy is kept; ours."""
+
 _INSIDE_RATIO: Final = 0.25
 _INSIDE_MM: Final = 0.5
 """The needle stops where the tip is seen so deep in the target: a part of the depth of the target,
@@ -46,6 +55,9 @@ VALUES: Final[dict[Aim, str]] = {"probability": "is_hit", "miss": "end_miss", "c
 LEARNED: Final = VALUES | {"probability": "end_loss"}
 """The prices that are learned. Where few random runs arrive, the probability alone tells learning
 too little: so failures that are near cost a little less."""
+
+
+Verdict = Literal["better", "alike", "worse"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +95,11 @@ class Comparison:
     confidence: float
 
     @property
-    def is_better(self) -> bool:
-        """Whether the policy is better for certain: its interval does not hold 0."""
-        return self.difference.lower > 0.0
+    def verdict(self) -> Verdict:
+        """Whether the policy is better or worse; alike if the difference's interval holds 0."""
+        if self.difference.lower > 0.0:
+            return "better"
+        return "worse" if self.difference.upper < 0.0 else "alike"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,14 +107,17 @@ class Steered:
     """A policy that was learned.
 
     Attributes:
-        policy: The policy.
+        policy: The policy; silent if what was learned is not better than the plan.
         plan: The plan around which it was learned: the best of those that were given.
-        aims: For each aim, how the policy compares with the plan.
+        guard: How what was learned compares with the plan, in the tissues that decide whether it is
+            kept.
+        aims: For each aim, how the policy compares with the plan in other tissues.
         learning_runs: From how many runs it was learned, with those that judged it.
     """
 
     policy: Policy
     plan: Plan
+    guard: Comparison
     aims: dict[Aim, Comparison]
     learning_runs: int
 
@@ -120,7 +137,8 @@ def steer(
         scene: The scene, with a stochastic tissue and one target.
         aim: What the plan and the policy are to be the best for.
         seen: How exactly the tip is seen.
-        sampling: How runs are made. Learning takes its seed, and the comparison the next one.
+        sampling: How runs are made. Learning takes its seed; the runs that decide whether the
+            policy is kept take the next one, and those that are reported the one after.
         listen: Is called between two pieces of work, and may raise to end it.
 
     Raises:
@@ -129,16 +147,27 @@ def steer(
     """
     around, plan = _best(plans, scene, aim, seen, sampling, listen)
     model = _loaded(scene, around)
-    learned = _learned(model, around, scene, aim, sampling)
+    learned = _learned(model.with_constants(IS_LEARNING="true"), around, scene, aim, sampling)
     listen()
     strategy = learned.strategy
     if strategy is None or learned.optimised is None:
         raise ModelError(f"the model of the policy fails: {learned.message}")
-    aims = _compared(model, around, scene, sampling)
-    digest = digest_of(scene, around)
+    text = strategy.json()
+    _keep(model, text)
+    guarding = replace(sampling, seed=sampling.seed + 1, runs=GUARD_RATIO * sampling.runs)
+    guard = _compared(model, around, scene, guarding, " under Steer")[aim]
+    is_kept = guard.verdict == "better"
+    listen()
+    reported = replace(sampling, seed=sampling.seed + 2)
+    aims = _compared(model, around, scene, reported, " under Steer" if is_kept else None)
     values: dict[str, Any] = {name: asdict(one) for name, one in aims.items()}
-    policy = Policy.of(aim, digest, around, json.loads(strategy.json()), values)
-    return Steered(policy, plan, aims, learned.optimised.runs)
+    around = around if is_kept else replace(around, window=0)
+    digest = digest_of(scene, around)
+    if is_kept:
+        policy = Policy.of(aim, digest, around, json.loads(text), values)
+    else:
+        policy = Policy.silent(aim, digest, around, values)
+    return Steered(policy, plan, guard, aims, learned.optimised.runs)
 
 
 def around_of(plan: Plan, scene: Scene, seen: Seen) -> Around:
@@ -169,7 +198,7 @@ def _best(
     for place, around in enumerate(arounds):
         listen()
         if around.rolls:
-            runs = _runs(_fixed(_loaded(scene, around)), around, scene, "", sampling, sampling.seed)
+            runs = _runs(_fixed(_loaded(scene, around)), around, scene, "", sampling)
             found.append((-_sign(aim) * fmean(runs[aim]), place))
     if not found:
         raise InputError(
@@ -208,10 +237,21 @@ def _learned(model: Model, around: Around, scene: Scene, aim: Aim, sampling: Sam
         good_runs=runs,
         eval_runs=max(2, runs // 3),
         max_iterations=ITERATIONS,
+        reset_no_better=ITERATIONS,
+        # What it is worth is estimated below, beside the plan.
+        runs=2,
         seed=sampling.seed,
         threads=sampling.threads,
     )
     return _checked(answer)
+
+
+def _keep(model: Model, strategy: str) -> None:
+    """Keeps what was learned under its name in a model without runs that are led."""
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "steer.json").write_text(strategy, encoding="utf-8")
+        query = 'strategy Steer = loadStrategy("steer.json")'
+        _checked(model.check(query, folder=Path(folder)))
 
 
 def _checked(answer: Answer) -> Answer:
@@ -223,12 +263,12 @@ def _checked(answer: Answer) -> Answer:
 
 
 def _runs(
-    model: Model, around: Around, scene: Scene, under: str, sampling: Sampling, seed: int
+    model: Model, around: Around, scene: Scene, under: str, sampling: Sampling
 ) -> dict[Aim, list[float]]:
     """What each run comes to, by aim."""
     shown = ", ".join(VALUES.values())
     query = f"simulate {_bound(around, scene)[:-1]}; {sampling.runs}] {{{shown}}}{under}"
-    answer = _checked(model.check(query, seed=seed, threads=sampling.threads))
+    answer = _checked(model.check(query, seed=sampling.seed, threads=sampling.threads))
     return {
         aim: [float(run.values[name][-1]) for run in answer.trajectories]
         for aim, name in VALUES.items()
@@ -236,12 +276,11 @@ def _runs(
 
 
 def _compared(
-    model: Model, around: Around, scene: Scene, sampling: Sampling
+    model: Model, around: Around, scene: Scene, sampling: Sampling, under: str | None
 ) -> dict[Aim, Comparison]:
-    """How the policy and the plan compare in the same tissues."""
-    seed = sampling.seed + 1
-    plan = _runs(_fixed(model), around, scene, "", sampling, seed)
-    policy = _runs(model, around, scene, " under Steer", sampling, seed)
+    """How a policy and the plan compare in the same tissues; None is the silent policy."""
+    plan = _runs(_fixed(model), around, scene, "", sampling)
+    policy = plan if under is None else _runs(model, around, scene, under, sampling)
     risk = sampling.risk
     compared: dict[Aim, Comparison] = {}
     for aim in VALUES:

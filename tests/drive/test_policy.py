@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -25,7 +26,7 @@ WINDOW = range(4, 14)
 
 
 def rolling_after(pushes: int | None) -> Policy:
-    """A policy by hand: its second roll comes after so many pushes; None: it is always silent."""
+    """A policy by hand: its second roll comes after so many pushes; None: it has seen nothing."""
     around = around_of(PLAN, SCENE, Seen(0.1, rad_from_deg(1.0), rad_from_deg(5.0)))
     regressors = {
         f"(1,{place})": {"regressor": {"0": 0.5, "1": 0.0 if place == pushes else 1.0}}
@@ -41,6 +42,12 @@ def rolling_after(pushes: int | None) -> Policy:
         "regressors": {} if pushes is None else regressors,
     }
     return Policy.of("probability", digest_of(SCENE, around), around, strategy, {})
+
+
+def silent() -> Policy:
+    """A silent policy."""
+    around = replace(rolling_after(None).around, window=0)
+    return Policy.silent("probability", digest_of(SCENE, around), around, {})
 
 
 def driven(policy: Policy | None, folder: Path) -> RunLog:
@@ -85,7 +92,20 @@ def test_the_policy_decides_where_the_needle_rolls(tmp_path: Path) -> None:
     assert said[-1].reason.startswith("roll 180 deg, push ")
 
 
-def test_a_silent_policy_leaves_all_to_syntheses(tmp_path: Path) -> None:
+def test_a_silent_policy_is_as_none_and_says_so_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    alone = driven(None, tmp_path)
+    assert "silent" not in capsys.readouterr().err
+    log = driven(silent(), tmp_path)
+    note = f"note: {tmp_path / 't.policy.json'} is silent: plans are followed as without a policy"
+    assert capsys.readouterr().err.count(note) == 1
+    assert not advised(log)
+    decided = [[one for one in run.records if isinstance(one, Command)] for run in (alone, log)]
+    assert decided[0] == decided[1]
+
+
+def test_a_policy_that_says_nothing_leaves_all_to_syntheses(tmp_path: Path) -> None:
     alone, log = driven(None, tmp_path), driven(rolling_after(None), tmp_path)
     assert rolls(log) == rolls(alone)
     silent = [one for one in advised(log) if not one.move]
@@ -108,7 +128,8 @@ def test_a_move_that_is_not_safe_is_not_made(tmp_path: Path) -> None:
     ("task", "policy", "words"),
     [
         (CHANCE, "{", "is no JSON"),
-        (CHANCE, '{"format": "ntagen policy", "version": 1}', "'aim' is missing"),
+        (CHANCE, '{"format": "ntagen policy", "version": 2}', "'aim' is missing"),
+        (CHANCE, '{"format": "ntagen policy", "version": 1}', "the policy has version 1"),
         (CHANCE.parents[1] / "paper.nsl", None, "one of another task"),
     ],
 )

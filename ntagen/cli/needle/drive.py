@@ -23,7 +23,7 @@ from ntagen.cli.needle.answering_tissue import (
     say_idle_options,
 )
 from ntagen.cli.needle.operator import SignalledOperator, signalled_operator
-from ntagen.cli.needle.policies import load_policy
+from ntagen.cli.needle.optimise import load_policy
 from ntagen.cli.needle.report import lines, report, summary
 from ntagen.cli.needle.steering import (
     known_option,
@@ -41,7 +41,7 @@ from ntagen.cli.needle.tracker import (
 )
 from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.terminal import echo, say_idle
+from ntagen.cli.terminal import echo, say, say_idle
 from ntagen.drive.states import State
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart
@@ -101,8 +101,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "policy_path",
     metavar="FILE.json",
     help="In a tissue with chance (tissue stochastic), ask the policy in this file after each push "
-    "whether to roll now; ntagen plan --optimise -o wrote it for this task. Where it is silent, or "
-    "its move is not safe, plans are followed as without it.",
+    "whether to roll now; ntagen plan --optimise -o wrote it for this task. Where it says nothing, "
+    "or its move is not safe, plans are followed as without it.",
 )
 @known_option
 @click.option(
@@ -201,6 +201,8 @@ def command(
         policy = None
         if policy_path is not None:
             policy = load_policy(policy_path, told(task.scene, known))
+            if policy.is_silent:
+                say([f"{policy_path} is silent: plans are followed as without a policy"])
         run = _Run(environment, task, configuration, known, tracking, wanted, course, policy)
         result = _drive(run, needle, log_path, terminal, operator)
     if as_json:

@@ -128,8 +128,9 @@ def command(
     is_apart (whether it is less probable than the best one).
 
     \b
-    With --optimise there is one JSON object: verdict, optimised, plan, is_better, aims (for each
-    aim plan, policy and difference, with value, lower, upper), learning_runs, seconds.
+    With --optimise there is one JSON object: verdict, optimised, plan, is_silent (the policy is not
+    better than the plan, so it never differs from it), is_better, guard (what decided that), aims
+    (for each aim plan, policy and difference, with value, lower, upper), learning_runs, seconds.
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.drive.settings import engine_for
@@ -141,7 +142,7 @@ def command(
     by_odds, criteria = (False, None) if ranking is None else split_ranking(ranking)
     task = load_task(source, include)
     if aim is not None:
-        from ntagen.cli.needle.policies import optimise
+        from ntagen.cli.needle.optimise import optimise
 
         say_idle({"count": "--best", "ranking": "--rank"}, "with --optimise")
         return optimise(task, aim, wanted, budget_s, output, as_json=as_json)

@@ -1,185 +1,243 @@
-"""`ntagen plan --optimise`: learns a policy, and says how it compares with the best plan."""
+"""`ntagen policies`: what policies gain over plans, task by task."""
 
 from __future__ import annotations
 
 import json
-import math
-import time
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from ntagen.cli.needle.odds import Wanted
-from ntagen.cli.terminal import echo
+import click
+
+from ntagen.cli.needle.optimise import signed, span
+from ntagen.cli.options import output_option
+from ntagen.cli.terminal import aligned, echo, say_idle
 from ntagen.errors import InputError
-from ntagen.files import read_file, write_files
+from ntagen.plan.steering import Comparison, Mean
 
 if TYPE_CHECKING:
-    from ntagen.drive.settings import Settings
-    from ntagen.nsl import Task
-    from ntagen.plan.anytime import Best
-    from ntagen.plan.policy import Aim, Policy
-    from ntagen.plan.steering import Comparison, Mean, Steered
-    from ntagen.render import Seen
-    from ntagen.scene import Scene
+    from ntagen.experiment.policies import PolicyCampaign, Row
+    from ntagen.plan.policy import Aim
 
-DEFAULT_RUNS: Final = 100_000
-"""A policy is learned from this number of runs. A tenth of it compares it with the plan."""
-
-BUDGET_S: Final = 20.0
-"""The search for plans ends after this time, which is enough to end by itself: so the same seed
-gives the same policy."""
-
-_COMPARED_PART: Final = 10
-_PLANS: Final = 10
-"""A policy is learned around the best of this number of plans."""
-
-_WORDS: Final = {
-    "probability": "reaches the target, and touches nothing",
-    "miss": "misses the target by",
-    "cut": "cuts",
-}
-_NONE: Final = 1
-_STOPPED: Final = 3
+_LOST: Final = 1
+_NO_PLAN: Final = {"none": "no plan", "unknown": "plan unknown"}
 
 
-def optimise(
-    task: Task,
+@click.command(
+    "policies",
+    epilog="Exit codes: 0 all tasks were done, 1 some were refused, 2 the input is wrong or a "
+    "result cannot be written, 70 internal error, 130 interrupted, 143 ended by SIGTERM.",
+)
+@click.argument("files", metavar="[ENV.nsl]…", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--random",
+    "random_tasks",
+    metavar="N",
+    default=0,
+    type=click.IntRange(0, 10_000),
+    help="Add this many random tasks: a needle, a target, one to three critical regions, and "
+    "tissue with chance.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    help="The seed of the first random task, and of what is learned for files. The same seed gives "
+    "the same tasks and policies.",
+)
+@click.option(
+    "--runs",
+    metavar="N",
+    default=20_000,
+    show_default=True,
+    type=click.IntRange(min=20),
+    help="From this many runs each policy is learned. A tenth as many tissues compare it with the "
+    "plan.",
+)
+@click.option(
+    "--drives",
+    metavar="N",
+    default=0,
+    show_default=True,
+    type=click.IntRange(0, 10_000),
+    help="Drive this many simulated needles in each of three ways: by the plan blindly, planning "
+    "again as needed, and by the policy.",
+)
+@click.option(
+    "--needle",
+    default="phantom",
+    show_default=True,
+    type=click.Choice(["phantom", "virtual"]),
+    help="Which needles are driven. A virtual one deviates as the task's tissue says.",
+)
+@click.option(
+    "--optimise",
+    "aim",
+    default="probability",
+    show_default=True,
+    type=click.Choice(["probability", "miss", "cut"]),
+    help="What plans and policies are to be the best for, as in `ntagen plan`.",
+)
+@click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(1, 1024),
+    help="Use this many processes of this machine.  [default: one for each core]",
+)
+@output_option("DIR", "Keep rows, policies, random tasks and the table in this folder.", "folder")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with a campaign that was interrupted. Finished rows of the folder are kept.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
+def command(
+    files: tuple[Path, ...],
+    random_tasks: int,
+    seed: int,
+    runs: int,
+    drives: int,
+    needle: str,
     aim: Aim,
-    wanted: Wanted,
-    budget_s: float | None,
-    output: Path | None,
-    *,
+    workers: int | None,
+    folder: Path | None,
+    resume: bool,
     as_json: bool,
 ) -> int:
-    """Learns a policy, prints what it is worth, and writes it; the exit code."""
-    from ntagen.drive.configure import configure
-    from ntagen.plan.chance import Sampling
-    from ntagen.plan.steering import steer
+    """Show what policies gain over plans, task by task.
 
-    scene = task.scene
-    if not scene.tissue.is_stochastic:
-        raise InputError(
-            f"there is nothing to optimise in a tissue that is {scene.tissue.kind}\n"
-            "hint: write `tissue stochastic`, with its spreads if you know them"
-        )
-    settings = configure(task.given, scene).settings
-    best = _plans(scene, settings, BUDGET_S if budget_s is None else budget_s)
-    if best.verdict != "found":
-        return _say_none(best.verdict, as_json=as_json)
-    runs = DEFAULT_RUNS if wanted.runs is None else wanted.runs
-    sampling = Sampling(max(2, runs // _COMPARED_PART), wanted.seed, learning_runs=runs)
-    start_s = time.monotonic()
-    plans = [one.plan for one in best.candidates]
-    steered = steer(plans, scene, aim, seen_by(settings, scene), sampling)
-    seconds = time.monotonic() - start_s
-    if output is not None:
-        write_files({output: steered.policy.text()})
-    if as_json:
-        echo(json.dumps(_record(steered, aim, seconds)))
-        return 0
-    _show(steered, aim, wanted.seed, seconds)
-    if output is not None:
-        echo(f"policy written to {output}")
-    return 0
+    For each task the best plan is found, and a policy is learned around it (`ntagen plan
+    --optimise`). Both meet the same tissues, which learning has not seen: a policy is better or
+    worse if the 95 % interval of the difference says so, else alike. One that is silent never
+    differs from its plan. Last come the counts, and the mean difference over tasks.
 
+    Ctrl-C ends the campaign, and prints the rows that are done.
 
-def seen_by(settings: Settings, scene: Scene) -> Seen:
-    """How exactly the driver knows the tip when it asks a policy.
+    \b
+    Examples:
+      ntagen policies examples/chance/chance.nsl --runs 100000
+      ntagen policies --random 10 --drives 3 -o campaign
+      ntagen policies --random 100 --drives 3 -o campaign --resume
 
-    Of the bevel it knows no more than what the last roll may have erred.
-    """
-    from ntagen.render import Seen
+    \b
+    The JSON object has wanted, tasks, confidence, rows (task, seed, verdict, reason, plan,
+    is_silent, guard, compared, learning_runs, drives, seconds), and sum. docs/policy.md says what
+    was measured.
+    """  # noqa: D301  click wants the control character
+    from ntagen.experiment.policies import Wanted, campaign_of, carry_out, document_of
+    from ntagen.experiment.scripting import crew_of
 
-    priors = settings.priors
-    bevel_rad = math.hypot(priors.bevel_rad, scene.tissue.roll_rad)
-    return Seen(priors.noise_mm, priors.heading_rad, bevel_rad)
-
-
-def load_policy(path: Path, scene: Scene) -> Policy:
-    """The policy of a file for a task.
-
-    Raises:
-        InputError: There is none for it in the file.
-    """
-    from ntagen.plan.policy import MOST_BYTES, read_policy
-
+    if folder is None:
+        say_idle({"resume": "--resume"}, "without -o")
+    elif folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is no folder\nhint: choose another one with -o")
+    if not drives:
+        say_idle({"needle": "--needle"}, "without --drives")
+    campaign = campaign_of(files, random_tasks, seed, Wanted(aim, runs, drives, needle))
+    told = _Progress(campaign)
     try:
-        return read_policy(read_file(path, MOST_BYTES), scene)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        document = carry_out(campaign, crew_of(workers), told.note, folder, resume=resume)
+    except KeyboardInterrupt:
+        _show(document_of(campaign, told.rows), as_json=as_json)
+        kept = "" if folder is None else f", and kept in {folder}; go on with --resume"
+        echo(f"interrupted: {len(told.rows)} of {told.of} tasks are done{kept}", err=True)
+        raise
+    _show(document, as_json=as_json)
+    if folder is not None:
+        echo(f"wrote {folder}", err=as_json)
+    return _LOST if document["sum"]["refused"] else 0
 
 
-def _plans(scene: Scene, settings: Settings, budget_s: float) -> Best:
-    """The best plans by reserve, as for `--rank probability`."""
-    from ntagen.drive.settings import engine_for
-    from ntagen.plan.anytime import best_plans
-    from ntagen.plan.rank import split_ranking
+@dataclass(slots=True)
+class _Progress:
+    """Prints a line for each task, and keeps its row."""
 
-    _, criteria = split_ranking("probability")
-    engine = replace(engine_for(settings), ranking=criteria)
-    *_, last = best_plans(scene, engine, clock=time.monotonic, count=_PLANS, budget_s=budget_s)
-    return last
+    campaign: PolicyCampaign
+    rows: dict[str, Row] = field(default_factory=dict)
+
+    @property
+    def of(self) -> int:
+        """The number of tasks."""
+        return len(self.campaign.rows)
+
+    def note(self, row: Row) -> None:
+        """Notes a row."""
+        self.rows[row.task] = row
+        said = _NO_PLAN.get(row.verdict) or row.reason
+        if row.compared is not None:
+            aim = self.campaign.wanted.aim
+            said = f"{_judged(row.compared.verdict, is_silent=row.is_silent)}, "
+            said += span(signed(row.compared.difference, aim), aim, sign="+")
+        echo(f"{len(self.rows)} of {self.of} tasks: {row.task}: {said}", err=True)
 
 
-def _say_none(verdict: str, *, as_json: bool) -> int:
-    is_proved = verdict == "none"
+def _judged(verdict: str, *, is_silent: bool) -> str:
+    return f"{verdict} (silent)" if is_silent else verdict
+
+
+def _show(document: Mapping[str, Any], *, as_json: bool) -> None:
+    """Prints the table and its sum."""
     if as_json:
-        echo(json.dumps({"verdict": verdict}))
-    elif is_proved:
-        echo("no plan: it is proved that the model has none that holds, so there is no policy")
-    else:
-        echo("unknown: the budget ended before a plan was found, or proved not to exist")
-        echo("hint: give more time with --within")
-    return _NONE if is_proved else _STOPPED
+        echo(json.dumps(document))
+        return
+    ways = list(document["sum"]["drives"])
+    head = ("task", "plan", "policy", "difference (95 %)", "", *(f"driven: {way}" for way in ways))
+    rows = [head, *(_cells(row, document) for row in document["rows"])]
+    for line in aligned(rows, right=(1, 2, *range(5, len(head)))):
+        echo(line)
+    for line in _sum_lines(document):
+        echo(line)
 
 
-def _record(steered: Steered, aim: Aim, seconds: float) -> dict[str, object]:
-    return {
-        "verdict": "found",
-        "optimised": aim,
-        "plan": str(steered.plan),
-        "is_better": steered.aims[aim].is_better,
-        "aims": {name: asdict(one) for name, one in steered.aims.items()},
-        "learning_runs": steered.learning_runs,
-        "seconds": seconds,
-    }
-
-
-def _show(steered: Steered, aim: Aim, seed: int, seconds: float) -> None:
-    chosen = steered.aims[aim]
-    echo(f"the best plan: {steered.plan}")
-    echo(
-        f"a policy was learned around it from {steered.learning_runs:,} runs with seed {seed} "
-        f"in {seconds:.1f} s"
+def _cells(row: Mapping[str, Any], document: Mapping[str, Any]) -> Sequence[str]:
+    aim, drives = document["wanted"]["aim"], document["wanted"]["drives"]
+    ways = list(document["sum"]["drives"])
+    if row["compared"] is None:
+        said = _NO_PLAN.get(row["verdict"]) or row["reason"]
+        return (row["task"], "", "", said, "", *("" for _ in ways))
+    compared = _comparison(row["compared"])
+    return (
+        row["task"],
+        _value(compared.plan, aim),
+        _value(compared.policy, aim),
+        span(signed(compared.difference, aim), aim, sign="+"),
+        _judged(compared.verdict, is_silent=row["is_silent"]),
+        *(f"{row['drives'][way]['arrived']} of {drives}" for way in ways),
     )
-    echo(
-        f"{chosen.runs:,} tissues that learning has not seen, the same for both; each interval "
-        f"holds at {chosen.confidence:.4g} confidence:"
-    )
-    for name, one in steered.aims.items():
-        mark = " (optimised)" if name == aim else ""
-        echo(f"  {_WORDS[name]}{mark}")
-        echo(f"    the plan:   {_span(one.plan, name)}")
-        echo(f"    the policy: {_span(one.policy, name)}")
-        echo(f"    difference: {_span(_signed(one, name), name, sign='+')}, {_judged(one)}")
 
 
-def _signed(one: Comparison, aim: str) -> Mean:
-    """The policy's value less the plan's."""
-    gain = one.difference
-    if aim == "probability":
-        return gain
-    return replace(gain, value=-gain.value, lower=-gain.upper, upper=-gain.lower)
+def _comparison(document: Mapping[str, Any]) -> Comparison:
+    means = {name: Mean(**document[name]) for name in ("plan", "policy", "difference")}
+    return Comparison(**{**document, **means})
 
 
-def _judged(one: Comparison) -> str:
-    if one.is_better:
-        return "better"
-    return "worse" if one.difference.upper < 0.0 else "not better"
+def _value(mean: Mean, aim: str) -> str:
+    return span(mean, aim).partition(" (")[0]
 
 
-def _span(mean: Mean, aim: str, sign: str = "") -> str:
-    scale, unit = (100.0, " %") if aim == "probability" else (1.0, " mm")
-    value, lower, upper = (scale * one for one in (mean.value, mean.lower, mean.upper))
-    return f"{value:{sign}.4g}{unit} (from {lower:{sign}.4g} to {upper:{sign}.4g}{unit})"
+def _sum_lines(document: Mapping[str, Any]) -> Sequence[str]:
+    """What all tasks together show."""
+    total, wanted = document["sum"], document["wanted"]
+    aim, found = wanted["aim"], total["found"]
+    left = {"none": "without a plan", "unknown": "whose plan is unknown", "refused": "refused"}
+    done = f"{len(document['rows'])} of {document['tasks']} tasks are done"
+    others = [f"{total[word]} {said}" for word, said in left.items() if total[word]]
+    lines = [
+        ", ".join([done, *others]),
+        f"of {found} with a policy it is better in {total['better']}, alike in {total['alike']} "
+        f"(silent in {total['silent']}), worse in {total['worse']}",
+    ]
+    for name, whose in (("difference", f"{found} tasks"), ("kept_difference", "those not silent")):
+        if total[name] is not None:
+            mean = span(signed(Mean(**total[name]), aim), aim, sign="+")
+            lines.append(f"mean difference of {whose}: {mean}")
+    if total["drives"]:
+        needles = found * wanted["drives"]
+        counts = "; ".join(
+            f"{way} {one['arrived']}, touched {one['hits']}" for way, one in total["drives"].items()
+        )
+        lines.append(f"of {needles} {wanted['needle']} needles arrived untouched: {counts}")
+    return lines

@@ -131,7 +131,7 @@ def test_a_policy_is_learned_compared_and_written(
     path = tmp_path / "t.policy.json"
     wanted = ["plan", CHANCE, "--optimise", "probability", "--runs", "6000", "-o", str(path)]
     assert cli.main(wanted) == 0
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
     assert "reaches the target, and touches nothing (optimised)" in out
     assert f"policy written to {path}" in out
     written = json.loads(path.read_text("utf-8"))
@@ -141,8 +141,26 @@ def test_a_policy_is_learned_compared_and_written(
     assert found["aims"] == written["values"]
     compared = found["aims"]["probability"]
     assert found["is_better"] == (compared["difference"]["lower"] > 0.0)
-    said = "better" if found["is_better"] else "not better"
-    assert said in out
+    assert (", better" in out) == found["is_better"]
+    decided = found["guard"]["difference"]["lower"] <= 0.0
+    assert found["is_silent"] == written["is_silent"] == decided
+    assert ("so the policy is silent" in err) == found["is_silent"]
+
+
+@pytest.mark.slow
+def test_a_policy_that_is_no_better_is_written_with_a_warning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "t.policy.json"
+    wanted = ["plan", CHANCE, "--optimise", "probability", "--runs", "200", "-o", str(path)]
+    assert cli.main(wanted) == 0
+    out, err = capsys.readouterr()
+    assert "warning: what was learned is not better than the plan in 40 other tissues" in err
+    assert "hint: drive without a policy, or learn from more --runs" in err
+    assert "difference: +0 % (from +0 to +0 %), alike" in out
+    written = json.loads(path.read_text("utf-8"))
+    assert written["is_silent"]
+    assert written["around"]["window"] == 0
 
 
 @pytest.mark.parametrize(

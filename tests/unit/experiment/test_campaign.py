@@ -18,14 +18,14 @@ from ntagen.errors import InputError
 from ntagen.experiment import making, store
 from ntagen.experiment.campaign import Progress, carry_out
 from ntagen.experiment.crew import Done, Here
-from ntagen.experiment.making import make_block
+from ntagen.experiment.making import Block, make_block
 from ntagen.experiment.reading import read_experiment
 from ntagen.experiment.report import report_of
 from ntagen.experiment.table import timeless
 from tests.unit.experiment.files import QUICK, written
 
 
-class Backwards(Here):
+class Backwards(Here[Block]):
     """Takes all blocks, and makes the last one first; counts the runs."""
 
     has_room = True
@@ -35,8 +35,8 @@ class Backwards(Here):
         super().__init__()
         self.seeds: list[tuple[str, int]] = []
 
-    def wait(self) -> list[Done]:
-        block = self._blocks.pop()
+    def wait(self) -> list[Done[Block]]:
+        block = self._jobs.pop()
         self.seeds += [(block.row.id, seed) for seed in block.seeds]
         return [Done(block, make_block(block))]
 
@@ -109,7 +109,7 @@ def test_an_experiment_goes_on_without_repeating_or_losing_runs(
     whole: tuple[Path, Mapping[str, Any]], tmp_path: Path
 ) -> None:
     class Interrupted(Backwards):
-        def wait(self) -> list[Done]:
+        def wait(self) -> list[Done[Block]]:
             if len(self.seeds) >= 3:
                 raise KeyboardInterrupt
             return super().wait()

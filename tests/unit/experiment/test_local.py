@@ -109,7 +109,7 @@ def deadly_block(block: Block) -> list[Run]:
 def test_a_run_that_kills_its_worker_twice_is_given_up_and_the_rest_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "make_block", deadly_block)
+    monkeypatch.setattr(local, "made_by", deadly_block)
     document = made(tmp_path, "x", lambda: LocalCrew(2))
     assert document["lost"] == [{"row": "no_cr", "seed": 3, "reason": "its worker died 2 times"}]
     assert [row["runs"] for row in document["rows"]] == [6, 5]

@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from ntagen import checker
 from ntagen.errors import InputError
 from ntagen.needle.kinematics import push, roll
 from ntagen.nsl import loads
@@ -51,7 +52,8 @@ def document(steered: Steered) -> dict[str, object]:
 def test_it_beats_the_best_plan_in_the_same_tissues(steered: Steered) -> None:
     assert steered.plan == PLAN
     compared = steered.aims["probability"]
-    assert compared.is_better
+    assert compared.verdict == steered.guard.verdict == "better"
+    assert not steered.policy.is_silent
     assert compared.difference.value == pytest.approx(
         compared.policy.value - compared.plan.value, abs=1e-9
     )
@@ -77,6 +79,25 @@ def test_the_same_seed_gives_the_same_policy() -> None:
         for sampling in (FEWER, replace(FEWER, threads=1), replace(FEWER, seed=4))
     ]
     assert texts[0] == texts[1] != texts[2]
+
+
+@pytest.mark.slow
+def test_a_policy_that_is_not_better_is_silent() -> None:
+    """Few runs teach nothing for certain: the policy is the plan, and its file says so."""
+    steered = steer([PLAN], SCENE, "cut", SEEN, FEWER)
+    assert steered.guard.verdict != "better"
+    policy = steered.policy
+    assert policy.is_silent
+    assert policy.around.window == 0
+    assert not policy.trees
+    assert policy.decide(SCENE, SCENE.needle.tip, 0.0, 0) is None
+    for compared in steered.aims.values():
+        assert compared.policy == compared.plan
+        assert (compared.difference.value, compared.verdict) == (0.0, "alike")
+    assert read_policy(policy.text().encode(), SCENE) == policy
+    other = loads(TEXT.replace("-50, 4", "-49, 4"))
+    with pytest.raises(InputError, match="learned for another task"):
+        read_policy(policy.text().encode(), other)
 
 
 @pytest.mark.slow
@@ -107,7 +128,8 @@ def test_it_rolls_within_its_windows(steered: Steered) -> None:
     ("changes", "words"),
     [
         ({"format": "plans"}, "it does not say 'ntagen policy'"),
-        ({"version": 2}, "the policy has version 2"),
+        ({"version": 1}, "the policy has version 1, and this program reads 2"),
+        ({"is_silent": "no"}, "is_silent is neither true nor false"),
         ({"aim": "speed"}, "it is the best for 'speed'"),
         ({"strategy": {}}, "statevars' is missing"),
         ({"model_sha256": "0"}, "learned for another task"),
@@ -200,6 +222,27 @@ def test_the_needle_bounds_the_pushes() -> None:
     assert around_of(PLAN, SCENE, SEEN).most_pushes == 28
     short = replace(SCENE, needle=replace(SCENE.needle, length_mm=52.0))
     assert around_of(PLAN, short, SEEN).most_pushes == 26
+
+
+def test_only_learning_follows_the_plan_at_first() -> None:
+    model = checker.load(render_policy(SCENE, around_of(PLAN, SCENE, SEEN)))
+    query = "simulate [<=60; 60] {rolled_at, led_pushes}"
+    led = {}
+    for learns in ("false", "true"):
+        answer = model.with_constants(IS_LEARNING=learns).check(query, seed=1)
+        ends = [
+            (run.values["led_pushes"][-1], run.values["rolled_at"][-1])
+            for run in answer.trajectories
+        ]
+        led[learns] = {one for one, _ in ends}
+        # The plan rolls after 9 pushes, its window begins after 4.
+        assert all(rolled == 9.0 for one, rolled in ends if one > 9.0)
+        assert any(rolled == 4.0 for one, rolled in ends if one <= 4.0)
+    assert led["false"] == {0.0}
+    assert 0.0 in led["true"]
+    assert len(led["true"]) > 5
+    fixed = model.with_constants(IS_FIXED="true").check(query, seed=1)
+    assert {run.values["rolled_at"][-1] for run in fixed.trajectories} == {9.0}
 
 
 def test_plans_without_rolls_leave_nothing_to_decide() -> None:
