@@ -206,29 +206,29 @@ impl Builder<'_> {
     fn add_wait(&mut self, memory: &Memory, here: &mut [f64], rates: &[f64], next: u32) {
         let (mut left, mut at) = (memory.time, memory.at);
         let cost_rate = memory.cost / memory.time;
-        let mut cell = self.partition.cell(memory.observation, here);
-        loop {
-            let exit = self.partition.exit(memory.observation, here, rates);
-            let slot = self.slot(cell, WAIT);
-            if exit >= left {
-                let cost = if memory.time > 0.0 {
-                    cost_rate * left
-                } else {
-                    memory.cost
-                };
-                self.add(slot, next, cost, here, at);
-                return;
-            }
-            let before = here.to_vec();
+        let mut before = here.to_vec();
+        let observation = memory.observation;
+        let (mut cell, mut exit) = self.partition.cell_and_exit(observation, here, rates);
+        while exit < left {
+            before.copy_from_slice(here);
             for (value, rate) in here.iter_mut().zip(rates) {
                 *value += rate * exit;
             }
-            cell = self.partition.cell(memory.observation, here);
+            let slot = self.slot(cell, WAIT);
+            let passed = exit;
+            (cell, exit) = self.partition.cell_and_exit(observation, here, rates);
             let stand = self.stand(cell, memory.set);
-            self.add(slot, stand, cost_rate * exit, &before, at);
-            left -= exit;
-            at += exit;
+            self.add(slot, stand, cost_rate * passed, &before, at);
+            left -= passed;
+            at += passed;
         }
+        let slot = self.slot(cell, WAIT);
+        let cost = if memory.time > 0.0 {
+            cost_rate * left
+        } else {
+            memory.cost
+        };
+        self.add(slot, next, cost, here, at);
     }
 
     fn finish(self) -> Process {

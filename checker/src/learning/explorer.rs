@@ -287,9 +287,8 @@ impl Explorer {
         let partition = &manner.partition;
         let Sight { point, rates, .. } = &mut self.sight;
         let start = point.clone();
-        let mut waited = 0.0;
+        let (mut waited, mut exit) = (0.0, partition.cell_and_exit(observation, point, rates).1);
         loop {
-            let exit = partition.exit(observation, point, rates);
             waited += exit;
             if waited.is_infinite() || !moment.is_straight {
                 break;
@@ -297,7 +296,9 @@ impl Explorer {
             for ((value, start), rate) in point.iter_mut().zip(&start).zip(&*rates) {
                 *value = start + rate * waited;
             }
-            let cell = &partition.cells[partition.cell(observation, point) as usize];
+            let (cell, next) = partition.cell_and_exit(observation, point, rates);
+            exit = next;
+            let cell = &partition.cells[cell as usize];
             let place = best(cell, moment, manner.learns.then_some(&mut *state));
             if let Some(&action) = place.and_then(|place| moment.moves.get(place)) {
                 let time = moment.time + waited * (1.0 - f64::EPSILON);

@@ -34,7 +34,7 @@ const FIRST_PART: u64 = 5;
 const SURE: f64 = 0.002;
 
 /// A decision that gives more samples counts for more than one, so that it takes no more time.
-const MANY_SAMPLES: f64 = 4.0;
+const MANY_SAMPLES: f64 = 2.0;
 
 /// A better strategy counts as such if it gains so many standard errors.
 const NOTABLE: f64 = 0.2;

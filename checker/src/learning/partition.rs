@@ -122,9 +122,10 @@ impl Partition {
         tree::leaf(self.tree(observation), point)
     }
 
-    /// In how long a point that moves with these rates is in another cell; infinity if never.
-    pub fn exit(&self, observation: u32, point: &[f64], rates: &[f64]) -> f64 {
-        tree::exit(self.tree(observation), point, rates)
+    /// The cell of a point that moves with these rates, and in how long it is in another one;
+    /// infinity if never.
+    pub fn cell_and_exit(&self, observation: u32, point: &[f64], rates: &[f64]) -> (u32, f64) {
+        tree::leaf_and_exit(self.tree(observation), point, rates)
     }
 
     /// Cuts a cell in two. Both parts know what the whole knew.

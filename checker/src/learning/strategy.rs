@@ -407,7 +407,7 @@ impl Chooser for Follower {
         while best(&options, &point, strategy.is_greatest).is_none_or(|best| best == place) {
             let exits = options
                 .iter()
-                .map(|one| tree::exit(one.tree, &point, &sight.rates));
+                .map(|one| tree::leaf_and_exit(one.tree, &point, &sight.rates).1);
             waited += exits.fold(f64::INFINITY, f64::min);
             if waited.is_infinite() || !moment.is_straight {
                 break;

@@ -41,24 +41,28 @@ pub(super) fn leaf_below<L: Copy>(tree: &[Node<L>], node: &mut u32, point: &[f64
     }
 }
 
-/// In how long a point that moves with these rates is in another leaf; infinity if never.
-pub(super) fn exit<L: Copy>(tree: &[Node<L>], point: &[f64], rates: &[f64]) -> f64 {
-    let (mut node, mut exit) = (tree[0], f64::INFINITY);
-    while let Node::Cut {
-        feature,
-        bound,
-        low,
-        high,
-    } = node
-    {
-        let (value, rate) = (point[feature as usize], rates[feature as usize]);
-        let is_low = value <= bound;
-        if rate != 0.0 && (rate > 0.0) == is_low {
-            exit = exit.min(beyond(bound, value, rate));
+/// The leaf of a point that moves with these rates, and in how long it is in another one; infinity
+/// if never.
+pub(super) fn leaf_and_exit<L: Copy>(tree: &[Node<L>], point: &[f64], rates: &[f64]) -> (L, f64) {
+    let (mut node, mut exit) = (0, f64::INFINITY);
+    loop {
+        match tree[node as usize] {
+            Node::Leaf(leaf) => return (leaf, exit),
+            Node::Cut {
+                feature,
+                bound,
+                low,
+                high,
+            } => {
+                let (value, rate) = (point[feature as usize], rates[feature as usize]);
+                let is_low = value <= bound;
+                if rate != 0.0 && (rate > 0.0) == is_low {
+                    exit = exit.min(beyond(bound, value, rate));
+                }
+                node = if is_low { low } else { high };
+            }
         }
-        node = tree[if is_low { low } else { high } as usize];
     }
-    exit
 }
 
 /// Where a bound is crossed counts as crossed so much later, relative to the numbers at hand: a
