@@ -145,6 +145,7 @@ impl Experience {
             stands: vec![Vec::new(); partition.cells.len()],
             sets: &self.sets,
             stand_parts: vec![(u32::MAX, u32::MAX)],
+            is_followed: false,
         };
         let mut here = Vec::with_capacity(self.dimension);
         for (number, memory) in self.memories.iter().enumerate() {
@@ -155,6 +156,7 @@ impl Experience {
             let numbers = &self.points[memory.point as usize..];
             here.extend_from_slice(&numbers[..self.dimension]);
             let next = self.memories.get(number + 1).filter(|_| !memory.is_last);
+            builder.is_followed = next.is_some_and(|next| next.action != DRAW);
             let next = next.map_or(END, |next| builder.stand(cells[number + 1], next.set));
             if memory.moves {
                 let rates = &numbers[self.dimension..2 * self.dimension];
@@ -180,6 +182,8 @@ struct Builder<'e> {
     sets: &'e [Box<[u32]>],
     /// By stand: its cell and its set.
     stand_parts: Vec<(u32, u32)>,
+    /// Whether the decision behind the one at hand has samples, too.
+    is_followed: bool,
 }
 
 impl Builder<'_> {
@@ -198,6 +202,8 @@ impl Builder<'_> {
             cost,
             point: self.points.len() as u32,
             at,
+            place: self.samples.len() as u32,
+            is_followed: self.is_followed,
         });
         self.points.extend_from_slice(point);
     }
@@ -209,6 +215,7 @@ impl Builder<'_> {
         let mut before = here.to_vec();
         let observation = memory.observation;
         let (mut cell, mut exit) = self.partition.cell_and_exit(observation, here, rates);
+        let is_followed = std::mem::replace(&mut self.is_followed, true);
         while exit < left {
             before.copy_from_slice(here);
             for (value, rate) in here.iter_mut().zip(rates) {
@@ -222,6 +229,7 @@ impl Builder<'_> {
             left -= passed;
             at += passed;
         }
+        self.is_followed = is_followed;
         let slot = self.slot(cell, WAIT);
         let cost = if memory.time > 0.0 {
             cost_rate * left

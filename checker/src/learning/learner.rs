@@ -18,6 +18,7 @@ use super::experience::Experience;
 use super::explorer::{Explorer, Explorers, Manner};
 use super::options::{Learning, Method};
 use super::partition::Partition;
+use super::process::Process;
 use super::refinement::{Rule, refine};
 use super::whole_state::functions;
 use crate::analysis::LiveVariables;
@@ -250,7 +251,7 @@ impl Learner<'_> {
         for episode in &episodes {
             self.experience.add(&mut self.partition, episode);
         }
-        let most = self.options.memory as f64 / self.weight();
+        let most = self.options.memory(self.progress.steps_of_run) as f64 / self.weight();
         self.experience.forget(most as usize);
         Ok(is_whole)
     }
@@ -266,7 +267,7 @@ impl Learner<'_> {
         let mut process = self.experience.process(&self.partition);
         process.begin_with(&self.partition.cells);
         if self.options.method == Method::M {
-            process.iterate(discount, self.spread);
+            self.compute(&mut process, discount);
         }
         let rule = Rule {
             score: self.options.score,
@@ -286,7 +287,7 @@ impl Learner<'_> {
             process.begin_with(&self.partition.cells);
         }
         match self.options.method {
-            Method::M => process.iterate(discount, self.spread),
+            Method::M => self.compute(&mut process, discount),
             Method::Q => {
                 let alpha = self.options.alpha;
                 process.follow(&self.partition.cells, discount, alpha, self.spread);
@@ -294,6 +295,14 @@ impl Learner<'_> {
         }
         process.note(&mut self.partition.cells);
         self.samples_of_step = process.len() as f64 / self.experience.len() as f64;
+    }
+
+    /// Computes all values from all samples.
+    fn compute(&self, process: &mut Process, discount: f64) {
+        match self.options.trace(self.progress.steps_of_run) {
+            0.0 => process.iterate(discount, self.spread),
+            trace => process.follow_traces(discount, trace, self.spread),
+        }
     }
 
     /// The mean value of runs under the strategy that takes the best action everywhere; none if it

@@ -66,7 +66,12 @@ const JUDGING_STEPS: f64 = 200_000.0;
 /// decision costs is lost in the noise of all that follow.
 pub(super) const LONG: f64 = 100.0;
 /// The discount of long runs.
-pub(super) const LONG_DISCOUNT: f64 = 0.99;
+pub(super) const LONG_DISCOUNT: f64 = 0.995;
+/// In long runs, what is behind a decision is so much what has followed, and for the rest what the
+/// cells promise: their errors add up from decision to decision.
+const LONG_TRACE: f64 = 0.5;
+/// Of long runs so many decisions are remembered: what has followed belongs to its strategy.
+const LONG_MEMORY: usize = 800_000;
 /// How much smaller the least difference is in each iteration.
 const FINER: f64 = 0.75;
 
@@ -103,6 +108,20 @@ impl Learning {
             1.0
         };
         self.discount.unwrap_or(fitting)
+    }
+
+    /// How much of what is behind a decision is what has followed, if a run has so many decisions.
+    pub(super) fn trace(&self, steps_of_run: f64) -> f64 {
+        if steps_of_run > LONG { LONG_TRACE } else { 0.0 }
+    }
+
+    /// How many decisions are remembered, if a run has so many.
+    pub(super) fn memory(&self, steps_of_run: f64) -> usize {
+        if steps_of_run > LONG {
+            self.memory.min(LONG_MEMORY)
+        } else {
+            self.memory
+        }
     }
 
     /// The least difference of costs in this iteration.

@@ -22,6 +22,10 @@ pub(super) struct Sample {
     pub(super) point: u32,
     /// When it was taken in its run.
     pub(super) at: f64,
+    /// Its place among all samples, in the order in which they came.
+    pub(super) place: u32,
+    /// Whether the sample behind it is the next decision of the run.
+    pub(super) is_followed: bool,
 }
 
 /// The samples of a slot that lead to the same stand.
@@ -56,7 +60,34 @@ pub(super) struct Process {
     errors: Vec<f64>,
     /// By slot: how often its action was taken, if that is more than there are samples.
     visits: Vec<f64>,
+    /// By stand: its cell.
+    cells_of_stands: Vec<u32>,
     worths: Vec<f64>,
+}
+
+/// The number, the sum and the sum of squares of what samples cost.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+impl Sums {
+    fn add(&mut self, cost: f64) {
+        self.count += 1.0;
+        self.sum += cost;
+        self.squares += cost * cost;
+    }
+
+    /// The mean, and its standard error: as if one more sample were off by as much as all runs
+    /// differ.
+    fn mean_and_error(self, spread: f64) -> (f64, f64) {
+        let mean = self.sum / self.count;
+        let deviation = (self.squares - self.sum * mean).max(0.0);
+        let variance = (deviation + spread * spread) / self.count;
+        (mean, (variance / self.count).sqrt())
+    }
 }
 
 /// What belongs to a cell.
@@ -65,6 +96,9 @@ struct Group {
     slots: Vec<u32>,
     stands: Vec<u32>,
 }
+
+/// So many times all values are computed from what has followed.
+const SWEEPS_OF_TRACES: usize = 15;
 
 /// Sweeps over all values end when no value changes by more than this part of the greatest one,
 const SMALL: f64 = 1e-7;
@@ -117,6 +151,7 @@ impl Process {
             values: vec![0.0; slots.len()],
             errors: vec![0.0; slots.len()],
             visits: Vec::new(),
+            cells_of_stands: stands.iter().map(|one| one.0).collect(),
             worths: vec![0.0; stands.len()],
             samples,
             slots,
@@ -205,6 +240,53 @@ impl Process {
         sample.cost + discount * self.worths[sample.next as usize]
     }
 
+    /// By place: what each sample costs as long as the same is done in the same cell, and from
+    /// there on. So a cell shows where in it that soon costs more, and not at its border alone.
+    pub(super) fn costs_of_stays(&self, discount: f64) -> Vec<f64> {
+        let mut costs = vec![0.0; self.trail.len()];
+        for (place, sample) in self.trail.iter().enumerate().rev() {
+            let stays = self.cells_of_stands[sample.next as usize] == self.cell(sample.slot);
+            let next = self.trail.get(place + 1);
+            costs[place] = match next.filter(|_| sample.is_followed && stays) {
+                Some(next) if next.slot == sample.slot => {
+                    sample.cost + self.discount(sample.slot, discount) * costs[place + 1]
+                }
+                _ => self.cost(sample, discount),
+            };
+        }
+        costs
+    }
+
+    /// Computes the values of all actions in all cells: the means of what their samples cost, where
+    /// what is behind a decision is to a part of `trace` what has followed, and for the rest what
+    /// its stand is worth. What a cell promises counts the less: where states that differ are in
+    /// one cell, it promises what no strategy can do.
+    ///
+    /// Source: R. Sutton and A. Barto, "Reinforcement Learning", 2nd edition, section 12.1
+    /// (lambda-returns).
+    pub(super) fn follow_traces(&mut self, discount: f64, trace: f64, spread: f64) {
+        for _ in 0..SWEEPS_OF_TRACES {
+            let mut sums = vec![Sums::default(); self.slots.len()];
+            let mut behind = 0.0;
+            for sample in self.trail.iter().rev() {
+                let worth = self.worths[sample.next as usize];
+                let next = if sample.is_followed {
+                    worth + trace * (behind - worth)
+                } else {
+                    worth
+                };
+                behind = sample.cost + self.discount(sample.slot, discount) * next;
+                sums[sample.slot as usize].add(behind);
+            }
+            for (slot, sums) in sums.iter().enumerate() {
+                (self.values[slot], self.errors[slot]) = sums.mean_and_error(spread);
+            }
+            for stand in 0..self.stands.len() as u32 {
+                self.appraise(stand);
+            }
+        }
+    }
+
     /// Computes the values of all actions in all cells: the means of what the samples cost.
     ///
     /// Source: value iteration, with the latest decisions first (Gauss and Seidel).
@@ -231,21 +313,18 @@ impl Process {
         self.groups = groups;
     }
 
-    /// The mean of what the samples of a slot cost, and its standard error: as if one more sample
-    /// were off by as much as all runs differ.
+    /// The mean of what the samples of a slot cost, and its standard error.
     fn mean(&self, slot: u32, discount: f64, spread: f64) -> (f64, f64) {
         let discount = self.discount(slot, discount);
         let ways = self.first_ways[slot as usize]..self.first_ways[slot as usize + 1];
-        let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        let mut sums = Sums::default();
         for way in &self.ways[ways.start as usize..ways.end as usize] {
             let worth = discount * self.worths[way.next as usize];
-            count += way.count;
-            sum += way.cost + way.count * worth;
-            squares += way.squares + worth * (2.0 * way.cost + way.count * worth);
+            sums.count += way.count;
+            sums.sum += way.cost + way.count * worth;
+            sums.squares += way.squares + worth * (2.0 * way.cost + way.count * worth);
         }
-        let mean = sum / count;
-        let variance = ((squares - sum * mean).max(0.0) + spread * spread) / count;
-        (mean, (variance / count).sqrt())
+        sums.mean_and_error(spread)
     }
 
     /// Moves the values of actions towards what each sample costs, the latest sample first. The

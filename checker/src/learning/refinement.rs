@@ -63,6 +63,7 @@ pub(super) fn refine(
     for slot in 0..process.slots() {
         by_cell[process.cell(slot) as usize].push(slot);
     }
+    let costs = process.costs_of_stays(discount);
     for (cell, slots) in by_cell.iter().enumerate() {
         let all: usize = slots.iter().map(|&slot| process.of(slot).len()).sum();
         let stride = all.div_ceil(LOOKED_AT).max(1);
@@ -71,7 +72,7 @@ pub(super) fn refine(
             let samples = process.of(slot).iter().step_by(stride);
             points.extend(samples.map(|sample| Point {
                 action: action as u32,
-                cost: process.cost(sample, discount),
+                cost: costs[sample.place as usize],
                 place: sample.point,
             }));
         }
