@@ -49,6 +49,9 @@ pub struct Learning {
     pub samples: usize,
     /// and the most cells.
     pub cells: usize,
+    /// How much of what is behind a decision is what has followed, in long runs; the rest is what
+    /// the cells promise, whose errors add up from decision to decision.
+    pub trace: f64,
     /// How many decisions are remembered.
     pub memory: usize,
 }
@@ -67,9 +70,6 @@ const JUDGING_STEPS: f64 = 200_000.0;
 pub(super) const LONG: f64 = 100.0;
 /// The discount of long runs.
 pub(super) const LONG_DISCOUNT: f64 = 0.995;
-/// In long runs, what is behind a decision is so much what has followed, and for the rest what the
-/// cells promise: their errors add up from decision to decision.
-const LONG_TRACE: f64 = 0.5;
 /// Of long runs so many decisions are remembered: what has followed belongs to its strategy.
 const LONG_MEMORY: usize = 800_000;
 /// How much smaller the least difference is in each iteration.
@@ -94,6 +94,7 @@ impl Default for Learning {
             difference: 0.02..0.002,
             samples: 24,
             cells: 200_000,
+            trace: 0.5,
             memory: 3_000_000,
         }
     }
@@ -112,7 +113,7 @@ impl Learning {
 
     /// How much of what is behind a decision is what has followed, if a run has so many decisions.
     pub(super) fn trace(&self, steps_of_run: f64) -> f64 {
-        if steps_of_run > LONG { LONG_TRACE } else { 0.0 }
+        if steps_of_run > LONG { self.trace } else { 0.0 }
     }
 
     /// How many decisions are remembered, if a run has so many.

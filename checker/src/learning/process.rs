@@ -109,13 +109,12 @@ impl Process {
     /// The process of some samples. Slots are cells with actions, stands are cells with slots; the
     /// first stand is the end.
     pub(super) fn new(
-        samples: Vec<Sample>,
+        trail: Vec<Sample>,
         points: Vec<f64>,
         slots: Vec<(u32, u32)>,
         stands: Vec<(u32, Box<[u32]>)>,
     ) -> Process {
-        let trail = samples.clone();
-        let samples = by_slots(&samples, slots.len());
+        let samples = by_slots(&trail, slots.len());
         let (mut first_samples, mut first_ways) = (Vec::new(), Vec::new());
         let mut ways: Vec<Way> = Vec::new();
         for (place, of_way) in samples
