@@ -104,7 +104,7 @@ class Owner(Protocol):
 def finished(folder: Path, experiment: Experiment) -> dict[tuple[str, int], Run]:
     """The finished runs of an experiment that its folder holds."""
     wanted = {(row.id, seed) for row in experiment.rows for seed in row.seeds}
-    found = {run.key: run for run in _read(Path(folder, RESULTS).glob("*.jsonl"))}
+    found = {run.key: run for run in _runs_in(lines_in(folder))}
     return {
         key: run
         for key, run in found.items()
@@ -114,7 +114,7 @@ def finished(folder: Path, experiment: Experiment) -> dict[tuple[str, int], Run]
 
 def finished_in(folder: Path, block: str) -> dict[int, Run]:
     """The finished runs of a block, by seed: those of all tries."""
-    return {run.seed: run for run in _read(Path(folder, RESULTS).glob(f"{block}.*.jsonl"))}
+    return {run.seed: run for run in _runs_in(lines_in(folder, f"{block}.*.jsonl"))}
 
 
 class Results:
@@ -185,18 +185,17 @@ def naming(path: Path) -> Iterator[None]:
         raise InputError(f"cannot write {path}: {reason}\nhint: {hint}") from error
 
 
-def lines_in(folder: Path) -> Iterator[bytes]:
-    """The lines of all that was made in a folder; the last one of a file may be torn."""
-    for path in sorted(Path(folder, RESULTS).glob("*.jsonl")):
+def lines_in(folder: Path, name: str = "*.jsonl") -> Iterator[bytes]:
+    """The lines of the result files with such a name; the last one of a file may be torn."""
+    for path in sorted(Path(folder, RESULTS).glob(name)):
         yield from path.read_bytes().splitlines()
 
 
-def _read(paths: Iterable[Path]) -> Iterator[Run]:
-    for path in sorted(paths):
-        for line in path.read_bytes().splitlines():
-            run = run_of(line)
-            if run is not None:
-                yield run
+def _runs_in(lines: Iterable[bytes]) -> Iterator[Run]:
+    for line in lines:
+        run = run_of(line)
+        if run is not None:
+            yield run
 
 
 def _sweep(folder: Path) -> None:
