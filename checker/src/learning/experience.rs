@@ -7,7 +7,7 @@ use rustc_hash::FxHashMap;
 
 use super::episode::Episode;
 use super::partition::{DRAW, Partition, WAIT};
-use super::process::{Process, Sample};
+use super::process::{Process, Sample, Stand};
 use super::tree;
 
 /// The stand after which nothing costs any more.
@@ -202,7 +202,6 @@ impl Builder<'_> {
             cost,
             point: self.points.len() as u32,
             at,
-            place: self.samples.len() as u32,
             is_followed: self.is_followed,
         });
         self.points.extend_from_slice(point);
@@ -248,7 +247,8 @@ impl Builder<'_> {
                 let found = known.iter().find(|one| one.0 == *action);
                 found.map(|one| one.1)
             });
-            (cell, slots.collect())
+            let slots = slots.collect();
+            Stand { cell, slots }
         });
         let stands = stands.collect();
         Process::new(self.samples, self.points, self.slot_parts, stands)

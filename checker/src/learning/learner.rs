@@ -251,8 +251,8 @@ impl Learner<'_> {
         for episode in &episodes {
             self.experience.add(&mut self.partition, episode);
         }
-        let most = self.options.memory(self.progress.steps_of_run) as f64 / self.weight();
-        self.experience.forget(most as usize);
+        let most = (self.options.memory as f64 / self.weight()) as usize;
+        self.experience.forget(most);
         Ok(is_whole)
     }
 
@@ -319,7 +319,9 @@ impl Learner<'_> {
             if !self.made(runs, 0.0, false, &mut episodes, watch)? {
                 return Ok(None);
             }
-            if mean_of(&episodes, self.sign).error < SURE * self.spread {
+            let error = mean_of(&episodes, self.sign).error;
+            // Where all runs are worth the same, what is rare has not been seen yet.
+            if error > 0.0 && error < SURE * self.spread {
                 break;
             }
         }

@@ -16,7 +16,9 @@ mod partition;
 mod policy;
 mod process;
 mod refinement;
+mod slopes;
 mod strategy;
+mod sums;
 mod tree;
 mod whole_state;
 

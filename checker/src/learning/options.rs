@@ -70,10 +70,12 @@ const JUDGING_STEPS: f64 = 200_000.0;
 pub(super) const LONG: f64 = 100.0;
 /// The discount of long runs.
 pub(super) const LONG_DISCOUNT: f64 = 0.995;
-/// Of long runs so many decisions are remembered: what has followed belongs to its strategy.
-const LONG_MEMORY: usize = 800_000;
 /// How much smaller the least difference is in each iteration.
 const FINER: f64 = 0.75;
+
+fn is_long(steps_of_run: f64) -> bool {
+    steps_of_run > LONG
+}
 
 impl Default for Learning {
     fn default() -> Learning {
@@ -94,7 +96,7 @@ impl Default for Learning {
             difference: 0.02..0.002,
             samples: 24,
             cells: 200_000,
-            trace: 0.5,
+            trace: 0.7,
             memory: 3_000_000,
         }
     }
@@ -103,7 +105,7 @@ impl Default for Learning {
 impl Learning {
     /// The discount, if a run has so many decisions.
     pub(super) fn discount(&self, steps_of_run: f64) -> f64 {
-        let fitting = if steps_of_run > LONG {
+        let fitting = if is_long(steps_of_run) {
             LONG_DISCOUNT
         } else {
             1.0
@@ -113,15 +115,10 @@ impl Learning {
 
     /// How much of what is behind a decision is what has followed, if a run has so many decisions.
     pub(super) fn trace(&self, steps_of_run: f64) -> f64 {
-        if steps_of_run > LONG { self.trace } else { 0.0 }
-    }
-
-    /// How many decisions are remembered, if a run has so many.
-    pub(super) fn memory(&self, steps_of_run: f64) -> usize {
-        if steps_of_run > LONG {
-            self.memory.min(LONG_MEMORY)
+        if is_long(steps_of_run) {
+            self.trace
         } else {
-            self.memory
+            0.0
         }
     }
 

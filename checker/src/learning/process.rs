@@ -5,10 +5,14 @@
 //! its worth is the value of the best of them.
 //!
 //! Invariants:
-//! * `samples` are sorted by slots, and those of a slot by the stands behind them.
+//! * `order` sorts the samples by slots, and those of a slot by the stands behind them.
 //! * `worths` are those of the values and errors at hand, but while they are computed.
 
+use std::borrow::Cow;
+
 use super::partition::{Cell, Known, WAIT};
+use super::slopes::Slopes;
+use super::sums::Sums;
 
 /// What a decision was.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +26,6 @@ pub(super) struct Sample {
     pub(super) point: u32,
     /// When it was taken in its run.
     pub(super) at: f64,
-    /// Its place among all samples, in the order in which they came.
-    pub(super) place: u32,
     /// Whether the sample behind it is the next decision of the run.
     pub(super) is_followed: bool,
 }
@@ -41,18 +43,18 @@ struct Way {
 /// The finite process.
 #[derive(Debug)]
 pub(super) struct Process {
+    /// In the order in which they came.
     samples: Vec<Sample>,
-    /// The samples in the order in which they came.
-    trail: Vec<Sample>,
     pub(super) points: Vec<f64>,
+    /// The places of the samples.
+    order: Vec<u32>,
     /// By slot: its cell and its action.
     slots: Vec<(u32, u32)>,
     /// By slot: where its samples begin, and its ways.
     first_samples: Vec<u32>,
     ways: Vec<Way>,
     first_ways: Vec<u32>,
-    /// By stand: the slots of its actions.
-    stands: Vec<Box<[u32]>>,
+    stands: Vec<Stand>,
     /// The cells with their slots and stands, those of late decisions first.
     groups: Vec<Group>,
     values: Vec<f64>,
@@ -60,34 +62,19 @@ pub(super) struct Process {
     errors: Vec<f64>,
     /// By slot: how often its action was taken, if that is more than there are samples.
     visits: Vec<f64>,
-    /// By stand: its cell.
-    cells_of_stands: Vec<u32>,
+    /// By stand.
     worths: Vec<f64>,
+    /// By sample: what it costs in the centre of its cell; empty if slopes were not looked at.
+    level_costs: Vec<f64>,
 }
 
-/// The number, the sum and the sum of squares of what samples cost.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    count: f64,
-    sum: f64,
-    squares: f64,
-}
-
-impl Sums {
-    fn add(&mut self, cost: f64) {
-        self.count += 1.0;
-        self.sum += cost;
-        self.squares += cost * cost;
-    }
-
-    /// The mean, and its standard error: as if one more sample were off by as much as all runs
-    /// differ.
-    fn mean_and_error(self, spread: f64) -> (f64, f64) {
-        let mean = self.sum / self.count;
-        let deviation = (self.squares - self.sum * mean).max(0.0);
-        let variance = (deviation + spread * spread) / self.count;
-        (mean, (variance / self.count).sqrt())
-    }
+/// A cell with the actions that are possible there.
+#[derive(Debug)]
+pub(super) struct Stand {
+    /// The end has none.
+    pub(super) cell: u32,
+    /// The slots of the actions.
+    pub(super) slots: Box<[u32]>,
 }
 
 /// What belongs to a cell.
@@ -109,30 +96,36 @@ impl Process {
     /// The process of some samples. Slots are cells with actions, stands are cells with slots; the
     /// first stand is the end.
     pub(super) fn new(
-        trail: Vec<Sample>,
+        samples: Vec<Sample>,
         points: Vec<f64>,
         slots: Vec<(u32, u32)>,
-        stands: Vec<(u32, Box<[u32]>)>,
+        stands: Vec<Stand>,
     ) -> Process {
-        let samples = by_slots(&trail, slots.len());
+        let order = by_slots(&samples, slots.len());
+        let way = |place: u32| {
+            let sample = &samples[place as usize];
+            (sample.slot, sample.next)
+        };
         let (mut first_samples, mut first_ways) = (Vec::new(), Vec::new());
         let mut ways: Vec<Way> = Vec::new();
-        for (place, of_way) in samples
-            .chunk_by(|one, other| (one.slot, one.next) == (other.slot, other.next))
-            .scan(0, |end, way| {
-                let place = *end;
-                *end += way.len();
-                Some((place, way))
-            })
+        for (place, of_way) in
+            order
+                .chunk_by(|&one, &other| way(one) == way(other))
+                .scan(0, |end, way| {
+                    let place = *end;
+                    *end += way.len();
+                    Some((place, way))
+                })
         {
             // There is no slot without samples.
-            if first_samples.len() == of_way[0].slot as usize {
+            let (slot, next) = way(of_way[0]);
+            if first_samples.len() == slot as usize {
                 first_samples.push(place as u32);
                 first_ways.push(ways.len() as u32);
             }
-            let costs = of_way.iter().map(|one| one.cost);
+            let costs = of_way.iter().map(|&one| samples[one as usize].cost);
             ways.push(Way {
-                next: of_way[0].next,
+                next,
                 count: of_way.len() as f64,
                 cost: costs.clone().sum(),
                 squares: costs.map(|cost| cost * cost).sum(),
@@ -141,8 +134,9 @@ impl Process {
         first_samples.push(samples.len() as u32);
         first_ways.push(ways.len() as u32);
         let mut process = Process {
-            trail,
+            samples,
             points,
+            order,
             first_samples,
             ways,
             first_ways,
@@ -150,34 +144,32 @@ impl Process {
             values: vec![0.0; slots.len()],
             errors: vec![0.0; slots.len()],
             visits: Vec::new(),
-            cells_of_stands: stands.iter().map(|one| one.0).collect(),
             worths: vec![0.0; stands.len()],
-            samples,
+            level_costs: Vec::new(),
             slots,
-            stands: Vec::new(),
+            stands,
         };
-        process.group(&stands);
-        process.stands = stands.into_iter().map(|(_, slots)| slots).collect();
+        process.group();
         process
     }
 
     /// Orders the cells by when decisions are taken in them.
-    fn group(&mut self, stands: &[(u32, Box<[u32]>)]) {
+    fn group(&mut self) {
         let cells = self.slots.iter().map(|slot| slot.0 + 1).max().unwrap_or(0);
         let mut groups = vec![Group::default(); cells as usize];
         let mut times = vec![0.0; cells as usize];
         let mut counts = vec![0.0; cells as usize];
         for (slot, &(cell, _)) in (0..).zip(&self.slots) {
             groups[cell as usize].slots.push(slot);
-            for sample in self.of(slot) {
+            for (_, sample) in self.of(slot) {
                 times[cell as usize] += sample.at;
                 counts[cell as usize] += 1.0;
             }
         }
-        for (stand, &(cell, _)) in (0..).zip(stands) {
+        for (number, stand) in (0..).zip(&self.stands) {
             // The end belongs to no cell.
-            if let Some(group) = groups.get_mut(cell as usize) {
-                group.stands.push(stand);
+            if let Some(group) = groups.get_mut(stand.cell as usize) {
+                group.stands.push(number);
             }
         }
         let mut order: Vec<usize> = (0..groups.len()).filter(|&one| counts[one] > 0.0).collect();
@@ -196,10 +188,13 @@ impl Process {
         self.samples.len()
     }
 
-    /// The samples of a slot.
-    pub(super) fn of(&self, slot: u32) -> &[Sample] {
+    /// The samples of a slot with their places.
+    pub(super) fn of(&self, slot: u32) -> impl ExactSizeIterator<Item = (usize, &Sample)> {
         let first = self.first_samples[slot as usize] as usize;
-        &self.samples[first..self.first_samples[slot as usize + 1] as usize]
+        let places = &self.order[first..self.first_samples[slot as usize + 1] as usize];
+        places
+            .iter()
+            .map(|&place| (place as usize, &self.samples[place as usize]))
     }
 
     /// How many slots there are.
@@ -219,7 +214,7 @@ impl Process {
     fn appraise(&mut self, stand: u32) {
         let (values, errors) = (&self.values, &self.errors);
         let cautious = |slot: u32| values[slot as usize] + errors[slot as usize];
-        let slots = self.stands[stand as usize].iter().copied();
+        let slots = self.stands[stand as usize].slots.iter().copied();
         let best = slots.min_by(|&one, &other| cautious(one).total_cmp(&cautious(other)));
         self.worths[stand as usize] = best.map_or(0.0, |slot| values[slot as usize]);
     }
@@ -239,13 +234,23 @@ impl Process {
         sample.cost + discount * self.worths[sample.next as usize]
     }
 
-    /// By place: what each sample costs as long as the same is done in the same cell, and from
-    /// there on. So a cell shows where in it that soon costs more, and not at its border alone.
-    pub(super) fn costs_of_stays(&self, discount: f64) -> Vec<f64> {
-        let mut costs = vec![0.0; self.trail.len()];
-        for (place, sample) in self.trail.iter().enumerate().rev() {
-            let stays = self.cells_of_stands[sample.next as usize] == self.cell(sample.slot);
-            let next = self.trail.get(place + 1);
+    /// By sample: what it costs, so that cells show where they differ: in the centre of its cell, or
+    /// else as long as the same is done in the same cell.
+    pub(super) fn telling_costs(&self, discount: f64) -> Cow<'_, [f64]> {
+        if self.level_costs.is_empty() {
+            Cow::Owned(self.costs_of_stays(discount))
+        } else {
+            Cow::Borrowed(&self.level_costs)
+        }
+    }
+
+    /// By sample: what it costs as long as the same is done in the same cell, and from there on. So
+    /// a cell shows where in it that soon costs more, and not at its border alone.
+    fn costs_of_stays(&self, discount: f64) -> Vec<f64> {
+        let mut costs = vec![0.0; self.samples.len()];
+        for (place, sample) in self.samples.iter().enumerate().rev() {
+            let stays = self.stands[sample.next as usize].cell == self.cell(sample.slot);
+            let next = self.samples.get(place + 1);
             costs[place] = match next.filter(|_| sample.is_followed && stays) {
                 Some(next) if next.slot == sample.slot => {
                     sample.cost + self.discount(sample.slot, discount) * costs[place + 1]
@@ -256,34 +261,44 @@ impl Process {
         costs
     }
 
-    /// Computes the values of all actions in all cells: the means of what their samples cost, where
-    /// what is behind a decision is to a part of `trace` what has followed, and for the rest what
-    /// its stand is worth. What a cell promises counts the less: where states that differ are in
-    /// one cell, it promises what no strategy can do.
+    /// Computes the values of all actions in all cells: what their samples cost in the centres of
+    /// the cells. What is behind a decision is to a part of `trace` what has followed, and for the
+    /// rest what its stand is worth at its point. What a cell promises counts the less: where
+    /// states that differ are in one cell, it promises what no strategy can do.
     ///
     /// Source: R. Sutton and A. Barto, "Reinforcement Learning", 2nd edition, section 12.1
     /// (lambda-returns).
     pub(super) fn follow_traces(&mut self, discount: f64, trace: f64, spread: f64) {
+        let mut slopes = Slopes::new(&self.samples, &self.points, &self.slots);
+        let mut costs = vec![0.0; self.samples.len()];
         for _ in 0..SWEEPS_OF_TRACES {
-            let mut sums = vec![Sums::default(); self.slots.len()];
             let mut behind = 0.0;
-            for sample in self.trail.iter().rev() {
-                let worth = self.worths[sample.next as usize];
-                let next = if sample.is_followed {
-                    worth + trace * (behind - worth)
-                } else {
-                    worth
-                };
+            for (place, sample) in self.samples.iter().enumerate().rev() {
+                let mut next = self.worths[sample.next as usize];
+                if sample.is_followed {
+                    let point = self.samples[place + 1].point as usize;
+                    let cell = self.stands[sample.next as usize].cell;
+                    next += slopes.rise(cell, &self.points[point..]);
+                    next += trace * (behind - next);
+                }
                 behind = sample.cost + self.discount(sample.slot, discount) * next;
-                sums[sample.slot as usize].add(behind);
+                costs[place] = behind;
+            }
+            slopes.fit(&self.points, &costs);
+            let mut sums = vec![Sums::default(); self.slots.len()];
+            for (sample, cost) in self.samples.iter().zip(&mut costs) {
+                let point = &self.points[sample.point as usize..];
+                *cost -= slopes.rise(self.cell(sample.slot), point);
+                sums[sample.slot as usize].add(*cost);
             }
             for (slot, sums) in sums.iter().enumerate() {
-                (self.values[slot], self.errors[slot]) = sums.mean_and_error(spread);
+                (self.values[slot], self.errors[slot]) = mean_and_error(*sums, spread);
             }
             for stand in 0..self.stands.len() as u32 {
                 self.appraise(stand);
             }
         }
+        self.level_costs = costs;
     }
 
     /// Computes the values of all actions in all cells: the means of what the samples cost.
@@ -323,7 +338,7 @@ impl Process {
             sums.sum += way.cost + way.count * worth;
             sums.squares += way.squares + worth * (2.0 * way.cost + way.count * worth);
         }
-        sums.mean_and_error(spread)
+        mean_and_error(sums, spread)
     }
 
     /// Moves the values of actions towards what each sample costs, the latest sample first. The
@@ -337,13 +352,13 @@ impl Process {
         });
         self.visits = visits.collect();
         let mut stands_of = vec![Vec::new(); self.slots.len()];
-        for (stand, slots) in (0..).zip(&self.stands) {
-            for &slot in slots {
-                stands_of[slot as usize].push(stand);
+        for (number, stand) in (0..).zip(&self.stands) {
+            for &slot in &stand.slots {
+                stands_of[slot as usize].push(number);
             }
         }
-        for place in (0..self.trail.len()).rev() {
-            let sample = self.trail[place];
+        for place in (0..self.samples.len()).rev() {
+            let sample = self.samples[place];
             let slot = sample.slot as usize;
             let cost = self.cost(&sample, discount);
             self.visits[slot] += 1.0;
@@ -397,9 +412,15 @@ impl Process {
     }
 }
 
-/// Samples in the order of their slots, and those of a slot in the order of the stands behind them.
-/// They are many, so they are counted first, and each is put where it belongs.
-fn by_slots(samples: &[Sample], slots: usize) -> Vec<Sample> {
+/// The mean of costs, and its standard error: as if one more were off by as much as all runs differ.
+fn mean_and_error(costs: Sums, spread: f64) -> (f64, f64) {
+    let variance = (costs.deviation() + spread * spread) / costs.count;
+    (costs.mean(), (variance / costs.count).sqrt())
+}
+
+/// The places of samples in the order of their slots, and those of a slot in the order of the
+/// stands behind them. They are many, so they are counted first, and each is put where it belongs.
+fn by_slots(samples: &[Sample], slots: usize) -> Vec<u32> {
     let mut ends = vec![0; slots + 1];
     for sample in samples {
         ends[sample.slot as usize + 1] += 1;
@@ -407,17 +428,15 @@ fn by_slots(samples: &[Sample], slots: usize) -> Vec<Sample> {
     for slot in 0..slots {
         ends[slot + 1] += ends[slot];
     }
-    let Some(&any) = samples.first() else {
-        return Vec::new();
-    };
-    let mut sorted = vec![any; samples.len()];
-    for &sample in samples {
-        let place = &mut ends[sample.slot as usize];
-        sorted[*place] = sample;
+    let mut order = vec![0; samples.len()];
+    for (number, sample) in (0..).zip(samples) {
+        let place: &mut usize = &mut ends[sample.slot as usize];
+        order[*place] = number;
         *place += 1;
     }
-    for of_slot in sorted.chunk_by_mut(|one, other| one.slot == other.slot) {
-        of_slot.sort_by_key(|sample| sample.next);
+    let sample = |place: u32| &samples[place as usize];
+    for of_slot in order.chunk_by_mut(|&one, &other| sample(one).slot == sample(other).slot) {
+        of_slot.sort_by_key(|&place| sample(place).next);
     }
-    sorted
+    order
 }

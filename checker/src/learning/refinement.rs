@@ -12,6 +12,7 @@
 
 use super::partition::Partition;
 use super::process::Process;
+use super::sums::Sums;
 
 /// When a cell is cut.
 #[derive(Clone, Copy, Debug)]
@@ -63,16 +64,16 @@ pub(super) fn refine(
     for slot in 0..process.slots() {
         by_cell[process.cell(slot) as usize].push(slot);
     }
-    let costs = process.costs_of_stays(discount);
+    let costs = process.telling_costs(discount);
     for (cell, slots) in by_cell.iter().enumerate() {
         let all: usize = slots.iter().map(|&slot| process.of(slot).len()).sum();
         let stride = all.div_ceil(LOOKED_AT).max(1);
         let mut points = Vec::with_capacity(all / stride + slots.len());
         for (action, &slot) in slots.iter().enumerate() {
-            let samples = process.of(slot).iter().step_by(stride);
-            points.extend(samples.map(|sample| Point {
+            let samples = process.of(slot).step_by(stride);
+            points.extend(samples.map(|(place, sample)| Point {
                 action: action as u32,
-                cost: costs[sample.place as usize],
+                cost: costs[place],
                 place: sample.point,
             }));
         }
@@ -92,40 +93,6 @@ struct Refiner<'p> {
     dimension: usize,
     rule: Rule,
     actions: usize,
-}
-
-/// The number, the sum and the sum of squares of costs.
-#[derive(Clone, Copy, Default)]
-struct Sums {
-    count: f64,
-    sum: f64,
-    squares: f64,
-}
-
-impl Sums {
-    fn add(&mut self, cost: f64) {
-        self.count += 1.0;
-        self.sum += cost;
-        self.squares += cost * cost;
-    }
-
-    fn without(self, other: Sums) -> Sums {
-        Sums {
-            count: self.count - other.count,
-            sum: self.sum - other.sum,
-            squares: self.squares - other.squares,
-        }
-    }
-
-    fn mean(self) -> f64 {
-        self.sum / self.count
-    }
-
-    /// The variance of the mean.
-    fn error(self) -> f64 {
-        let deviation = (self.squares - self.sum * self.mean()).max(0.0);
-        deviation / (self.count - 1.0) / self.count
-    }
 }
 
 impl Refiner<'_> {
@@ -203,11 +170,15 @@ impl Refiner<'_> {
         if difference < self.rule.difference {
             return 0.0;
         }
-        let error = low.error() + high.error();
+        let error = variance_of_mean(low) + variance_of_mean(high);
         // Where costs are no chance at all, the difference alone counts.
         let least = self.rule.difference * self.rule.difference / 1e4;
         difference * difference / error.max(least)
     }
+}
+
+fn variance_of_mean(costs: Sums) -> f64 {
+    costs.deviation() / (costs.count - 1.0) / costs.count
 }
 
 /// The number between two others, of which the first is less, that has the fewest binary digits.
