@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.needle.optimise import signed, span
+from ntagen.cli.needle.optimise import amount, signed, span
 from ntagen.cli.options import output_option
 from ntagen.cli.terminal import aligned, echo, say_idle
 from ntagen.errors import InputError
@@ -201,8 +201,8 @@ def _cells(row: Mapping[str, Any], document: Mapping[str, Any]) -> Sequence[str]
     compared = _comparison(row["compared"])
     return (
         row["task"],
-        _value(compared.plan, aim),
-        _value(compared.policy, aim),
+        amount(compared.plan.value, aim),
+        amount(compared.policy.value, aim),
         span(signed(compared.difference, aim), aim, sign="+"),
         _judged(compared.verdict, is_silent=row["is_silent"]),
         *(f"{row['drives'][way]['arrived']} of {drives}" for way in ways),
@@ -212,10 +212,6 @@ def _cells(row: Mapping[str, Any], document: Mapping[str, Any]) -> Sequence[str]
 def _comparison(document: Mapping[str, Any]) -> Comparison:
     means = {name: Mean(**document[name]) for name in ("plan", "policy", "difference")}
     return Comparison(**{**document, **means})
-
-
-def _value(mean: Mean, aim: str) -> str:
-    return span(mean, aim).partition(" (")[0]
 
 
 def _sum_lines(document: Mapping[str, Any]) -> Sequence[str]:
