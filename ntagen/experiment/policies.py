@@ -394,11 +394,11 @@ def _drives(steered: Steered, task: Task, wanted: Wanted) -> dict[str, Drives]:
 
 
 def _end(way: str, steered: Steered, task: Task, needle: str, seed: int) -> tuple[bool, bool]:
-    """Whether a needle is in the target in the end, and whether it touched a critical region."""
+    """Whether a needle arrived in the target, and whether it touched a critical region."""
     configuration = _configuration(task, needle, seed)
     if way == "plan":
         blind = drive_blindly(steered.plan, task.scene, configuration, seed)
-        return blind.target_distance_mm <= 0.0, blind.clearance_mm <= 0.0
+        return blind.is_reached, blind.clearance_mm <= 0.0
     settings = configuration.settings
     result = simulate(
         task.scene,
