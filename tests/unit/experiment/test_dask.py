@@ -74,7 +74,7 @@ def test_workers_of_another_version_are_refused(tmp_path: Path, cluster: Any) ->
     from distributed import Client
 
     with Client(cluster, set_as_default=False) as client:
-        other = "import ntagen.experiment.making as m; m.identity = lambda: '9.9.9'"
+        other = "import ntagen.cluster.workers as m; m.identity = lambda: '9.9.9'"
         client.run(exec, other, workers=[next(iter(client.nthreads()))])
     with pytest.raises(InputError, match=r"has another version of ntagen: 9\.9\.9(.|\n)*hint: "):
         campaign(file, dask=cluster.scheduler_address, folder=tmp_path / "x")
