@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ntagen.checker import Options, form_of, load
 from ntagen.cluster.identity import identity
-from ntagen.cluster.workers import Workers, as_messages, distributed
+from ntagen.cluster.workers import Workers, as_messages, distributed, require_same_version
 from ntagen.errors import InputError, NtagenError
 
 if TYPE_CHECKING:
@@ -89,11 +89,7 @@ def make_block(job: Job, first: int, count: int) -> tuple[bytes, float]:
     Raises:
         InputError: This is another version of ntagen.
     """
-    if job.version != identity():
-        raise InputError(
-            f"a worker has another version of ntagen: {identity()}, and this is {job.version}\n"
-            "hint: install the same version on all machines, and start the workers again"
-        )
+    require_same_version(job.version)
     model = _loaded(job)
     start = time.perf_counter()
     options = replace(job.options, progress=_giving_up())

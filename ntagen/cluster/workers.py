@@ -14,6 +14,8 @@ from ntagen.errors import InputError, NtagenError
 CONNECT_S: Final = 10.0
 """How long a scheduler may take to answer, in seconds."""
 
+_SAME: Final = "hint: install the same version on all machines, and start the workers again"
+
 _ADDRESS: Final = re.compile(r"([a-z]+://)?[^\s/]+:[0-9]{1,5}")
 
 
@@ -70,16 +72,31 @@ class Workers:
             found: dict[str, str] = self.client.run(identity)
         except Exception as error:  # whatever an old ntagen, or none, raises there
             raise InputError(
-                f"a worker cannot run ntagen {identity()}: {' '.join(str(error).split())}\n"
-                "hint: install the same version on all machines, and start the workers again"
+                f"a worker cannot run ntagen {identity()}: {' '.join(str(error).split())}\n{_SAME}"
             ) from error
         for place, version in found.items():
             if version != identity():
                 raise InputError(
                     f"the worker at {place} has another version of ntagen: {version}, and this is "
-                    f"{identity()}\nhint: install the same version on all machines, and start the "
-                    "workers again"
+                    f"{identity()}\n{_SAME}"
                 )
+
+
+def require_same_version(version: str, then: str = "") -> None:
+    """Refuses a job for another ntagen: a worker may come, or be updated, in the middle.
+
+    Args:
+        version: The ntagen that the job is for.
+        then: What to do when the workers have been started again, in words.
+
+    Raises:
+        InputError: This is another version.
+    """
+    if version != identity():
+        raise InputError(
+            f"a worker has another version of ntagen: {identity()}, and this is {version}\n"
+            f"{_SAME}{then}"
+        )
 
 
 @contextlib.contextmanager

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ntagen.drive.configure import Configuration
-from ntagen.drive.knowledge import obstacles_of
-from ntagen.drive.simulate import virtual
+from ntagen.drive.simulate import simulated
 from ntagen.drive.spinning import steered
 from ntagen.plan.actions import Plan, Push, Roll
 from ntagen.scene import Scene
@@ -41,10 +40,8 @@ def drive_blindly(plan: Plan, scene: Scene, configuration: Configuration, seed: 
         configuration: The needle, and the lag of rolls that is made up for.
         seed: The seed of the needle.
     """
-    settings, errors = configuration.settings, configuration.errors
-    make = configuration.needle.made_in(scene) or virtual(errors)
-    obstacles = obstacles_of(scene, settings.sensing_margin_mm)
-    needle = make(errors.true_needle(scene.needle), obstacles, seed)
+    settings, make = configuration.settings, configuration.needle.made_in(scene)
+    needle = simulated(scene, settings, seed, configuration.errors, make)
     actuator = steered(needle, scene, settings.compensated_lag_rad)
     for action in plan.actions:
         if isinstance(action, Push):

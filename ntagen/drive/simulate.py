@@ -168,10 +168,7 @@ def simulate(
         course: As in `Controller`.
         policy: As in `Controller`.
     """
-    obstacles = obstacles_of(scene, settings.sensing_margin_mm)
-    errors = errors or Errors()
-    true_needle = errors.true_needle(scene.needle)
-    needle = (make or virtual(errors))(true_needle, obstacles, seed)
+    needle = simulated(scene, settings, seed, errors, make)
     if scene.breath is not None and not isinstance(needle, Waiting):
         raise InputError(
             "this simulated needle cannot wait for regions that move\n"
@@ -206,6 +203,15 @@ def simulate(
         guaranteed=counter.guaranteed,
         promised=counter.promised,
     )
+
+
+def simulated(
+    scene: Scene, settings: Settings, seed: int, errors: Errors | None, make: Maker | None
+) -> Simulated:
+    """A simulated needle at the entry of a scene; the arguments are those of `simulate`."""
+    errors = errors or Errors()
+    obstacles = obstacles_of(scene, settings.sensing_margin_mm)
+    return (make or virtual(errors))(errors.true_needle(scene.needle), obstacles, seed)
 
 
 def synthesiser_for(

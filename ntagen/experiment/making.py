@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ntagen.cluster.identity import identity
+from ntagen.cluster.workers import require_same_version
 from ntagen.drive.configure import Configuration
 from ntagen.drive.log import Log
 from ntagen.drive.log_facts import facts_of
@@ -74,12 +74,7 @@ def make_block(block: Block, notify: Callable[[Run], None] = lambda _: None) -> 
         InputError: This is another version of ntagen, the scene is not that of the row, or a run
             cannot be written.
     """
-    if block.version != identity():
-        raise InputError(
-            f"a worker has another version of ntagen: {identity()}, and this is {block.version}\n"
-            "hint: install the same version on all machines, start the workers again, and go on "
-            "with --resume"
-        )
+    require_same_version(block.version, ", then go on with --resume")
     task = _task(block.row.scenario)
     if digest_of(block.row, task) != block.row.digest:
         _task.cache_clear()

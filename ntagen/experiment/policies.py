@@ -20,6 +20,7 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from ntagen.cluster.identity import identity
+from ntagen.cluster.workers import require_same_version
 from ntagen.drive.best_policy import best_policy, sampling_of
 from ntagen.drive.blind import drive_blindly
 from ntagen.drive.configure import Configuration, configure
@@ -155,11 +156,8 @@ class TaskJob:
             InputError: This is another version of ntagen, the task has changed, or nothing can be
                 written.
         """
-        if self.version != identity():
-            raise InputError(
-                f"a worker has another version of ntagen: {identity()}, and this is {self.version}"
-                "\nhint: start again with one version"
-            )
+        kept = "" if self.folder is None else ", then go on with --resume"
+        require_same_version(self.version, kept)
         since_s = time.perf_counter()
         task = self.load()
         if _digest_of(self, task) != self.digest:
@@ -394,11 +392,11 @@ def _drives(steered: Steered, task: Task, wanted: Wanted) -> dict[str, Drives]:
 
 
 def _end(way: str, steered: Steered, task: Task, needle: str, seed: int) -> tuple[bool, bool]:
-    """Whether a needle is in the target in the end, and whether it touched a critical region."""
+    """Whether a needle arrived in the target, and whether it touched a critical region."""
     configuration = _configuration(task, needle, seed)
     if way == "plan":
         blind = drive_blindly(steered.plan, task.scene, configuration, seed)
-        return blind.target_distance_mm <= 0.0, blind.clearance_mm <= 0.0
+        return blind.is_reached, blind.clearance_mm <= 0.0
     settings = configuration.settings
     result = simulate(
         task.scene,

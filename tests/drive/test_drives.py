@@ -21,6 +21,13 @@ from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN, PAPER, scene, sphere
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+RUNS = 15
+"""So many seeds has a slow test; `tests/benchmarks/drives.py` drives hundreds."""
+
+
+def seeds(noise_mm: float, count: int = RUNS) -> range:
+    """Seeds to try: without errors all of them give the same run."""
+    return range(1, 1 + count) if noise_mm else range(1, 2)
 
 
 def check_reached(scene: Scene, known: str, noise_mm: float, seeds: range) -> None:
@@ -33,20 +40,20 @@ def check_reached(scene: Scene, known: str, noise_mm: float, seeds: range) -> No
 
 @pytest.mark.parametrize("noise_mm", [0.0, 0.1])
 def test_the_paper_instance_is_reached(noise_mm: float) -> None:
-    check_reached(PAPER, "all", noise_mm, range(1, 3))
+    check_reached(PAPER, "all", noise_mm, seeds(noise_mm, 2))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise_mm", [0.0, 0.1])
-def test_the_paper_instance_is_reached_50_times(noise_mm: float) -> None:
-    check_reached(PAPER, "all", noise_mm, range(1, 51))
+def test_the_paper_instance_is_reached_every_time() -> None:
+    check_reached(PAPER, "all", 0.1, seeds(0.1))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["no_cr", "small_mid_cr", "surface_crs", "tunnel_crs"])
 @pytest.mark.parametrize("noise_mm", [0.0, 0.1])
-def test_the_scenarios_are_reached_50_times(name: str, noise_mm: float) -> None:
-    check_reached(load(EXAMPLES / "scenarios" / f"{name}.nsl"), "all", noise_mm, range(1, 51))
+def test_the_scenarios_are_reached_every_time(name: str, noise_mm: float) -> None:
+    where = load(EXAMPLES / "scenarios" / f"{name}.nsl")
+    check_reached(where, "all", noise_mm, seeds(noise_mm))
 
 
 @pytest.mark.parametrize("noise_mm", [0.0, 0.1])
@@ -81,18 +88,17 @@ def test_a_region_that_was_not_told_is_felt_and_avoided(noise_mm: float) -> None
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise_mm", [0.0, 0.1])
-def test_a_region_that_was_not_told_is_never_pierced_in_50_runs(noise_mm: float) -> None:
-    reached = sum(check_felt_and_avoided(noise_mm, seed) for seed in range(1, 51))
+def test_a_region_that_was_not_told_is_never_pierced() -> None:
+    reached = sum(check_felt_and_avoided(0.1, seed) for seed in seeds(0.1))
     # A region that is felt from three sides can leave no plan that ends in time.
-    assert reached >= 48
+    assert reached >= RUNS - 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["small_mid_cr", "large_mid_cr", "surface_crs", "tunnel_crs"])
 def test_no_region_is_ever_pierced_whatever_is_known(name: str) -> None:
     where = load(EXAMPLES / "scenarios" / f"{name}.nsl")
-    for seed in range(1, 16):
+    for seed in seeds(0.1, 8):
         result, _ = drive(where, known="none", noise_mm=0.1, roll_rad=0.05, seed=seed)
         assert result.clearance_mm > 0.0, (seed, result.ended)
 

@@ -43,7 +43,7 @@ def wins(scene: Scene, radius_mm: float, *, only_plans: bool) -> bool:
 
 
 @pytest.mark.slow
-@settings(max_examples=examples(40), deadline=None)
+@settings(max_examples=examples(12), deadline=None)
 @given(answered())
 def test_the_least_target_that_is_reached_stays(scene: Scene) -> None:
     # Where the winner changes, a cut that takes too much is seen first.

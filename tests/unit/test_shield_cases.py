@@ -7,13 +7,32 @@ import json
 import numpy as np
 import pytest
 
-from ntagen.checker import Answer, load
+from ntagen.checker import Answer, Model, load
 from tests.oracles.learning.shields.cases import CASES, WALK, Shielding
 from tests.oracles.learning.shields.fixed_point import Cells, Walk
 
 CELLS = 100
 NEARLY = 0.02
 """By so much the shares of cells differ at most where errors are drawn."""
+
+
+def shielded(case: Shielding) -> tuple[Model, Answer]:
+    """The model with its shield S, and the answer that made it."""
+    model = load(case.text)
+    return model, model.check(case.query, threads=2, **case.options)
+
+
+def check_safe(case: Shielding, model: Model, answer: Answer) -> None:
+    """There is a shield, and no run under it is unsafe."""
+    assert answer.verdict == "satisfied"
+    under = model.check(f"{case.broken} under S", threads=2).estimate
+    assert under is not None
+    assert under.satisfied_runs == 0
+
+
+@pytest.fixture(scope="module")
+def walk() -> tuple[Model, Answer]:
+    return shielded(WALK)
 
 
 def steps(answer: Answer) -> dict[str, Cells]:
@@ -40,8 +59,10 @@ def test_without_errors_the_walk_has_the_cells_of_an_independent_fixed_point() -
 
 
 @pytest.mark.slow
-def test_with_errors_the_walk_has_nearly_the_cells_for_the_worst_ones() -> None:
-    answer = load(WALK.text).check(WALK.query, **WALK.options)
+def test_with_errors_the_walk_has_nearly_the_cells_for_the_worst_ones(
+    walk: tuple[Model, Answer],
+) -> None:
+    _, answer = walk
     wanted = Walk(CELLS, samples=4, error=0.04, errors=9).solve()
     found = steps(answer)
     for name in wanted:
@@ -52,26 +73,28 @@ def test_with_errors_the_walk_has_nearly_the_cells_for_the_worst_ones() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.model)
-def test_no_run_under_a_published_shield_is_unsafe(case: Shielding) -> None:
-    model = load(case.text)
-    assert model.check(case.query, threads=2, **case.options).verdict == "satisfied"
-    under = model.check(f"{case.broken} under S", threads=2).estimate
-    assert under is not None
-    assert under.satisfied_runs == 0
+def test_no_run_under_the_shield_of_the_walk_is_unsafe(walk: tuple[Model, Answer]) -> None:
+    check_safe(WALK, *walk)
 
 
 @pytest.mark.slow
-def test_what_is_learned_under_a_shield_is_safe_and_cheaper() -> None:
-    model = load(WALK.text)
-    model.check(WALK.query, threads=2, **WALK.options)
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if case != WALK], ids=lambda case: case.model
+)
+def test_no_run_under_a_published_shield_is_unsafe(case: Shielding) -> None:
+    check_safe(case, *shielded(case))
+
+
+@pytest.mark.slow
+def test_what_is_learned_under_a_shield_is_safe_and_cheaper(walk: tuple[Model, Answer]) -> None:
+    model, _ = walk
     cheap = "strategy Cheap = minE(cost)[#<=100] {} -> {x, t}: <> Walker.End"
-    free = model.check(cheap, threads=2)
+    free = model.check(cheap, threads=2, max_iterations=6)
     assert model.check(f"{WALK.broken} under Cheap").value > 0.1
-    shielded = model.check(f"{cheap} under S", threads=2)
+    fenced = model.check(f"{cheap} under S", threads=2, max_iterations=6)
     under = model.check(f"{WALK.broken} under Cheap").estimate
     assert under is not None
     assert under.satisfied_runs == 0
-    uniform = shielded.optimised and shielded.optimised.uniform
+    uniform = fenced.optimised and fenced.optimised.uniform
     assert uniform is not None
-    assert free.value < shielded.value < uniform.value
+    assert free.value < fenced.value < uniform.value

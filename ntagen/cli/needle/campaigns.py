@@ -1,4 +1,7 @@
-"""What `ntagen experiment` and `ntagen sweep` share: options, progress, the table, the end."""
+"""What `ntagen experiment` and `ntagen sweep` share: options, progress, the table, the end.
+
+`ntagen policies` has the same workers.
+"""
 
 from __future__ import annotations
 
@@ -47,21 +50,25 @@ class How:
     no_logs: bool
 
 
+workers_option = click.option(
+    "--workers",
+    metavar="N",
+    type=click.IntRange(1, 1024),
+    help="Use this many processes of this machine.  [default: one for each core]",
+)
+
+dask_option = click.option(
+    "--dask",
+    metavar="ADDRESS",
+    help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They must "
+    "have the same ntagen, and see the same files.",
+)
+
 campaign_options = gathered(
     "how",
     {
-        "workers": click.option(
-            "--workers",
-            metavar="N",
-            type=click.IntRange(1, 1024),
-            help="Use this many processes of this machine.  [default: one for each core]",
-        ),
-        "dask": click.option(
-            "--dask",
-            metavar="ADDRESS",
-            help="Use the workers of the Dask scheduler at this address, as tcp://host:8786. They "
-            "must have the same ntagen, and see the same files.",
-        ),
+        "workers": workers_option,
+        "dask": dask_option,
         "resume": click.option(
             "--resume",
             is_flag=True,

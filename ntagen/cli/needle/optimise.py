@@ -142,6 +142,14 @@ def signed(gain: Mean, aim: str) -> Mean:
 
 def span(mean: Mean, aim: str, sign: str = "") -> str:
     """A mean and its interval, in the unit of what is optimised."""
-    scale, unit = (100.0, " %") if aim == "probability" else (1.0, " mm")
-    value, lower, upper = (scale * one for one in (mean.value, mean.lower, mean.upper))
-    return f"{value:{sign}.4g}{unit} (from {lower:{sign}.4g} to {upper:{sign}.4g}{unit})"
+    value, upper = (amount(one, aim, sign) for one in (mean.value, mean.upper))
+    return f"{value} (from {_number(mean.lower, aim, sign)} to {upper})"
+
+
+def amount(value: float, aim: str, sign: str = "") -> str:
+    """A number in the unit of what is optimised."""
+    return _number(value, aim, sign) + (" %" if aim == "probability" else " mm")
+
+
+def _number(value: float, aim: str, sign: str) -> str:
+    return f"{100.0 * value if aim == 'probability' else value:{sign}.4g}"

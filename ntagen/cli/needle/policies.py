@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from ntagen.cli.needle.optimise import signed, span
+from ntagen.cli.needle.campaigns import dask_option, workers_option
+from ntagen.cli.needle.optimise import amount, signed, span
 from ntagen.cli.options import output_option
 from ntagen.cli.terminal import aligned, echo, say_idle
 from ntagen.errors import InputError
@@ -81,12 +82,8 @@ _NO_PLAN: Final = {"none": "no plan", "unknown": "plan unknown"}
     type=click.Choice(["probability", "miss", "cut"]),
     help="What plans and policies are to be the best for, as in `ntagen plan`.",
 )
-@click.option(
-    "--workers",
-    metavar="N",
-    type=click.IntRange(1, 1024),
-    help="Use this many processes of this machine.  [default: one for each core]",
-)
+@workers_option
+@dask_option
 @output_option("DIR", "Keep rows, policies, random tasks and the table in this folder.", "folder")
 @click.option(
     "--resume",
@@ -103,6 +100,7 @@ def command(
     needle: str,
     aim: Aim,
     workers: int | None,
+    dask: str | None,
     folder: Path | None,
     resume: bool,
     as_json: bool,
@@ -121,6 +119,7 @@ def command(
       ntagen policies examples/chance/chance.nsl --runs 100000
       ntagen policies --random 10 --drives 3 -o campaign
       ntagen policies --random 100 --drives 3 -o campaign --resume
+      ntagen policies --random 100 --drives 3 -o campaign --dask tcp://head:8786
 
     \b
     The JSON object has wanted, tasks, confidence, rows (task, seed, verdict, reason, plan,
@@ -139,7 +138,7 @@ def command(
     campaign = campaign_of(files, random_tasks, seed, Wanted(aim, runs, drives, needle))
     told = _Progress(campaign)
     try:
-        document = carry_out(campaign, crew_of(workers), told.note, folder, resume=resume)
+        document = carry_out(campaign, crew_of(workers, dask), told.note, folder, resume=resume)
     except KeyboardInterrupt:
         _show(document_of(campaign, told.rows), as_json=as_json)
         kept = "" if folder is None else f", and kept in {folder}; go on with --resume"
@@ -201,8 +200,8 @@ def _cells(row: Mapping[str, Any], document: Mapping[str, Any]) -> Sequence[str]
     compared = _comparison(row["compared"])
     return (
         row["task"],
-        _value(compared.plan, aim),
-        _value(compared.policy, aim),
+        amount(compared.plan.value, aim),
+        amount(compared.policy.value, aim),
         span(signed(compared.difference, aim), aim, sign="+"),
         _judged(compared.verdict, is_silent=row["is_silent"]),
         *(f"{row['drives'][way]['arrived']} of {drives}" for way in ways),
@@ -212,10 +211,6 @@ def _cells(row: Mapping[str, Any], document: Mapping[str, Any]) -> Sequence[str]
 def _comparison(document: Mapping[str, Any]) -> Comparison:
     means = {name: Mean(**document[name]) for name in ("plan", "policy", "difference")}
     return Comparison(**{**document, **means})
-
-
-def _value(mean: Mean, aim: str) -> str:
-    return span(mean, aim).partition(" (")[0]
 
 
 def _sum_lines(document: Mapping[str, Any]) -> Sequence[str]:

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from ntagen.cluster import workers
 from ntagen.drive.reading import read_log
 from ntagen.drive.replay import replay
 from ntagen.drive.simulate import synthesiser_for
@@ -204,7 +205,7 @@ def test_a_folder_of_another_version_is_refused(
 def test_a_worker_of_another_version_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(making, "identity", lambda: "9.9.9")
+    monkeypatch.setattr(workers, "identity", lambda: "9.9.9")
     with pytest.raises(InputError, match=r"a worker has another version of ntagen: 9\.9\.9"):
         made(tmp_path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -12,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from ntagen import cli
 from ntagen.errors import InputError
 from ntagen.experiment.campaign import carry_out
 from ntagen.experiment.crew import Done, Here
@@ -74,10 +76,24 @@ def test_workers_of_another_version_are_refused(tmp_path: Path, cluster: Any) ->
     from distributed import Client
 
     with Client(cluster, set_as_default=False) as client:
-        other = "import ntagen.experiment.making as m; m.identity = lambda: '9.9.9'"
+        other = "import ntagen.cluster.workers as m; m.identity = lambda: '9.9.9'"
         client.run(exec, other, workers=[next(iter(client.nthreads()))])
     with pytest.raises(InputError, match=r"has another version of ntagen: 9\.9\.9(.|\n)*hint: "):
         campaign(file, dask=cluster.scheduler_address, folder=tmp_path / "x")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_policies_are_the_same_on_a_cluster(tmp_path: Path, cluster: Any) -> None:  # noqa: ANN401
+    address, tables = cluster.scheduler_address, []
+    for name, where in (("cluster", ["--dask", address]), ("here", ["--workers", "1"])):
+        folder = tmp_path / name
+        words = ["policies", "--random", "3", "--runs", "200", *where, "-o", str(folder)]
+        assert cli.main(words) == 0
+        rows = json.loads((folder / "table.json").read_text("utf-8"))["rows"]
+        tables.append([row | {"seconds": 0.0} for row in rows])
+        assert (folder / "random_1.policy.json").exists()
+    assert tables[0] == tables[1]
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -100,6 +116,9 @@ def test_without_dask_there_is_a_hint(tmp_path: Path, monkeypatch: pytest.Monkey
         campaign(written(tmp_path), dask="tcp://127.0.0.1:9", folder=tmp_path / "x")
 
 
-def test_a_cluster_has_its_own_workers(tmp_path: Path) -> None:
+def test_a_cluster_has_its_own_workers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(InputError, match="a cluster has its own workers"):
         campaign(written(tmp_path), dask="tcp://127.0.0.1:9", workers=2, folder=tmp_path / "x")
+    both = ["--dask", "tcp://127.0.0.1:9", "--workers", "2"]
+    assert cli.main(["policies", "--random", "1", *both]) == 2
+    assert "a cluster has its own workers" in capsys.readouterr().err

@@ -208,6 +208,24 @@ def test_an_interruption_keeps_the_rows_that_are_done(
     assert "interrupted: 1 of 2 tasks are done" in err
 
 
+def test_virtual_needles_arrive_as_often_as_tissues_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    in_this_process(monkeypatch)
+    monkeypatch.setattr(policies, "WAYS", ("plan",))
+    path, usual = tmp_path / "much.nsl", "curvature 5 %  roll 5 deg  tip 0.3 mm"
+    much = "curvature 10 %  roll 15 deg  tip 0.5 mm"
+    path.write_text(CHANCE.read_text("utf-8").replace(usual, much), "utf-8")
+    # Of phantom needles, whose tissue has no such chance, 83 arrive, of the others 62.
+    wanted = ["policies", str(path), "--needle", "virtual", "--runs", "1000", "--drives", "100"]
+    assert cli.main([*wanted, "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert 0.4 < row["compared"]["plan"]["value"] < 0.7
+    arrived = row["drives"]["plan"]["arrived"]
+    assert abs(arrived / 100.0 - row["compared"]["plan"]["value"]) < 0.15
+    assert row["drives"]["plan"]["hits"] > 5
+
+
 def test_a_blind_needle_goes_where_its_plan_says() -> None:
     task = load_task(CHANCE)
     half = Roll(rad_from_deg(180.0))
