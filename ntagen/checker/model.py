@@ -324,7 +324,9 @@ class Model:
             features, known = training["features"], training["actions"]
             wait = training["wait"] if wait is None else wait
         with rejecting():
-            actions = _checker.follow(self._raw, name, (features, wait, known), follower)
+            actions = _checker.follow(
+                self._raw, name, features, follower, wait=wait, actions=known
+            )
         self._followers[name] = follower
         return tuple(actions)
 
@@ -499,6 +501,17 @@ class Model:
         with rejecting():
             raw = _checker.Strategy.named(self._raw, form.uses, query, options)
         return None if raw is None else Strategy(raw, options.forced, options.priorities)
+
+    def has_strategy_of_game(self, name: str) -> bool | None:
+        """Whether the strategy with this name is one of a game.
+
+        Args:
+            name: The name that a query has given it.
+
+        Returns:
+            False for a learned strategy, a shield and a policy; ``None`` if the name is not known.
+        """
+        return _checker.Strategy.is_of_game(self._raw, name)
 
     def verify(
         self,

@@ -178,7 +178,8 @@ class DaskRuns:
 
     def answer(self, model: Model, query: str, options: Options) -> Answer:
         """Answers a query as `check` does, with all options as one value."""
-        if (reason := why_here(query, options)) is not None:
+        reason = why_here(query, options) or why_here_under(model, query)
+        if reason is not None:
             raise InputError(f"{query.strip()}: {reason}\nhint: ask without a cluster")
         with self.runs_of(model, query, options) as source:
             return model.answer(query, replace(options, run_source=source))
@@ -212,6 +213,14 @@ def why_here(query: str, options: Options) -> str | None:
     if options.levels is not None:
         return "importance splitting is not done by a cluster"
     return None
+
+
+def why_here_under(model: Model, query: str) -> str | None:
+    """Why the runs under the strategy of a query cannot be made elsewhere; None if they can."""
+    form = form_of(query)
+    if form is None or form.uses is None or model.has_strategy_of_game(form.uses) is not False:
+        return None
+    return f"{form.uses} is no strategy of a game, and only these are sent to a cluster"
 
 
 @dataclass(frozen=True, slots=True)

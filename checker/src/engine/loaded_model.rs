@@ -466,4 +466,9 @@ impl NamedStrategy {
             in_zones: None,
         }
     }
+
+    /// Whether it is one of a game, and neither learned, a shield nor a policy.
+    pub fn is_of_game(&self) -> bool {
+        self.learned.is_none() && self.shield.is_none() && self.policy.is_none()
+    }
 }

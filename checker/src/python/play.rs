@@ -109,6 +109,13 @@ impl Strategy {
         }))
     }
 
+    /// Whether the strategy with this name is one of a game; `None` if there is none.
+    #[staticmethod]
+    fn is_of_game(model: &Bound<'_, Model>, name: &str) -> Option<bool> {
+        let inner = model.get();
+        inner.with(|model| model.strategy(name).map(NamedStrategy::is_of_game))
+    }
+
     /// Reads a strategy from the bytes of a file; `path` names it.
     #[staticmethod]
     fn read(model: &Bound<'_, Model>, path: &str, data: &Bound<'_, PyBytes>) -> PyResult<Strategy> {

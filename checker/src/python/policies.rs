@@ -165,17 +165,19 @@ impl Policy for PythonPolicy {
 /// Lets queries of a model be asked under a policy by a name; returns the texts of the actions. The
 /// policy sees features, waits at most for a time, and may say between which actions it decides.
 #[pyfunction]
+#[pyo3(signature = (model, name, features, decide, *, wait, actions))]
 pub(super) fn follow(
     model: &Bound<'_, Model>,
     name: &str,
-    interface: (String, Option<f64>, Option<Vec<String>>),
+    features: String,
     decide: Py<PyAny>,
+    wait: Option<f64>,
+    actions: Option<Vec<String>>,
 ) -> PyResult<Vec<String>> {
     let policy = Arc::new(PythonPolicy {
         decide,
         failure: Mutex::new(String::new()),
     });
-    let (features, wait, actions) = interface;
     let interface = Interface {
         features,
         wait,

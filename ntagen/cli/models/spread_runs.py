@@ -51,6 +51,10 @@ def joint_answers(
     return dict(zip(places, answers, strict=True))
 
 
+def _by_this_machine(query: str, reason: str) -> str:
+    return f"{query}: runs are made by this machine: {reason}"
+
+
 def _is_joint(query: Asked) -> bool:
     form = query.form
     return form is not None and form.is_statistical and form.kind != "simulate"
@@ -83,7 +87,7 @@ class Spreading:
                 self._reasons[query.text] = why_not or why_here(query.text, options)
         say(
             [
-                f"{text}: runs are made by this machine: {reason}"
+                _by_this_machine(text, reason)
                 for text, reason in self._reasons.items()
                 if reason is not None
             ]
@@ -98,6 +102,12 @@ class Spreading:
     def source(self, model: Model, query: Asked, options: Options) -> Iterator[dict[str, Any]]:
         """Gives the options of `ntagen.checker.Options` by which runs come from the cluster."""
         if self._cluster is None or self._reasons.get(query.text, "other") is not None:
+            yield {}
+            return
+        from ntagen.cluster.runs import why_here_under
+
+        if (reason := why_here_under(model, query.text)) is not None:
+            say([_by_this_machine(query.text, reason)])
             yield {}
             return
         with self._cluster.runs_of(model, query.text, options) as source:

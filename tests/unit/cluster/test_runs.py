@@ -135,6 +135,34 @@ def test_runs_under_a_strategy_are_those_of_one_machine(
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
+def test_runs_under_a_learned_strategy_are_made_here(
+    tmp_path: Path,
+    cluster: Any,  # noqa: ANN401
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "game.xta"
+    path.write_text(GAME, "utf-8")
+    learned = "strategy Least = minE(n)[<=3]{}->{t}: <> t >= 3"
+    words = ["check", str(path), "--json", "--seed", "1"]
+    for query in [learned, "E[<=3; 500](max: n) under Least", "E[<=3; 500](max: n)"]:
+        words += ["--query", query]
+    assert main(words) == 0
+    here = lines(capsys.readouterr().out)
+    assert main([*words, "--set", f"dask {cluster.scheduler_address}"]) == 0
+    said = capsys.readouterr()
+    assert lines(said.out) == here
+    assert said.err.count("by this machine: Least is no strategy of a game") == 1
+    model = checker.load(GAME)
+    model.check(learned, seed=1)
+    with (
+        DaskRuns(cluster.scheduler_address) as runs,
+        pytest.raises(InputError, match="Least is no strategy of a game"),
+    ):
+        runs.check(model, "E[<=3; 500](max: n) under Least")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
 def test_a_lost_worker_changes_nothing(cluster: Any) -> None:  # noqa: ANN401
     model, options = checker.load(SLOW), Options(runs=50)
     query = "Pr[<=3](<> n == 1)"
