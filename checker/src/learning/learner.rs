@@ -202,7 +202,8 @@ impl Learner<'_> {
                 is_complete = false;
                 break;
             }
-            if since_better >= self.options.patience {
+            let is_finest = !self.options.becomes_finer(in_reset - 1);
+            if since_better >= self.options.patience && is_finest {
                 if resets >= self.options.resets {
                     break;
                 }

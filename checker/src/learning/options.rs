@@ -29,7 +29,8 @@ pub struct Learning {
     pub learning_runs: Option<u64>,
     /// How many runs judge the strategy of an iteration.
     pub judging_runs: Option<u64>,
-    /// So many iterations without a better strategy, and learning ends or begins anew.
+    /// So many iterations without a better strategy, and learning ends or begins anew, but not
+    /// while cuts become finer.
     pub patience: u64,
     /// How often it begins anew.
     pub resets: u64,
@@ -126,6 +127,11 @@ impl Learning {
     pub(super) fn difference(&self, iteration: u64) -> f64 {
         let Range { start, end } = self.difference;
         (start * FINER.powi(iteration as i32)).max(end)
+    }
+
+    /// Whether cuts become finer behind this iteration.
+    pub(super) fn becomes_finer(&self, iteration: u64) -> bool {
+        self.difference(iteration) > self.difference.end
     }
 
     /// How many runs this iteration learns from, if a run has so many decisions.

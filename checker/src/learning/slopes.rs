@@ -30,7 +30,7 @@ pub(super) struct Slopes {
     /// the Cholesky factor of how points scatter around the middles of their slots, row by row,
     factors: Vec<f64>,
     /// and how costs change with each number.
-    slopes: Vec<f64>,
+    rates: Vec<f64>,
 }
 
 impl Slopes {
@@ -48,10 +48,13 @@ impl Slopes {
             middles: vec![0.0; slots.len() * dimension],
             centres: vec![0.0; cells * dimension],
             factors: vec![0.0; cells * dimension * dimension],
-            slopes: vec![0.0; cells * dimension],
+            rates: vec![0.0; cells * dimension],
         };
-        slopes.centre(points, slots);
-        slopes.scatter(points);
+        // Who sees no numbers has no lines.
+        if dimension > 0 {
+            slopes.centre(points, slots);
+            slopes.scatter(points);
+        }
         slopes
     }
 
@@ -76,7 +79,7 @@ impl Slopes {
                 *middle += value;
             }
         }
-        let mut of_cells = vec![0.0; self.centres.len() / dimension.max(1)];
+        let mut of_cells = vec![0.0; self.centres.len() / dimension];
         for (slot, &(cell, _)) in slots.iter().enumerate() {
             let cell = cell as usize;
             of_cells[cell] += of_slots[slot];
@@ -98,7 +101,7 @@ impl Slopes {
     fn scatter(&mut self, points: &[f64]) {
         let dimension = self.dimension;
         let mut factors = std::mem::take(&mut self.factors);
-        let mut counts = vec![0.0; self.centres.len() / dimension.max(1)];
+        let mut counts = vec![0.0; self.centres.len() / dimension];
         let mut off = vec![0.0; dimension];
         for (slot, cell, point) in self.all(points) {
             counts[cell] += 1.0;
@@ -137,7 +140,7 @@ impl Slopes {
     /// By how much it costs more at a point than at the centre of a cell.
     pub(super) fn rise(&self, cell: u32, point: &[f64]) -> f64 {
         let first = cell as usize * self.dimension;
-        let parts = self.slopes[first..].iter().zip(&self.centres[first..]);
+        let parts = self.rates[first..].iter().zip(&self.centres[first..]);
         let parts = parts.zip(&point[..self.dimension]);
         parts
             .map(|((slope, centre), value)| slope * (value - centre))
@@ -149,7 +152,7 @@ impl Slopes {
     /// Source: least squares, by the normal equations.
     pub(super) fn fit(&mut self, points: &[f64], costs: &[f64]) {
         let dimension = self.dimension;
-        let mut slopes = std::mem::take(&mut self.slopes);
+        let mut slopes = std::mem::take(&mut self.rates);
         slopes.fill(0.0);
         let mut off = vec![0.0; dimension];
         for ((slot, cell, point), cost) in self.all(points).zip(costs) {
@@ -163,7 +166,7 @@ impl Slopes {
         for (slopes, factor) in slopes.chunks_exact_mut(size).zip(factors) {
             solve(factor, slopes);
         }
-        self.slopes = slopes;
+        self.rates = slopes;
     }
 }
 
