@@ -101,7 +101,7 @@ impl Process {
         slots: Vec<(u32, u32)>,
         stands: Vec<Stand>,
     ) -> Process {
-        let order = by_slots(&samples, slots.len());
+        let order = by_slots(&samples, slots.len(), stands.len());
         let way = |place: u32| {
             let sample = &samples[place as usize];
             (sample.slot, sample.next)
@@ -419,24 +419,32 @@ fn mean_and_error(costs: Sums, spread: f64) -> (f64, f64) {
 }
 
 /// The places of samples in the order of their slots, and those of a slot in the order of the
-/// stands behind them. They are many, so they are counted first, and each is put where it belongs.
-fn by_slots(samples: &[Sample], slots: usize) -> Vec<u32> {
-    let mut ends = vec![0; slots + 1];
-    for sample in samples {
-        ends[sample.slot as usize + 1] += 1;
-    }
-    for slot in 0..slots {
-        ends[slot + 1] += ends[slot];
-    }
-    let mut order = vec![0; samples.len()];
-    for (number, sample) in (0..).zip(samples) {
-        let place: &mut usize = &mut ends[sample.slot as usize];
-        order[*place] = number;
-        *place += 1;
-    }
+/// stands behind them.
+fn by_slots(samples: &[Sample], slots: usize, stands: usize) -> Vec<u32> {
     let sample = |place: u32| &samples[place as usize];
-    for of_slot in order.chunk_by_mut(|&one, &other| sample(one).slot == sample(other).slot) {
-        of_slot.sort_by_key(|&place| sample(place).next);
+    let by_stands = counted(0..samples.len() as u32, stands, |place| sample(place).next);
+    counted(by_stands.iter().copied(), slots, |place| sample(place).slot)
+}
+
+/// Places in the order of their keys, of which there are so many; else in the order they have.
+/// Samples are many and keys are few, so keys are counted.
+fn counted(
+    places: impl ExactSizeIterator<Item = u32> + Clone,
+    keys: usize,
+    key: impl Fn(u32) -> u32,
+) -> Vec<u32> {
+    let mut ends = vec![0; keys + 1];
+    for place in places.clone() {
+        ends[key(place) as usize + 1] += 1;
+    }
+    for key in 0..keys {
+        ends[key + 1] += ends[key];
+    }
+    let mut order = vec![0; places.len()];
+    for place in places {
+        let next: &mut usize = &mut ends[key(place) as usize];
+        order[*next] = place;
+        *next += 1;
     }
     order
 }
