@@ -161,7 +161,8 @@ class Options:
     """How many iterations there are at most, in total."""
 
     reset_no_better: int | None = None
-    """After so many iterations without a better strategy, learning ends or begins anew."""
+    """After so many iterations without a better strategy, learning ends or begins anew; without a
+    number after 5, but not before the 10th one in all."""
 
     max_reset_learning: int | None = None
     """How often learning begins anew, with all forgotten but the best strategy."""

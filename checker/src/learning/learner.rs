@@ -202,8 +202,7 @@ impl Learner<'_> {
                 is_complete = false;
                 break;
             }
-            let is_finest = !self.options.becomes_finer(in_reset - 1);
-            if since_better >= self.options.patience && is_finest {
+            if self.options.has_enough(in_reset - 1, since_better) {
                 if resets >= self.options.resets {
                     break;
                 }

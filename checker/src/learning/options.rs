@@ -29,9 +29,9 @@ pub struct Learning {
     pub learning_runs: Option<u64>,
     /// How many runs judge the strategy of an iteration.
     pub judging_runs: Option<u64>,
-    /// So many iterations without a better strategy, and learning ends or begins anew, but not
-    /// while cuts become finer.
-    pub patience: u64,
+    /// So many iterations without a better strategy, and learning ends or begins anew. `None` is
+    /// [`PATIENCE`], but not while cuts become finer.
+    pub patience: Option<u64>,
     /// How often it begins anew.
     pub resets: u64,
     /// What a cost counts a decision earlier, as a part of itself; `None` is 1, but
@@ -71,6 +71,8 @@ const JUDGING_STEPS: f64 = 200_000.0;
 pub(super) const LONG: f64 = 100.0;
 /// The discount of long runs.
 pub(super) const LONG_DISCOUNT: f64 = 0.995;
+/// After so many iterations without a better strategy there is hardly one.
+const PATIENCE: u64 = 5;
 /// How much smaller the least difference is in each iteration.
 const FINER: f64 = 0.75;
 
@@ -88,7 +90,7 @@ impl Default for Learning {
             iterations: 30,
             learning_runs: None,
             judging_runs: None,
-            patience: 5,
+            patience: None,
             resets: 0,
             discount: None,
             alpha: 1000.0,
@@ -129,9 +131,14 @@ impl Learning {
         (start * FINER.powi(iteration as i32)).max(end)
     }
 
-    /// Whether cuts become finer behind this iteration.
-    pub(super) fn becomes_finer(&self, iteration: u64) -> bool {
-        self.difference(iteration) > self.difference.end
+    /// Whether it ends or begins anew after this iteration, if the strategies of so many were not
+    /// better.
+    pub(super) fn has_enough(&self, iteration: u64, worse: u64) -> bool {
+        let is_finest = self.difference(iteration) <= self.difference.end;
+        match self.patience {
+            Some(patience) => worse >= patience,
+            None => worse >= PATIENCE && is_finest,
+        }
     }
 
     /// How many runs this iteration learns from, if a run has so many decisions.

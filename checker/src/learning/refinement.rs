@@ -195,7 +195,9 @@ fn simplest_between(low: f64, high: f64) -> f64 {
         }
         step /= 2.0;
     }
-    f64::midpoint(low, high)
+    let middle = f64::midpoint(low, high);
+    // Between neighbours there is none, and a cut at the greater one would cut nothing off.
+    if middle < high { middle } else { low }
 }
 
 #[cfg(test)]
@@ -224,7 +226,11 @@ mod tests {
 
     #[test]
     fn a_cut_of_neighbours_lies_between_them() {
-        let (low, high) = (1.0, 1.0_f64.next_up());
-        assert!((low..high).contains(&simplest_between(low, high)));
+        let mut low = 1.0_f64;
+        for _ in 0..4 {
+            let high = low.next_up();
+            assert!((low..high).contains(&simplest_between(low, high)));
+            low = high;
+        }
     }
 }

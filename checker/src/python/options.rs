@@ -177,7 +177,7 @@ fn learning(given: &Bound<'_, PyAny>) -> PyResult<Learning> {
         learning_runs: field(given, "good_runs")?,
         judging_runs: field(given, "eval_runs")?,
         iterations: number("max_iterations", usual.iterations)?,
-        patience: number("reset_no_better", usual.patience)?,
+        patience: field(given, "reset_no_better")?,
         resets: number("max_reset_learning", usual.resets)?,
         discount: discount.or(usual.discount),
         alpha: alpha.unwrap_or(usual.alpha),

@@ -226,7 +226,7 @@ LEARNING_SETTINGS: Final = (
         "reset-no-better N",
         click.IntRange(min=1),
         "For minE and its kin: after N iterations without a better strategy, learning ends or "
-        "begins anew.  [default: 5]",
+        "begins anew.  [default: 5, but at least 10 in all]",
         "reset_no_better",
     ),
     Setting(
