@@ -197,7 +197,8 @@ STATISTICAL_SETTINGS: Final = (
         click.STRING,
         "For Pr and E: use the workers of the Dask scheduler at this address, as tcp://host:8786. "
         "They must have the same ntagen. Answers are the same as without them. Joint runs, those "
-        "with levels and those of simulate are made by this machine.",
+        "with levels, those of simulate, those to learn from and those under a learned strategy, "
+        "a shield or a policy are made by this machine.",
     ),
 )
 
