@@ -7,7 +7,8 @@ use rustc_hash::FxHashMap;
 
 use super::episode::Episode;
 use super::partition::{DRAW, Partition, WAIT};
-use super::process::{Process, Sample, Stand};
+use super::process::{Process, Stand};
+use super::sample::Sample;
 use super::tree;
 
 /// The stand after which nothing costs any more.

@@ -16,6 +16,7 @@ mod partition;
 mod policy;
 mod process;
 mod refinement;
+mod sample;
 mod slopes;
 mod strategy;
 mod sums;

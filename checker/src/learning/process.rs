@@ -11,24 +11,9 @@
 use std::borrow::Cow;
 
 use super::partition::{Cell, Known, WAIT};
+use super::sample::Sample;
 use super::slopes::Slopes;
 use super::sums::Sums;
-
-/// What a decision was.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Sample {
-    /// The action in its cell.
-    pub(super) slot: u32,
-    /// The stand behind it.
-    pub(super) next: u32,
-    pub(super) cost: f64,
-    /// Where its point begins, among those of all samples.
-    pub(super) point: u32,
-    /// When it was taken in its run.
-    pub(super) at: f64,
-    /// Whether the sample behind it is the next decision of the run.
-    pub(super) is_followed: bool,
-}
 
 /// The samples of a slot that lead to the same stand.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@
 //! tree); R. Fisher, "Statistical methods for research workers", section 49 (analysis of
 //! covariance).
 
-use super::process::Sample;
+use super::sample::Sample;
 
 /// In a cell of n samples a line is as steep as it would be if `CAUTION` more samples said nothing.
 const CAUTION: f64 = 10.0;
@@ -207,7 +207,7 @@ fn solve(factor: &[f64], sides: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::process::Sample;
+    use super::super::sample::Sample;
     use super::Slopes;
 
     /// Samples of one cell with two actions: the second one was taken where it costs more.
