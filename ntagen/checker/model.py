@@ -324,9 +324,7 @@ class Model:
             features, known = training["features"], training["actions"]
             wait = training["wait"] if wait is None else wait
         with rejecting():
-            actions = _checker.follow(
-                self._raw, name, features, follower, wait=wait, actions=known
-            )
+            actions = _checker.follow(self._raw, name, features, follower, wait=wait, actions=known)
         self._followers[name] = follower
         return tuple(actions)
 
