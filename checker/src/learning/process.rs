@@ -219,8 +219,8 @@ impl Process {
         sample.cost + discount * self.worths[sample.next as usize]
     }
 
-    /// By sample: what it costs, so that cells show where they differ: in the centre of its cell, or
-    /// else as long as the same is done in the same cell.
+    /// By sample: what it costs, so that cells show where they differ: in the centre of its cell,
+    /// or else as long as the same is done in the same cell.
     pub(super) fn telling_costs(&self, discount: f64) -> Cow<'_, [f64]> {
         if self.level_costs.is_empty() {
             Cow::Owned(self.costs_of_stays(discount))
@@ -397,7 +397,8 @@ impl Process {
     }
 }
 
-/// The mean of costs, and its standard error: as if one more were off by as much as all runs differ.
+/// The mean of costs, and its standard error: as if one more cost were off by as much as all runs
+/// differ.
 fn mean_and_error(costs: Sums, spread: f64) -> (f64, f64) {
     let variance = (costs.deviation() + spread * spread) / costs.count;
     (costs.mean(), (variance / costs.count).sqrt())
