@@ -52,8 +52,8 @@ impl Slopes {
         };
         // Who sees no numbers has no lines.
         if dimension > 0 {
-            slopes.centre(points, slots);
-            slopes.scatter(points);
+            let counts = slopes.centre(points, slots);
+            slopes.scatter(points, &counts);
         }
         slopes
     }
@@ -68,8 +68,9 @@ impl Slopes {
         places.map(|(&(slot, cell), point)| (slot as usize, cell as usize, point))
     }
 
-    /// Computes the middles of slots and the centres of cells.
-    fn centre(&mut self, points: &[f64], slots: &[(u32, u32)]) {
+    /// Computes the middles of slots and the centres of cells; returns how many samples each cell
+    /// has.
+    fn centre(&mut self, points: &[f64], slots: &[(u32, u32)]) -> Vec<f64> {
         let dimension = self.dimension;
         let mut middles = std::mem::take(&mut self.middles);
         let mut of_slots = vec![0.0; slots.len()];
@@ -95,17 +96,16 @@ impl Slopes {
             }
         }
         self.middles = middles;
+        of_cells
     }
 
-    /// Computes how points scatter.
-    fn scatter(&mut self, points: &[f64]) {
+    /// Computes how points scatter in cells of so many samples.
+    fn scatter(&mut self, points: &[f64], counts: &[f64]) {
         let dimension = self.dimension;
         let mut factors = std::mem::take(&mut self.factors);
-        let mut counts = vec![0.0; self.centres.len() / dimension];
         let mut off = vec![0.0; dimension];
         for (slot, cell, point) in self.all(points) {
-            counts[cell] += 1.0;
-            self.look(slot, point, &mut off);
+            self.off_middle(slot, point, &mut off);
             let factor = &mut factors[cell * dimension * dimension..];
             for row in 0..dimension {
                 for column in 0..=row {
@@ -130,7 +130,7 @@ impl Slopes {
     }
 
     /// How a point is off the middle of its slot.
-    fn look(&self, slot: usize, point: &[f64], off: &mut [f64]) {
+    fn off_middle(&self, slot: usize, point: &[f64], off: &mut [f64]) {
         let middle = &self.middles[slot * self.dimension..];
         for ((off, value), middle) in off.iter_mut().zip(point).zip(middle) {
             *off = value - middle;
@@ -156,7 +156,7 @@ impl Slopes {
         slopes.fill(0.0);
         let mut off = vec![0.0; dimension];
         for ((slot, cell, point), cost) in self.all(points).zip(costs) {
-            self.look(slot, point, &mut off);
+            self.off_middle(slot, point, &mut off);
             for (slope, off) in slopes[cell * dimension..].iter_mut().zip(&off) {
                 *slope += off * cost;
             }
