@@ -29,6 +29,8 @@ struct Memory {
     point: u32,
     moves: bool,
     is_last: bool,
+    /// Which half of the runs its run belongs to: 0 or 1.
+    half: u8,
     /// A node of the tree of the observation that its point lies below, not far from the leaf.
     node: u32,
 }
@@ -45,6 +47,8 @@ pub(super) struct Experience {
     set_numbers: FxHashMap<Box<[u32]>, u32>,
     /// The number that was asked for last, which is often asked for again.
     last_set: u32,
+    /// The half of the runs to which the next one belongs.
+    next_half: u8,
 }
 
 impl Experience {
@@ -79,6 +83,7 @@ impl Experience {
                 point: self.points.len() as u32,
                 moves: step.moves,
                 is_last: number + 1 == episode.steps.len(),
+                half: self.next_half,
                 node: 0,
             });
             self.points
@@ -87,6 +92,7 @@ impl Experience {
             choice += step.choices as usize;
             at += step.time;
         }
+        self.next_half = 1 - self.next_half;
     }
 
     /// The number of a set of possible actions.
@@ -147,12 +153,14 @@ impl Experience {
             sets: &self.sets,
             stand_parts: vec![(u32::MAX, u32::MAX)],
             is_followed: false,
+            half: 0,
         };
         let mut here = Vec::with_capacity(self.dimension);
         for (number, memory) in self.memories.iter().enumerate() {
             if memory.action == DRAW {
                 continue;
             }
+            builder.half = memory.half;
             here.clear();
             let numbers = &self.points[memory.point as usize..];
             here.extend_from_slice(&numbers[..self.dimension]);
@@ -185,6 +193,8 @@ struct Builder<'e> {
     stand_parts: Vec<(u32, u32)>,
     /// Whether the decision behind the one at hand has samples, too.
     is_followed: bool,
+    /// The half of the runs to which the one at hand belongs.
+    half: u8,
 }
 
 impl Builder<'_> {
@@ -204,6 +214,7 @@ impl Builder<'_> {
             point: self.points.len() as u32,
             at,
             is_followed: self.is_followed,
+            half: self.half,
         });
         self.points.extend_from_slice(point);
     }

@@ -4,9 +4,15 @@
 //! A *slot* is an action in a cell. A *stand* is a cell with the actions that are possible there;
 //! its worth is the value of the best of them.
 //!
+//! Of several actions the one that seems best is often the one that was lucky. If its luck counted
+//! as its value, waiting would always seem good: one of the cells ahead is lucky. So the runs are in
+//! two halves; each chooses by its own samples, and takes the value from those of the other.
+//!
+//! Source: H. van Hasselt, "Double Q-learning", NIPS 2010, for the halves.
+//!
 //! Invariants:
 //! * `order` sorts the samples by slots, and those of a slot by the stands behind them.
-//! * `worths` are those of the values and errors at hand, but while they are computed.
+//! * `worths` are those of the values at hand, but while they are computed.
 
 use std::borrow::Cow;
 
@@ -19,10 +25,33 @@ use super::sums::Sums;
 #[derive(Clone, Copy, Debug)]
 struct Way {
     next: u32,
-    count: f64,
-    /// The sum of their costs, and of the squares.
-    cost: f64,
-    squares: f64,
+    /// Their costs, by the half of the runs.
+    costs: [Sums; 2],
+}
+
+/// What the samples of a slot say of its value.
+#[derive(Clone, Copy, Debug, Default)]
+struct Estimate {
+    value: f64,
+    /// Its standard error.
+    error: f64,
+}
+
+impl Estimate {
+    /// The mean of costs: its error is as if one more cost were off by as much as all runs differ.
+    fn of(costs: Sums, spread: f64) -> Estimate {
+        let variance = (costs.deviation() + spread * spread) / costs.count;
+        Estimate {
+            value: costs.mean(),
+            error: (variance / costs.count).sqrt(),
+        }
+    }
+
+    /// What is known from few samples counts as worse by its error, or else luck would be taken for
+    /// skill.
+    fn cautious(self) -> f64 {
+        self.value + self.error
+    }
 }
 
 /// The finite process.
@@ -42,13 +71,14 @@ pub(super) struct Process {
     stands: Vec<Stand>,
     /// The cells with their slots and stands, those of late decisions first.
     groups: Vec<Group>,
-    values: Vec<f64>,
-    /// By slot: the standard error of its value.
-    errors: Vec<f64>,
+    /// By slot: by all samples, and by those of each half of the runs. A half without samples has
+    /// those of the other.
+    values: Vec<Estimate>,
+    halves: Vec<[Estimate; 2]>,
     /// By slot: how often its action was taken, if that is more than there are samples.
     visits: Vec<f64>,
-    /// By stand.
-    worths: Vec<f64>,
+    /// By stand: for each half of the runs.
+    worths: Vec<[f64; 2]>,
     /// By sample: what it costs in the centre of its cell; empty if slopes were not looked at.
     level_costs: Vec<f64>,
 }
@@ -108,13 +138,12 @@ impl Process {
                 first_samples.push(place as u32);
                 first_ways.push(ways.len() as u32);
             }
-            let costs = of_way.iter().map(|&one| samples[one as usize].cost);
-            ways.push(Way {
-                next,
-                count: of_way.len() as f64,
-                cost: costs.clone().sum(),
-                squares: costs.map(|cost| cost * cost).sum(),
-            });
+            let mut costs = [Sums::default(); 2];
+            for &one in of_way {
+                let sample = &samples[one as usize];
+                costs[sample.half as usize].add(sample.cost);
+            }
+            ways.push(Way { next, costs });
         }
         first_samples.push(samples.len() as u32);
         first_ways.push(ways.len() as u32);
@@ -126,10 +155,10 @@ impl Process {
             ways,
             first_ways,
             groups: Vec::new(),
-            values: vec![0.0; slots.len()],
-            errors: vec![0.0; slots.len()],
+            values: vec![Estimate::default(); slots.len()],
+            halves: vec![[Estimate::default(); 2]; slots.len()],
             visits: Vec::new(),
-            worths: vec![0.0; stands.len()],
+            worths: vec![[0.0; 2]; stands.len()],
             level_costs: Vec::new(),
             slots,
             stands,
@@ -192,16 +221,31 @@ impl Process {
         self.slots[slot as usize].0
     }
 
+    /// Sets the value of a slot, whichever half of the runs asks.
+    fn set(&mut self, slot: usize, estimate: Estimate) {
+        self.values[slot] = estimate;
+        self.halves[slot] = [estimate; 2];
+    }
+
     /// Computes the worth of a stand: the value of the best action there; 0 where nothing is known.
-    /// What is known from few samples counts as worse by its error when the best is chosen, or else
-    /// luck would be taken for skill. The error is not handed on: in a run of many decisions it
-    /// would add up, and make short runs look better than long ones.
+    /// The error of a value is not handed on: in a run of many decisions it would add up, and make
+    /// short runs look better than long ones.
     fn appraise(&mut self, stand: u32) {
-        let (values, errors) = (&self.values, &self.errors);
-        let cautious = |slot: u32| values[slot as usize] + errors[slot as usize];
-        let slots = self.stands[stand as usize].slots.iter().copied();
-        let best = slots.min_by(|&one, &other| cautious(one).total_cmp(&cautious(other)));
-        self.worths[stand as usize] = best.map_or(0.0, |slot| values[slot as usize]);
+        let halves = &self.halves;
+        let slots = self.stands[stand as usize].slots.iter();
+        for half in 0..2 {
+            let cautious = |slot: &u32| halves[*slot as usize][half].cautious();
+            let best = slots
+                .clone()
+                .min_by(|one, other| cautious(one).total_cmp(&cautious(other)));
+            let worth = best.map_or(0.0, |&slot| halves[slot as usize][1 - half].value);
+            self.worths[stand as usize][half] = worth;
+        }
+    }
+
+    /// What a stand is worth to a half of the runs.
+    fn worth(&self, stand: u32, half: u8) -> f64 {
+        self.worths[stand as usize][half as usize]
     }
 
     /// To wait puts nothing off, so it is not discounted.
@@ -216,7 +260,7 @@ impl Process {
     /// What a sample costs from there on.
     pub(super) fn cost(&self, sample: &Sample, discount: f64) -> f64 {
         let discount = self.discount(sample.slot, discount);
-        sample.cost + discount * self.worths[sample.next as usize]
+        sample.cost + discount * self.worth(sample.next, sample.half)
     }
 
     /// By sample: what it costs, so that cells show where they differ: in the centre of its cell,
@@ -259,7 +303,7 @@ impl Process {
         for _ in 0..SWEEPS_OF_TRACES {
             let mut behind = 0.0;
             for (place, sample) in self.samples.iter().enumerate().rev() {
-                let mut next = self.worths[sample.next as usize];
+                let mut next = self.worth(sample.next, sample.half);
                 if sample.is_followed {
                     let point = self.samples[place + 1].point as usize;
                     let cell = self.stands[sample.next as usize].cell;
@@ -276,8 +320,8 @@ impl Process {
                 *cost -= slopes.rise(self.cell(sample.slot), point);
                 sums[sample.slot as usize].add(*cost);
             }
-            for (slot, sums) in sums.iter().enumerate() {
-                (self.values[slot], self.errors[slot]) = mean_and_error(*sums, spread);
+            for (slot, &sums) in sums.iter().enumerate() {
+                self.set(slot, Estimate::of(sums, spread));
             }
             for stand in 0..self.stands.len() as u32 {
                 self.appraise(stand);
@@ -295,11 +339,11 @@ impl Process {
             let (mut change, mut greatest) = (0.0_f64, 0.0_f64);
             for group in &groups {
                 for &slot in &group.slots {
-                    let (value, error) = self.mean(slot, discount, spread);
-                    self.errors[slot as usize] = error;
-                    change = change.max((value - self.values[slot as usize]).abs());
+                    let before = self.values[slot as usize].value;
+                    self.average(slot, discount, spread);
+                    let value = self.values[slot as usize].value;
+                    change = change.max((value - before).abs());
                     greatest = greatest.max(value.abs());
-                    self.values[slot as usize] = value;
                 }
                 for &stand in &group.stands {
                     self.appraise(stand);
@@ -312,18 +356,27 @@ impl Process {
         self.groups = groups;
     }
 
-    /// The mean of what the samples of a slot cost, and its standard error.
-    fn mean(&self, slot: u32, discount: f64, spread: f64) -> (f64, f64) {
+    /// Computes the value of a slot: the mean of what its samples cost.
+    fn average(&mut self, slot: u32, discount: f64, spread: f64) {
         let discount = self.discount(slot, discount);
-        let ways = self.first_ways[slot as usize]..self.first_ways[slot as usize + 1];
-        let mut sums = Sums::default();
+        let slot = slot as usize;
+        let ways = self.first_ways[slot]..self.first_ways[slot + 1];
+        let mut sums = [Sums::default(); 2];
         for way in &self.ways[ways.start as usize..ways.end as usize] {
-            let worth = discount * self.worths[way.next as usize];
-            sums.count += way.count;
-            sums.sum += way.cost + way.count * worth;
-            sums.squares += way.squares + worth * (2.0 * way.cost + way.count * worth);
+            for (half, sums) in sums.iter_mut().enumerate() {
+                let worth = discount * self.worths[way.next as usize][half];
+                *sums = sums.with(way.costs[half].raised(worth));
+            }
         }
-        mean_and_error(sums, spread)
+        let all = Estimate::of(sums[0].with(sums[1]), spread);
+        self.values[slot] = all;
+        self.halves[slot] = sums.map(|half| {
+            if half.count > 0.0 {
+                Estimate::of(half, spread)
+            } else {
+                all
+            }
+        });
     }
 
     /// Moves the values of actions towards what each sample costs, the latest sample first. The
@@ -353,8 +406,12 @@ impl Process {
             } else {
                 1.0
             };
-            self.values[slot] += rate * (cost - self.values[slot]);
-            self.errors[slot] = spread / visits;
+            let value = self.values[slot].value;
+            let estimate = Estimate {
+                value: value + rate * (cost - value),
+                error: spread / visits,
+            };
+            self.set(slot, estimate);
             for &stand in &stands_of[slot] {
                 self.appraise(stand);
             }
@@ -374,8 +431,8 @@ impl Process {
             known.push(Known {
                 action,
                 visits: self.visits.get(slot as usize).copied().unwrap_or(count),
-                value: self.values[slot as usize],
-                error: self.errors[slot as usize],
+                value: self.values[slot as usize].value,
+                error: self.values[slot as usize].error,
             });
         }
         for cell in cells {
@@ -385,23 +442,16 @@ impl Process {
 
     /// Begins with the values that actions had in the cells.
     pub(super) fn begin_with(&mut self, cells: &[Cell]) {
-        for (slot, &(cell, action)) in self.slots.iter().enumerate() {
-            if let Some(known) = cells[cell as usize].of(action) {
-                self.values[slot] = known.value;
-                self.errors[slot] = known.error;
+        for slot in 0..self.slots.len() {
+            let (cell, action) = self.slots[slot];
+            if let Some(&Known { value, error, .. }) = cells[cell as usize].of(action) {
+                self.set(slot, Estimate { value, error });
             }
         }
         for stand in 0..self.stands.len() as u32 {
             self.appraise(stand);
         }
     }
-}
-
-/// The mean of costs, and its standard error: as if one more cost were off by as much as all runs
-/// differ.
-fn mean_and_error(costs: Sums, spread: f64) -> (f64, f64) {
-    let variance = (costs.deviation() + spread * spread) / costs.count;
-    (costs.mean(), (variance / costs.count).sqrt())
 }
 
 /// The places of samples in the order of their slots, and those of a slot in the order of the
@@ -433,4 +483,45 @@ fn counted(
         *next += 1;
     }
     order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Process, Sample, Stand};
+
+    /// A decision that leads to a choice of two actions.
+    const BEFORE: (u32, u32) = (0, 0);
+    const LUCKY: (u32, u32) = (1, 0);
+    const STEADY: (u32, u32) = (1, 1);
+
+    #[test]
+    fn luck_in_one_half_of_the_runs_counts_for_nothing() {
+        let sample = |slot, next, cost, half| Sample {
+            slot,
+            next,
+            cost,
+            point: 0,
+            at: f64::from(2 - next),
+            is_followed: false,
+            half,
+        };
+        let mut samples = Vec::new();
+        for _ in 0..100 {
+            for (half, luck) in [(0, -10.0), (1, 10.0)] {
+                samples.push(sample(0, 1, 0.0, half));
+                samples.push(sample(1, 0, luck, half));
+                samples.push(sample(2, 0, 0.0, half));
+            }
+        }
+        let stands = [(u32::MAX, &[][..]), (1, &[1, 2][..])].map(|(cell, slots)| Stand {
+            cell,
+            slots: slots.into(),
+        });
+        let slots = vec![BEFORE, LUCKY, STEADY];
+        let mut process = Process::new(samples, Vec::new(), slots, stands.into());
+        process.iterate(1.0, 1.0);
+        // The first half chooses the lucky one, which the other half has seen to cost 10.
+        let values = process.values.iter().map(|one| one.value.round() as i32);
+        assert_eq!(values.collect::<Vec<_>>(), [5, 0, 0]);
+    }
 }

@@ -14,4 +14,6 @@ pub(super) struct Sample {
     pub(super) at: f64,
     /// Whether the sample behind it is the next decision of the run.
     pub(super) is_followed: bool,
+    /// Which half of the runs its run belongs to: 0 or 1.
+    pub(super) half: u8,
 }

@@ -220,6 +220,7 @@ mod tests {
             point: (place * dimension) as u32,
             at: 0.0,
             is_followed: false,
+            half: (place % 2) as u8,
         });
         let samples: Vec<Sample> = samples.collect();
         let mut slopes = Slopes::new(&samples, points, &[(0, 0), (0, 1)]);

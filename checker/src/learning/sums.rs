@@ -15,6 +15,24 @@ impl Sums {
         self.squares += cost * cost;
     }
 
+    /// Those of the costs of both.
+    pub(super) fn with(self, other: Sums) -> Sums {
+        Sums {
+            count: self.count + other.count,
+            sum: self.sum + other.sum,
+            squares: self.squares + other.squares,
+        }
+    }
+
+    /// Those of the costs, if each of them is so much greater.
+    pub(super) fn raised(self, by: f64) -> Sums {
+        Sums {
+            sum: self.sum + self.count * by,
+            squares: self.squares + by * (2.0 * self.sum + self.count * by),
+            ..self
+        }
+    }
+
     /// Those of the costs that the others do not have.
     pub(super) fn without(self, other: Sums) -> Sums {
         Sums {
