@@ -5,8 +5,8 @@
 //! its worth is the value of the best of them.
 //!
 //! Of several actions the one that seems best is often the one that was lucky. If its luck counted
-//! as its value, waiting would always seem good: one of the cells ahead is lucky. So the runs are in
-//! two halves; each chooses by its own samples, and takes the value from those of the other.
+//! as its value, waiting would always seem good: one of the cells ahead is lucky. So the runs are
+//! in two halves; each chooses by its own samples, and takes the value from those of the other.
 //!
 //! Source: H. van Hasselt, "Double Q-learning", NIPS 2010, for the halves.
 //!
