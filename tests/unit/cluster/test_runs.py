@@ -143,7 +143,8 @@ def test_runs_under_a_learned_strategy_are_made_here(
     path = tmp_path / "game.xta"
     path.write_text(GAME, "utf-8")
     learned = "strategy Least = minE(n)[<=3]{}->{t}: <> t >= 3"
-    words = ["check", str(path), "--json", "--seed", "1"]
+    few = ["--set", "good-runs 200", "--set", "max-iterations 3"]
+    words = ["check", str(path), "--json", "--seed", "1", *few]
     for query in [learned, "E[<=3; 500](max: n) under Least", "E[<=3; 500](max: n)"]:
         words += ["--query", query]
     assert main(words) == 0
@@ -153,7 +154,7 @@ def test_runs_under_a_learned_strategy_are_made_here(
     assert lines(said.out) == here
     assert said.err.count("by this machine: Least is no strategy of a game") == 1
     model = checker.load(GAME)
-    model.check(learned, seed=1)
+    model.check(learned, seed=1, good_runs=200, max_iterations=3)
     with (
         DaskRuns(cluster.scheduler_address) as runs,
         pytest.raises(InputError, match="Least is no strategy of a game"),
