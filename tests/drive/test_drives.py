@@ -21,7 +21,7 @@ from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN, PAPER, scene, sphere
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-RUNS = 15
+RUNS = 8
 """So many seeds has a slow test; `tests/benchmarks/drives.py` drives hundreds."""
 
 

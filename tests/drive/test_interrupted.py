@@ -31,7 +31,7 @@ from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN
 
 ROOT = Path(__file__).parents[2]
-TRIES = int(os.environ.get("NTAGEN_INTERRUPTIONS", "8"))
+TRIES = int(os.environ.get("NTAGEN_INTERRUPTIONS", "5"))
 
 
 def slow(share: float) -> object:
