@@ -223,8 +223,8 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
             return Ok(false);
         };
         self.is_busy = true;
-        let passed = &self.shard.tree.passed;
-        let load = |words: &mut [i32], zone: &mut [Bound]| passed.load(stored, words, zone);
+        let passed = &mut self.shard.tree.passed;
+        let load = |words: &mut [i32], zone: &mut [Bound]| passed.visit(stored, words, zone);
         self.explorer.begin(self.symbolic, load)?;
         Ok(true)
     }

@@ -217,8 +217,8 @@ impl<'s, 'a> Search<'s, 'a> {
     /// the limits.
     fn visit(&mut self, stored: Stored, moves: &mut u64) -> Result<Visit, Failure> {
         let counters = self.own_counters();
-        let passed = &self.store.tree.passed;
-        let load = |words: &mut [i32], zone: &mut [Bound]| passed.load(stored, words, zone);
+        let passed = &mut self.store.tree.passed;
+        let load = |words: &mut [i32], zone: &mut [Bound]| passed.visit(stored, words, zone);
         self.explorer.begin(self.symbolic, load)?;
         loop {
             let mut scene = Scene {

@@ -19,7 +19,6 @@ use crate::search::store::passed_list::{PassedList, Stored};
 /// A state that is sent.
 #[derive(Clone, Copy, Debug)]
 struct Head {
-    hash: u32,
     /// The node from which it was reached, in the shard that sends it.
     origin: u32,
     /// The number of moves from there, with [`IS_CHOICE`].
@@ -152,7 +151,7 @@ impl Shard {
                 node: head.origin,
             };
             self.tree.passed.propose_record(record);
-            let stored = self.tree.add_proposed(head.hash, zone, origin, way);
+            let stored = self.tree.add_proposed(zone, origin, way);
             let queue = if head.steps & IS_CHOICE == 0 {
                 &mut self.next
             } else {
@@ -183,11 +182,10 @@ impl Shard {
         let hash = self.tree.passed.propose(words);
         let owner = owner(hash, self.outgoing.len());
         if owner == self.index {
-            return self.tree.add_proposed(hash, zone, self.current, way);
+            return self.tree.add_proposed(zone, self.current, way);
         }
         let mail = &mut self.outgoing[owner];
         mail.heads.push(Head {
-            hash,
             origin: self.current.node,
             steps: way.len() as u32 | if is_choice { IS_CHOICE } else { 0 },
         });

@@ -90,15 +90,14 @@ impl Tree {
         Some(stored)
     }
 
-    /// Like [`Tree::add`], for the words that were proposed last, which have this hash.
+    /// Like [`Tree::add`], for the words that were proposed last.
     pub(super) fn add_proposed(
         &mut self,
-        hash: u32,
         zone: Kept<'_>,
         origin: Origin,
         path: &[Step],
     ) -> Option<Stored> {
-        let stored = self.passed.add_proposed(hash, zone)?;
+        let stored = self.passed.add_proposed(zone)?;
         self.add_node(origin, path);
         Some(stored)
     }

@@ -8,27 +8,18 @@
 //! * Ids count from 0 in the order of first insertion.
 //!
 //! A word takes one, two or four bytes, as the range of its variable or the number of locations
-//! needs. An assignment checks that a value lies in its range; packing checks it again.
-//!
-//! Cost: a state takes its written words; records lie in blocks that are never moved. A look-up
-//! hashes the bytes once and compares them once, on a match of 32 bits of the hash.
+//! needs. An assignment checks that a value lies in its range; packing checks it again. The bytes
+//! of the identity are kept as a row of numbers, that is, as a tree of pairs ([`super::rows`]):
+//! what states have in common is stored once.
 
 use crate::ir::{Network, Shape};
 
 use super::records::Records;
-use super::segmented_table::PiecedTable;
+use super::rows::Rows;
 
 /// The index of a stored discrete state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DiscreteId(pub u32);
-
-/// An entry of the table: the state and a part of its hash. When the table grows, it is rebuilt
-/// from these parts.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    id: u32,
-    hash: u32,
-}
 
 /// What a word is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,12 +137,16 @@ fn widen<const N: usize>(bytes: &[u8], words: &mut [i32], from: impl Fn([u8; N])
 pub struct StateStore {
     /// The words that are stored; those of the identity first.
     runs: Vec<Run>,
-    /// The bytes of a record that decide identity.
+    /// How many runs belong to the identity.
+    identity_runs: usize,
+    /// The bytes of a record that decide identity: whole numbers of the row, at least two.
     identity: usize,
     /// What the words are that are not stored.
     initial: Vec<i32>,
-    records: Records,
-    table: PiecedTable<Entry>,
+    rows: Rows,
+    /// By state: the bytes of its `meta` words.
+    meta: Records,
+    /// The record of the state that was packed last, or loaded.
     scratch: Vec<u8>,
 }
 
@@ -162,22 +157,26 @@ impl StateStore {
         let widths = widths(network);
         let identity_words = network.layout.identity_words as usize;
         let mut runs = runs_of(&written, &widths, 0, identity_words);
-        let identity = runs.iter().map(Run::bytes).sum();
+        let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
+        let numbers = bytes(&runs).div_ceil(size_of::<u32>()).max(2);
+        let identity = numbers * size_of::<u32>();
+        let identity_runs = runs.len();
         runs.extend(runs_of(&written, &widths, identity_words, written.len()));
-        let stride = runs.iter().map(Run::bytes).sum::<usize>().max(1);
+        let meta = bytes(&runs[identity_runs..]);
         StateStore {
             runs,
+            identity_runs,
             identity,
             initial: network.initial.clone(),
-            records: Records::new(stride),
-            table: PiecedTable::new(),
-            scratch: vec![0; stride],
+            rows: Rows::new(numbers),
+            meta: Records::new(meta),
+            scratch: vec![0; identity + meta],
         }
     }
 
     /// The bytes that the store takes.
     pub fn bytes(&self) -> usize {
-        self.records.bytes() + self.table.bytes()
+        self.rows.bytes() + self.meta.bytes()
     }
 
     /// The bytes of the state that decide identity, valid until the next call.
@@ -185,15 +184,17 @@ impl StateStore {
     /// # Panics
     /// If a word lies outside the range of its variable.
     pub fn pack(&mut self, words: &[i32]) -> &[u8] {
-        let fits = pack(&self.runs, words, &mut self.scratch);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        let fits = self.write(words, &mut scratch);
         assert!(fits, "every word lies in the range of its variable");
+        self.scratch = scratch;
         &self.scratch[..self.identity]
     }
 
     /// The id of a state, and whether it is new.
     pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
-        let hash = self.propose(words);
-        self.intern_proposed(hash)
+        self.pack(words);
+        self.intern_proposed()
     }
 
     /// Packs a state, for [`StateStore::intern_proposed`] or for another store of the same network;
@@ -212,35 +213,24 @@ impl StateStore {
         self.scratch.copy_from_slice(record);
     }
 
-    /// The id of the state that was packed or taken over last, which has this hash, and whether it
-    /// is new.
-    pub(super) fn intern_proposed(&mut self, hash: u32) -> (DiscreteId, bool) {
-        if let Some(known) = self.known(&self.scratch[..self.identity], hash) {
-            return (known, false);
+    /// The id of the state that was packed or taken over last, and whether it is new.
+    pub(super) fn intern_proposed(&mut self) -> (DiscreteId, bool) {
+        let (identity, meta) = self.scratch.split_at(self.identity);
+        let (id, is_new) = self.rows.intern(row_of(identity));
+        if is_new && !meta.is_empty() {
+            self.meta.push(meta);
         }
-        let id = self.records.push(&self.scratch);
-        self.table
-            .insert_unique(spread(hash), Entry { id, hash }, |entry| spread(entry.hash));
-        (DiscreteId(id), true)
-    }
-
-    #[inline]
-    fn known(&self, key: &[u8], hash: u32) -> Option<DiscreteId> {
-        let is_same = |entry: &Entry| {
-            entry.hash == hash && &self.records.get(entry.id)[..self.identity] == key
-        };
-        let entry = self.table.find(spread(hash), is_same);
-        entry.map(|entry| DiscreteId(entry.id))
+        (DiscreteId(id), is_new)
     }
 
     /// The id of a stored state.
     pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
-        let mut packed = vec![0; self.scratch.len()];
-        if !pack(&self.runs, words, &mut packed) {
+        let mut record = vec![0; self.scratch.len()];
+        if !self.write(words, &mut record) {
             return None;
         }
-        let key = &packed[..self.identity];
-        self.known(key, hash_bytes(key))
+        let found = self.rows.find(row_of(&record[..self.identity]));
+        found.map(DiscreteId)
     }
 
     /// The words of a state.
@@ -252,12 +242,55 @@ impl StateStore {
 
     /// Writes the stored words of a state over those of another state of the same network.
     pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
-        let mut record = self.records.get(id.0);
-        for run in &self.runs {
-            let (bytes, rest) = record.split_at(run.bytes());
-            run.unpack(bytes, words);
-            record = rest;
+        let mut bytes = vec![0; self.identity];
+        set_row(&mut bytes, &self.rows.get(id.0));
+        self.read(id, &bytes, words);
+    }
+
+    /// The same, but the next states that are stored are likely to differ from this one in few
+    /// words: they are compared with it.
+    pub fn visit(&mut self, id: DiscreteId, words: &mut [i32]) {
+        set_row(&mut self.scratch[..self.identity], self.rows.visit(id.0));
+        self.read(id, &self.scratch[..self.identity], words);
+    }
+
+    /// Writes a record, all of which is 0 or a record; returns whether all words fit.
+    fn write(&self, words: &[i32], record: &mut [u8]) -> bool {
+        let (identity, meta) = record.split_at_mut(self.identity);
+        let (of_identity, of_meta) = self.runs.split_at(self.identity_runs);
+        pack(of_identity, words, identity) & pack(of_meta, words, meta)
+    }
+
+    /// Writes the words of a state, whose identity has these bytes.
+    fn read(&self, id: DiscreteId, identity: &[u8], words: &mut [i32]) {
+        let (of_identity, of_meta) = self.runs.split_at(self.identity_runs);
+        unpack(of_identity, identity, words);
+        if !of_meta.is_empty() {
+            unpack(of_meta, self.meta.get(id.0), words);
         }
+    }
+}
+
+/// The numbers of a row, from its bytes.
+fn row_of(bytes: &[u8]) -> impl Iterator<Item = u32> {
+    let numbers = bytes.as_chunks::<{ size_of::<u32>() }>().0.iter();
+    numbers.map(|bytes| u32::from_le_bytes(*bytes))
+}
+
+/// Writes the numbers of a row as bytes.
+fn set_row(bytes: &mut [u8], row: &[u32]) {
+    let numbers = bytes.as_chunks_mut::<{ size_of::<u32>() }>().0;
+    for (bytes, number) in numbers.iter_mut().zip(row) {
+        *bytes = number.to_le_bytes();
+    }
+}
+
+/// Writes the words of all runs from their bytes.
+fn unpack(runs: &[Run], mut bytes: &[u8], words: &mut [i32]) {
+    for run in runs {
+        let (own, rest) = bytes.split_at(run.bytes());
+        run.unpack(own, words);
+        bytes = rest;
     }
 }
 
@@ -415,7 +448,7 @@ mod tests {
                 first: 0,
                 set: None,
             }));
-            assert_eq!(store.scratch.len(), 3 * bytes);
+            assert_eq!(store.scratch.len(), (3 * bytes).next_multiple_of(4).max(8));
             for state in [[low, high, 0], [high, high, low]] {
                 let (id, is_new) = store.intern(&state);
                 assert!(is_new && store.intern(&state) == (id, false));

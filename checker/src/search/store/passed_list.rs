@@ -81,9 +81,14 @@ impl PassedList {
     }
 
     /// Writes a stored state that is not covered, its zone as it is stored, over another state of
-    /// the same network.
-    pub(in crate::search) fn load(&self, stored: Stored, words: &mut [i32], zone: &mut [Bound]) {
-        self.store.load(stored.discrete, words);
+    /// the same network. The next states that are added are likely to be its successors.
+    pub(in crate::search) fn visit(
+        &mut self,
+        stored: Stored,
+        words: &mut [i32],
+        zone: &mut [Bound],
+    ) {
+        self.store.visit(stored.discrete, words);
         if self.has_clocks {
             self.zones.load(stored.zone, zone);
         }
@@ -96,8 +101,8 @@ impl PassedList {
 
     /// Stores a state, unless a stored one contains it.
     pub(in crate::search) fn add(&mut self, words: &[i32], zone: Kept<'_>) -> Option<Stored> {
-        let hash = self.store.propose(words);
-        self.add_proposed(hash, zone)
+        self.store.pack(words);
+        self.add_proposed(zone)
     }
 
     /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another
@@ -116,9 +121,9 @@ impl PassedList {
         self.store.propose_record(record);
     }
 
-    /// As [`PassedList::add`], for the words that were proposed last, which have this hash.
-    pub(in crate::search) fn add_proposed(&mut self, hash: u32, zone: Kept<'_>) -> Option<Stored> {
-        let (discrete, is_new) = self.store.intern_proposed(hash);
+    /// As [`PassedList::add`], for the words that were proposed last.
+    pub(in crate::search) fn add_proposed(&mut self, zone: Kept<'_>) -> Option<Stored> {
+        let (discrete, is_new) = self.store.intern_proposed();
         if !self.has_clocks {
             return is_new.then(|| self.stored(discrete, ZoneId(0)));
         }

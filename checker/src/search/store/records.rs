@@ -19,7 +19,7 @@ impl Records {
     pub(super) fn new(size: usize) -> Records {
         Records {
             size,
-            block_bits: (BLOCK_BYTES / size).max(1).ilog2(),
+            block_bits: (BLOCK_BYTES / size.max(1)).max(1).ilog2(),
             blocks: Vec::new(),
             count: 0,
         }
