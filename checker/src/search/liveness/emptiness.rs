@@ -25,13 +25,14 @@
 
 use crate::cancellation;
 use crate::ir::Predicate;
-use crate::network::{Failure, Moves, Part, Symbolic};
+use crate::network::{Failure, Moves, Symbolic};
 use crate::zones::Zone;
 use crate::zones::dbm;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::delay_inside::{Entry, Inside};
 use super::ending::RunEnding;
+use super::stack::{Frame, Stack};
 use crate::search::limits::{Counters, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
@@ -61,20 +62,6 @@ struct Node {
     depth: u32,
 }
 
-/// A node on the stack.
-struct Frame {
-    node: u32,
-    words: Vec<i32>,
-    zone: Zone,
-    moves: Moves,
-    next_move: usize,
-    /// The target of the current move, and its nodes that are still to be visited.
-    target: Vec<i32>,
-    pending: Vec<Zone>,
-    /// The current move.
-    parts: Vec<Part>,
-}
-
 /// Searches for runs inside `keep`. Several searches share what is known about nodes that start no
 /// run.
 pub struct Liveness<'p> {
@@ -84,7 +71,9 @@ pub struct Liveness<'p> {
     nodes: Vec<Node>,
     /// For each discrete state: its first node.
     heads: Vec<u32>,
-    frames: Vec<Frame>,
+    stack: Stack,
+    /// The words of the state that is entered.
+    words: Vec<i32>,
     explored: u64,
     next_look: u64,
     is_coarse: bool,
@@ -99,7 +88,8 @@ impl<'p> Liveness<'p> {
             zones: ZoneTable::new(symbolic.dimension()),
             nodes: Vec::new(),
             heads: Vec::new(),
-            frames: Vec::new(),
+            stack: Stack::default(),
+            words: Vec::new(),
             explored: 0,
             next_look: states_between_checks(LOOK_EVERY, symbolic.dimension()),
             is_coarse: false,
@@ -114,16 +104,11 @@ impl<'p> Liveness<'p> {
     /// What was done until now.
     pub fn counters(&self) -> Counters {
         let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
-        let words = self
-            .frames
-            .first()
-            .map_or(0, |frame| 2 * frame.words.len() * 4);
-        let frames = self.frames.len() * (size_of::<Frame>() + words);
         Counters {
             explored: self.explored,
             stored: self.nodes.len() as u64,
-            waiting: self.frames.len() as u64,
-            bytes: (self.store.bytes() + self.zones.bytes() + nodes + frames) as u64,
+            waiting: self.stack.len() as u64,
+            bytes: (self.store.bytes() + self.zones.bytes() + nodes + self.stack.bytes()) as u64,
         }
     }
 
@@ -151,8 +136,8 @@ impl<'p> Liveness<'p> {
     ) -> Result<Outcome<EndlessRun>, (Failure, Trace)> {
         let mut words = words.to_vec();
         let outcome = self.run(symbolic, &mut words, entry, before, watch);
-        let outcome = outcome.map_err(|failure| (failure, self.stack_trace()));
-        self.frames.clear();
+        let outcome = outcome.map_err(|failure| (failure, self.stack_trace(symbolic)));
+        self.stack.clear();
         outcome
     }
 
@@ -180,10 +165,10 @@ impl<'p> Liveness<'p> {
             if self.is_left(discrete, &zone) {
                 continue;
             }
-            self.push(symbolic, words, zone)?;
-            while !self.frames.is_empty() {
+            self.push(symbolic, discrete, words, zone)?;
+            while self.stack.len() > 0 {
                 if let Some(ending) = self.step(symbolic)? {
-                    return Ok(Outcome::Found(self.found(ending)));
+                    return Ok(Outcome::Found(self.found(symbolic, ending)));
                 }
                 if self.explored >= self.next_look {
                     let dimension = symbolic.dimension();
@@ -199,57 +184,43 @@ impl<'p> Liveness<'p> {
 
     /// Moves one node down, to the next move, or one node up.
     fn step(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
-        let Some(frame) = self.frames.last_mut() else {
-            return Ok(None);
+        let Some(frame) = self.stack.top() else {
+            return self.come_back(symbolic);
         };
         if let Some(zone) = frame.pending.pop() {
-            let words = frame.target.clone();
-            return self.visit(symbolic, &words, zone);
+            return self.visit(symbolic, zone);
         }
         if frame.next_move < frame.moves.len() {
-            return self.take_next(symbolic);
+            return take_next(symbolic, self.keep, frame, &mut self.is_coarse);
         }
         let node = frame.node;
-        self.frames.pop();
+        self.stack.pop();
         self.leave(node);
         Ok(None)
     }
 
-    /// Takes the next move of the node on top: fills its pending nodes.
-    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
-        let mut frame = self.frames.pop().expect("there is a node on top");
-        let result = self.take(symbolic, &mut frame);
-        self.frames.push(frame);
-        result
-    }
-
-    fn take(
-        &mut self,
-        symbolic: &mut Symbolic<'_>,
-        frame: &mut Frame,
-    ) -> Result<Option<RunEnding>, Failure> {
-        let one = frame.moves.get(frame.next_move);
-        frame.next_move += 1;
-        frame.parts.clear();
-        frame.parts.extend_from_slice(one.parts);
-        let (words, zone) = (&frame.words, frame.zone.bounds());
-        let Some(effect) = symbolic.fire_within(one, words, zone, &mut frame.target)? else {
+    /// Holds the top of the stack again.
+    fn come_back(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
+        let Some(below) = self.stack.pop_below() else {
             return Ok(None);
         };
-        let mut entries = Vec::new();
-        effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
-        for entry in &entries {
-            let entry = Entry::at(entry);
-            let target = &mut frame.target;
-            let inside = Inside::of(symbolic, self.keep, target, entry, &effect.invariant)?;
-            self.is_coarse |= inside.is_coarse;
-            frame.pending.extend(inside.zones);
-            if inside.ending.is_some() {
-                return Ok(inside.ending);
-            }
+        let (words, zone) = self.state(symbolic, below.node);
+        self.stack.push(symbolic, below.node, &words, zone)?;
+        let frame = self.stack.top().expect("a state was pushed");
+        frame.next_move = below.next_move as usize;
+        if below.pending > 0 {
+            frame.next_move -= 1;
+            take_next(symbolic, self.keep, frame, &mut self.is_coarse)?;
+            frame.pending.truncate(below.pending as usize);
         }
-        symbolic.extrapolate_all(&frame.target, &mut frame.pending);
         Ok(None)
+    }
+
+    /// The state of a node.
+    fn state(&self, symbolic: &Symbolic<'_>, node: u32) -> (Vec<i32>, Zone) {
+        let Node { discrete, zone, .. } = self.nodes[node as usize];
+        let zone = Zone::from_bounds(symbolic.dimension(), self.zones.get(zone));
+        (self.store.words(discrete), zone)
     }
 
     /// The number of words; those that are new begin an empty list.
@@ -261,8 +232,22 @@ impl<'p> Liveness<'p> {
         discrete
     }
 
-    /// Moves to a node, unless it is known to start no run; checks whether it closes a loop.
+    /// Moves to the target of the current move with this zone, unless it is known to start no run;
+    /// checks whether it closes a loop.
     fn visit(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        zone: Zone,
+    ) -> Result<Option<RunEnding>, Failure> {
+        let top = self.stack.top().expect("the move was taken from a node");
+        let mut words = std::mem::take(&mut self.words);
+        words.clone_from(&top.target);
+        let ending = self.enter(symbolic, &words, zone);
+        self.words = words;
+        ending
+    }
+
+    fn enter(
         &mut self,
         symbolic: &mut Symbolic<'_>,
         words: &[i32],
@@ -274,12 +259,12 @@ impl<'p> Liveness<'p> {
         };
         let closing = self.list(discrete).find(closes).map(|one| one.depth);
         if let Some(depth) = closing {
-            let top = self.frames.last_mut();
+            let top = self.stack.top();
             top.expect("the move was taken from a node").pending = vec![zone];
             return Ok(Some(RunEnding::Loop(depth as usize)));
         }
         if !self.is_left(discrete, &zone) {
-            self.push(symbolic, words, zone)?;
+            self.push(symbolic, discrete, words, zone)?;
         }
         Ok(None)
     }
@@ -301,31 +286,19 @@ impl<'p> Liveness<'p> {
     fn push(
         &mut self,
         symbolic: &mut Symbolic<'_>,
+        discrete: DiscreteId,
         words: &[i32],
         zone: Zone,
     ) -> Result<(), Failure> {
         self.explored += 1;
-        let discrete = self.discrete(words);
         let node = cancellation::number(self.nodes.len());
         self.nodes.push(Node {
             discrete,
             zone: self.zones.intern(zone.bounds()),
             next: std::mem::replace(&mut self.heads[discrete.0 as usize], node),
-            depth: self.frames.len() as u32,
+            depth: self.stack.len() as u32,
         });
-        let mut frame = Frame {
-            node,
-            words: words.to_vec(),
-            zone,
-            moves: Moves::default(),
-            next_move: 0,
-            target: words.to_vec(),
-            pending: Vec::new(),
-            parts: Vec::new(),
-        };
-        let moves = symbolic.moves_within(&mut frame.words, frame.zone.bounds(), &mut frame.moves);
-        self.frames.push(frame);
-        moves
+        self.stack.push(symbolic, node, words, zone)
     }
 
     /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the
@@ -357,25 +330,64 @@ impl<'p> Liveness<'p> {
     }
 
     /// The run on the stack, with the state in which it ends.
-    fn found(&self, ending: RunEnding) -> EndlessRun {
-        let mut trace = self.stack_trace();
-        if let Some(top) = self.frames.last() {
-            trace.moves.push(top.parts.clone());
+    fn found(&self, symbolic: &mut Symbolic<'_>, ending: RunEnding) -> EndlessRun {
+        let mut trace = self.stack_trace(symbolic);
+        if let (_, [.., top]) = self.stack.all() {
+            trace.moves.push(top.parts().to_vec());
             push_state(&mut trace, &top.target, &top.pending);
         }
         EndlessRun { trace, ending }
     }
 
-    fn stack_trace(&self) -> Trace {
-        let states = self.frames.iter();
-        let states = states.map(|frame| (frame.words.clone(), frame.zone.clone()));
-        let moves = self.frames.iter().map(|frame| frame.parts.clone());
-        let count = self.frames.len().saturating_sub(1);
-        Trace {
-            states: states.collect(),
-            moves: moves.take(count).collect(),
+    fn stack_trace(&self, symbolic: &mut Symbolic<'_>) -> Trace {
+        let (below, frames) = self.stack.all();
+        let mut trace = Trace::default();
+        let mut moves = Moves::default();
+        for one in below {
+            let (mut words, zone) = self.state(symbolic, one.node);
+            let found = symbolic.moves_within(&mut words, zone.bounds(), &mut moves);
+            found.expect("the moves were found before");
+            let current = moves.get(one.next_move as usize - 1);
+            trace.moves.push(current.parts.to_vec());
+            trace.states.push((words, zone));
+        }
+        for (number, frame) in frames.iter().enumerate() {
+            trace.states.push((frame.words.clone(), frame.zone.clone()));
+            if number + 1 < frames.len() {
+                trace.moves.push(frame.parts().to_vec());
+            }
+        }
+        trace
+    }
+}
+
+/// Takes the next move of a state: fills its pending zones.
+fn take_next(
+    symbolic: &mut Symbolic<'_>,
+    keep: &Predicate,
+    frame: &mut Frame,
+    is_coarse: &mut bool,
+) -> Result<Option<RunEnding>, Failure> {
+    let one = frame.moves.get(frame.next_move);
+    frame.next_move += 1;
+    let (words, zone) = (&frame.words, frame.zone.bounds());
+    let Some(effect) = symbolic.fire_within(one, words, zone, &mut frame.target)? else {
+        return Ok(None);
+    };
+    let mut entries = Vec::new();
+    effect.entry_zones(frame.zone.bounds(), symbolic.dimension(), &mut entries);
+    for entry in &entries {
+        let entry = Entry::at(entry);
+        let target = &mut frame.target;
+        let inside = Inside::of(symbolic, keep, target, entry, &effect.invariant)?;
+        *is_coarse |= inside.is_coarse;
+        frame.pending.extend(inside.zones);
+        if inside.ending.is_some() {
+            return Ok(inside.ending);
         }
     }
+    symbolic.extrapolate_all(&frame.target, &mut frame.pending);
+    Ok(None)
 }
 
 /// Adds a state of a trace: the words with the last of their zones.

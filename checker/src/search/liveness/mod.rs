@@ -5,3 +5,4 @@ pub mod emptiness;
 pub mod ending;
 pub mod leads_to;
 pub mod shortest_lasso;
+mod stack;

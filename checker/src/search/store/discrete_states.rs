@@ -9,7 +9,7 @@
 //!
 //! A word takes one, two or four bytes, as the range of its variable or the number of locations
 //! needs. An assignment checks that a value lies in its range; packing checks it again. The bytes
-//! of the identity are kept as a row of numbers, that is, as a tree of pairs ([`super::rows`]):
+//! of the identity are kept as a row of numbers, that is, as a tree of groups ([`super::rows`]):
 //! what states have in common is stored once.
 
 use crate::ir::{Network, Shape};
@@ -139,7 +139,7 @@ pub struct StateStore {
     runs: Vec<Run>,
     /// How many runs belong to the identity.
     identity_runs: usize,
-    /// The bytes of a record that decide identity: whole numbers of the row, at least two.
+    /// The bytes of a record that decide identity: whole numbers of the row, at least one.
     identity: usize,
     /// What the words are that are not stored.
     initial: Vec<i32>,
@@ -158,7 +158,7 @@ impl StateStore {
         let identity_words = network.layout.identity_words as usize;
         let mut runs = runs_of(&written, &widths, 0, identity_words);
         let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
-        let numbers = bytes(&runs).div_ceil(size_of::<u32>()).max(2);
+        let numbers = bytes(&runs).div_ceil(size_of::<u32>()).max(1);
         let identity = numbers * size_of::<u32>();
         let identity_runs = runs.len();
         runs.extend(runs_of(&written, &widths, identity_words, written.len()));
@@ -448,7 +448,7 @@ mod tests {
                 first: 0,
                 set: None,
             }));
-            assert_eq!(store.scratch.len(), (3 * bytes).next_multiple_of(4).max(8));
+            assert_eq!(store.scratch.len(), (3 * bytes).next_multiple_of(4));
             for state in [[low, high, 0], [high, high, low]] {
                 let (id, is_new) = store.intern(&state);
                 assert!(is_new && store.intern(&state) == (id, false));

@@ -1,10 +1,10 @@
 //! Where states are kept: discrete states, packed zones, the passed list.
 
 pub mod discrete_states;
+mod groups;
 pub(super) mod packed_paths;
 pub(super) mod packed_zones;
 pub(super) mod passed_list;
-mod pairs;
 mod records;
 mod rows;
 pub(super) mod segmented_table;

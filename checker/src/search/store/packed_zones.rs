@@ -272,27 +272,42 @@ impl PackedZones {
         while !self.pack(zone.matrix) {
             self.widen();
         }
-        let dimension = self.dimension;
-        let size = dimension * dimension;
-        let signature = if !self.tuning.signatures {
-            Signature::of([0; 8])
-        } else if self.width == Width::One && self.signatures.are_narrow() {
-            self.narrow.resize(size, 0);
-            widen_narrow(&self.candidate, zone.limits, dimension, &mut self.narrow);
-            self.signatures.of_narrow(&self.narrow)
-        } else if zone.limits.is_empty() {
-            self.signatures.of(zone.matrix)
-        } else {
-            self.demands.resize(size, Bound::INFINITY);
-            simulation::demands(zone.matrix, dimension, zone.limits, &mut self.demands);
-            self.signatures.of(&self.demands)
-        };
+        let candidate = std::mem::take(&mut self.candidate);
+        let signature = self.signature_of(&candidate, zone.matrix, zone.limits);
+        self.candidate = candidate;
         if self.tuning.kept_signatures
             && let Some(known) = zone.known
         {
             self.known.add(known, &self.candidate, signature);
         }
         signature
+    }
+
+    /// The signature of a stored zone that has these limits.
+    pub(super) fn signature(&mut self, id: ZoneId, limits: &[Bound]) -> Signature {
+        let mut matrix = vec![Bound::INFINITY; self.dimension * self.dimension];
+        self.load(id, &mut matrix);
+        let packed = self.get(id.0).to_vec();
+        self.signature_of(&packed, &matrix, limits)
+    }
+
+    /// The signature of a zone, from its packed matrix or its bounds.
+    fn signature_of(&mut self, packed: &[u8], matrix: &[Bound], limits: &[Bound]) -> Signature {
+        let dimension = self.dimension;
+        let size = dimension * dimension;
+        if !self.tuning.signatures {
+            Signature::of([0; 8])
+        } else if self.width == Width::One && self.signatures.are_narrow() {
+            self.narrow.resize(size, 0);
+            widen_narrow(packed, limits, dimension, &mut self.narrow);
+            self.signatures.of_narrow(&self.narrow)
+        } else if limits.is_empty() {
+            self.signatures.of(matrix)
+        } else {
+            self.demands.resize(size, Bound::INFINITY);
+            simulation::demands(matrix, dimension, limits, &mut self.demands);
+            self.signatures.of(&self.demands)
+        }
     }
 
     fn pack(&mut self, zone: &[Bound]) -> bool {

@@ -141,6 +141,7 @@ impl PassedList {
             }
             self.forget_within(discrete, signature, zone.limits);
         }
+        let limits = zone.limits;
         let zone = self.zones.keep();
         let stored = self.stored(discrete, zone);
         let entry = Entry {
@@ -148,7 +149,9 @@ impl PassedList {
             zone,
             node: stored.node,
         };
-        self.lists.push(discrete, entry);
+        let zones = &mut self.zones;
+        let signature_of = |zone| zones.signature(zone, limits);
+        self.lists.push(discrete, entry, signature_of);
         Some(stored)
     }
 
@@ -171,12 +174,12 @@ impl PassedList {
             covered_count,
             ..
         } = self;
-        lists.remove_below(discrete, proposed, |entry| {
-            let is_within = zones.is_in_candidate(entry.zone, limits);
+        lists.remove_below(discrete, proposed, |zone, node| {
+            let is_within = zones.is_in_candidate(zone, limits);
             if is_within {
-                cover(covered, entry.node);
+                cover(covered, node);
                 *covered_count += 1;
-                zones.release(entry.zone);
+                zones.release(zone);
             }
             is_within
         });

@@ -1,71 +1,75 @@
-//! Rows of numbers, all of one length, each stored once as a tree of pairs.
+//! Rows of numbers, all of one length, each stored once as a tree of groups.
 //!
-//! The numbers of a row are the lowest level of its tree. A level has one number for each two of
-//! the level below: that of the pair. The last one of a level of odd length stands above it as it
-//! is. The two numbers of the uppermost level are the root, whose number is that of the row. So
-//! equal parts of rows are stored once.
+//! The numbers of a row are the lowest level of its tree. A level has one number for each few of
+//! the level below: that of the group which they make. The uppermost level is the root, whose
+//! number is that of the row. So equal parts of rows are stored once.
 //!
 //! Rows that follow each other differ in few places. So a row is compared with the one at hand, the
-//! *basis*, and only what differs is looked up, with the pairs above it.
+//! *basis*, and only what differs is looked up, with the groups above it.
 //!
 //! Invariants:
 //! * Two rows get the same number exactly if they are equal.
-//! * All levels of the basis are right, and the pairs below its root are stored.
+//! * All levels of the basis are right, and the groups below its root are stored.
 //!
 //! Source: A. Laarman, J. van de Pol, M. Weber, "Parallel Recursive State Compression for Free",
-//! SPIN 2011, also for the changes along a transition.
+//! SPIN 2011, also for the changes along a transition. They pair numbers; wider groups make fewer
+//! levels, and less time is spent in looking up.
 //!
-//! Cost: a row takes a root, and the pairs that no other row has: at most as many as the depth of
+//! Cost: a row takes a root, and the groups that no other row has: at most as many as the depth of
 //! the tree for each place where it differs.
 
-use super::pairs::Pairs;
+use super::groups::Groups;
 
-/// Where a level stands.
+/// The most numbers in a group.
+const WIDEST: usize = 8;
+
+/// Where a level stands: `length` groups of numbers.
 #[derive(Clone, Copy, Debug)]
 struct Level {
     first: usize,
-    length: usize,
+    groups: usize,
 }
 
 /// Stored rows.
 #[derive(Debug)]
 pub(super) struct Rows {
-    /// From the lowest one to that with two numbers.
+    length: usize,
+    /// The numbers in a group.
+    width: usize,
+    /// From the lowest one to that below the root.
     levels: Vec<Level>,
-    /// The pairs of all levels but the uppermost.
-    pairs: Pairs,
-    roots: Pairs,
-    /// The numbers of all levels of the basis.
+    /// The groups of all levels.
+    groups: Groups,
+    roots: Groups,
+    /// The numbers of all levels of the basis, then those of its root.
     basis: Vec<u32>,
-    /// Whether the basis was visited; else it is the row that was stored last.
-    is_visited: bool,
-    /// What the basis had before it was changed: places and numbers.
-    before: Vec<(usize, u32)>,
-    /// Where the level at hand has changed, and that above it.
+    /// Where the root begins there.
+    root: usize,
+    /// The groups that have changed in the level at hand, and in that above it.
     changed: Vec<usize>,
     changed_above: Vec<usize>,
 }
 
 impl Rows {
-    /// No rows. They will have so many numbers, at least two.
+    /// No rows. They will have so many numbers, at least one.
     pub(super) fn new(length: usize) -> Rows {
-        let mut levels = vec![Level { first: 0, length }];
-        let mut last = levels[0];
-        while last.length > 2 {
-            last = Level {
-                first: last.first + last.length,
-                length: last.length.div_ceil(2),
-            };
-            levels.push(last);
+        let width = width(length);
+        let (mut levels, mut first, mut below) = (Vec::new(), 0, length);
+        while below > width {
+            let groups = below.div_ceil(width);
+            levels.push(Level { first, groups });
+            first += groups * width;
+            below = groups;
         }
         let mut rows = Rows {
-            basis: vec![0; last.first + last.length],
+            length,
+            width,
+            changed: (0..levels.first().map_or(0, |level| level.groups)).collect(),
             levels,
-            pairs: Pairs::new(),
-            roots: Pairs::new(),
-            is_visited: false,
-            before: Vec::new(),
-            changed: (0..length.div_ceil(2)).collect(),
+            groups: Groups::new(width),
+            roots: Groups::new(below),
+            basis: vec![0; first + below],
+            root: first,
             changed_above: Vec::new(),
         };
         rows.change_upper();
@@ -74,141 +78,127 @@ impl Rows {
 
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
-        self.pairs.bytes() + self.roots.bytes()
+        self.groups.bytes() + self.roots.bytes()
     }
 
-    /// The number of a row, and whether it is new.
+    /// The number of a row, and whether it is new. It becomes the basis.
     pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
-        self.before.clear();
         self.changed.clear();
-        for (place, number) in row.enumerate() {
-            let known = self.basis[place];
-            if number != known {
-                self.before.push((place, known));
-                self.basis[place] = number;
-                note(&mut self.changed, place / 2);
+        let groups = self.basis[..self.length].chunks_mut(self.width);
+        let mut row = row;
+        for (place, group) in groups.enumerate() {
+            let mut is_changed = false;
+            for (known, number) in group.iter_mut().zip(&mut row) {
+                is_changed |= *known != number;
+                *known = number;
             }
-        }
-        self.change_upper();
-        let found = self.roots.intern(self.root());
-        if self.is_visited {
-            for &(place, number) in self.before.iter().rev() {
-                self.basis[place] = number;
-            }
-        }
-        found
-    }
-
-    /// Computes what stands above the changed pairs of the lowest level.
-    fn change_upper(&mut self) {
-        for level in 1..self.levels.len() {
-            self.changed_above.clear();
-            for &place in &self.changed {
-                let below = below(&self.basis, self.levels[level - 1], place);
-                let number = match *below {
-                    [one] => one,
-                    [one, other] => self.pairs.intern([one, other]).0,
-                    _ => unreachable!("a number stands above one or two"),
-                };
-                let own = self.levels[level].first + place;
-                if self.basis[own] != number {
-                    self.before.push((own, self.basis[own]));
-                    self.basis[own] = number;
-                    note(&mut self.changed_above, place / 2);
-                }
-            }
-            std::mem::swap(&mut self.changed, &mut self.changed_above);
-        }
-    }
-
-    fn root(&self) -> [u32; 2] {
-        let last = self.levels[self.levels.len() - 1].first;
-        [self.basis[last], self.basis[last + 1]]
-    }
-
-    /// The number of a row, if it is stored.
-    pub(super) fn find(&self, row: impl Iterator<Item = u32>) -> Option<u32> {
-        let mut numbers: Vec<u32> = row.collect();
-        while numbers.len() > 2 {
-            let mut length = 0;
-            for place in 0..numbers.len().div_ceil(2) {
-                let number = numbers[2 * place];
-                let next = numbers.get(2 * place + 1);
-                numbers[place] = match next {
-                    None => number,
-                    Some(&other) => self.pairs.find([number, other])?,
-                };
-                length = place + 1;
-            }
-            numbers.truncate(length);
-        }
-        self.roots.find([numbers[0], numbers[1]])
-    }
-
-    /// Makes a stored row the basis, and returns it. Rows to be stored will be compared with it.
-    pub(super) fn visit(&mut self, row: u32) -> &[u32] {
-        self.is_visited = true;
-        self.changed.clear();
-        let upper = self.levels[self.levels.len() - 1];
-        for (place, number) in self.roots.get(row).into_iter().enumerate() {
-            if self.basis[upper.first + place] != number {
-                self.basis[upper.first + place] = number;
+            if is_changed {
                 self.changed.push(place);
             }
         }
-        for level in (1..self.levels.len()).rev() {
+        self.change_upper();
+        self.roots.intern(&self.basis[self.root..])
+    }
+
+    /// Computes what stands above the changed groups of the lowest level.
+    fn change_upper(&mut self) {
+        for (number, level) in self.levels.iter().enumerate() {
+            let above = self
+                .levels
+                .get(number + 1)
+                .map_or(self.root, |above| above.first);
             self.changed_above.clear();
-            let (own, below) = (self.levels[level], self.levels[level - 1]);
             for &place in &self.changed {
-                let number = self.basis[own.first + place];
-                let first = 2 * place;
-                let (pair, count) = if first + 1 < below.length {
-                    (self.pairs.get(number), 2)
-                } else {
-                    ([number, 0], 1)
-                };
-                for (place, &number) in (first..).zip(&pair[..count]) {
-                    if self.basis[below.first + place] != number {
-                        self.basis[below.first + place] = number;
-                        self.changed_above.push(place);
+                let group = &self.basis[level.first + place * self.width..][..self.width];
+                let number = self.groups.intern(group).0;
+                if self.basis[above + place] != number {
+                    self.basis[above + place] = number;
+                    let group = place / self.width;
+                    if self.changed_above.last() != Some(&group) {
+                        self.changed_above.push(group);
                     }
                 }
             }
             std::mem::swap(&mut self.changed, &mut self.changed_above);
         }
-        &self.basis[..self.levels[0].length]
+    }
+
+    /// The number of a row, if it is stored.
+    pub(super) fn find(&self, row: impl Iterator<Item = u32>) -> Option<u32> {
+        let mut numbers: Vec<u32> = row.collect();
+        for level in &self.levels {
+            numbers.resize(level.groups * self.width, 0);
+            let groups = numbers.chunks_exact(self.width);
+            let above: Option<Vec<u32>> = groups.map(|group| self.groups.find(group)).collect();
+            numbers = above?;
+        }
+        self.roots.find(&numbers)
+    }
+
+    /// Makes a stored row the basis, and returns it.
+    pub(super) fn visit(&mut self, row: u32) -> &[u32] {
+        self.changed.clear();
+        let root = self.basis[self.root..].iter_mut();
+        for (place, (known, &number)) in root.zip(self.roots.get(row)).enumerate() {
+            if *known != number {
+                *known = number;
+                self.changed.push(place);
+            }
+        }
+        let mut own = self.root;
+        for (number, level) in self.levels.iter().enumerate().rev() {
+            self.changed_above.clear();
+            for &place in &self.changed {
+                let group = self.groups.get(self.basis[own + place]);
+                let first = place * self.width;
+                let below = &mut self.basis[level.first + first..][..self.width];
+                if number == 0 {
+                    below.copy_from_slice(group);
+                    continue;
+                }
+                for (place, (known, &number)) in (first..).zip(below.iter_mut().zip(group)) {
+                    if *known != number {
+                        *known = number;
+                        self.changed_above.push(place);
+                    }
+                }
+            }
+            std::mem::swap(&mut self.changed, &mut self.changed_above);
+            own = level.first;
+        }
+        &self.basis[..self.length]
     }
 
     /// A stored row.
     pub(super) fn get(&self, row: u32) -> Vec<u32> {
         let mut numbers = self.roots.get(row).to_vec();
-        for level in self.levels.iter().rev().skip(1) {
-            let mut below = Vec::with_capacity(level.length);
-            for number in numbers {
-                if below.len() + 1 < level.length {
-                    below.extend(self.pairs.get(number));
-                } else {
-                    below.push(number);
-                }
-            }
-            numbers = below;
+        for level in self.levels.iter().rev() {
+            let groups = numbers[..level.groups].iter();
+            numbers = groups
+                .flat_map(|&number| self.groups.get(number))
+                .copied()
+                .collect();
         }
+        numbers.truncate(self.length);
         numbers
     }
 }
 
-/// The one or two numbers of a level that stand below a place.
-fn below(numbers: &[u32], level: Level, place: usize) -> &[u32] {
-    let first = 2 * place;
-    let end = level.length.min(first + 2);
-    &numbers[level.first + first..level.first + end]
-}
-
-/// Adds a place, unless it is the last one already.
-fn note(places: &mut Vec<usize>, place: usize) {
-    if places.last() != Some(&place) {
-        places.push(place);
-    }
+/// The least width of groups with which rows have the fewest levels.
+fn width(length: usize) -> usize {
+    let levels = |width: usize| {
+        let mut levels = 0;
+        let mut below = length;
+        while below > width {
+            below = below.div_ceil(width);
+            levels += 1;
+        }
+        levels
+    };
+    let fewest = levels(WIDEST);
+    (2..=WIDEST)
+        .find(|&width| levels(width) == fewest)
+        .unwrap_or(WIDEST)
 }
 
 #[cfg(test)]
@@ -257,7 +247,7 @@ mod tests {
 
     #[test]
     fn rows_come_back_whatever_their_length() {
-        for length in [2, 3, 4, 5, 7, 8, 9, 31, 100] {
+        for length in [1, 2, 3, 7, 8, 9, 31, 64, 65, 100, 600] {
             check(length, false);
             check(length, true);
         }

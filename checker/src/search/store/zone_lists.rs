@@ -25,7 +25,7 @@ pub(super) struct Entry {
 }
 
 /// A list: this many entries from `first` on, in a place whose length is the next power of two; or
-/// [`SPLIT`], and the number of the split.
+/// [`SPLIT`], and the number of the split; or the only zone, and its node with [`ALONE`].
 #[derive(Clone, Copy, Debug)]
 struct List {
     first: u32,
@@ -35,10 +35,30 @@ struct List {
 /// The length of a list that is split.
 const SPLIT: u32 = u32::MAX;
 
+/// Marks the node of the only zone of a discrete state, which needs no signature. Most discrete
+/// states of many models have one zone.
+const ALONE: u32 = 1 << 31;
+
 /// A list is split when it has this many entries, or twice as many after a split in vain.
 const LONG: u32 = 128;
 
 const EMPTY: List = List { first: 0, len: 0 };
+
+impl List {
+    /// The list of this zone alone, if its node is small enough.
+    fn alone(entry: Entry) -> Option<List> {
+        (entry.node < SPLIT & !ALONE).then_some(List {
+            first: entry.zone.0,
+            len: entry.node | ALONE,
+        })
+    }
+
+    /// The only zone, and its node.
+    fn only(self) -> Option<(ZoneId, u32)> {
+        let is_alone = self.len & ALONE != 0 && self.len != SPLIT;
+        is_alone.then_some((ZoneId(self.first), self.len & !ALONE))
+    }
+}
 
 /// A long list in parts.
 #[derive(Debug)]
@@ -110,7 +130,11 @@ impl Lists {
         proposed: Signature,
         contains: &mut dyn FnMut(ZoneId) -> bool,
     ) -> bool {
-        let List { first, len } = self.list(at);
+        let list = self.list(at);
+        if let Some((zone, _)) = list.only() {
+            return contains(zone);
+        }
+        let List { first, len } = list;
         if len == SPLIT {
             let split = &self.splits[first as usize];
             let reached = proposed.reaches(split.mean);
@@ -138,7 +162,7 @@ impl Lists {
         &mut self,
         discrete: DiscreteId,
         proposed: Signature,
-        mut is_within: impl FnMut(&Entry) -> bool,
+        mut is_within: impl FnMut(ZoneId, u32) -> bool,
     ) {
         self.remove_below_in(At::Discrete(discrete), proposed, &mut is_within);
     }
@@ -147,9 +171,16 @@ impl Lists {
         &mut self,
         at: At,
         proposed: Signature,
-        is_within: &mut dyn FnMut(&Entry) -> bool,
+        is_within: &mut dyn FnMut(ZoneId, u32) -> bool,
     ) {
-        let List { first, len } = self.list(at);
+        let list = self.list(at);
+        if let Some((zone, node)) = list.only() {
+            if is_within(zone, node) {
+                self.set(at, EMPTY);
+            }
+            return;
+        }
+        let List { first, len } = list;
         if len == SPLIT {
             let split = &self.splits[first as usize];
             let reached = proposed.reaches(split.mean);
@@ -164,15 +195,37 @@ impl Lists {
         // Where one is taken out, one that was looked at takes its place.
         for index in (0..len as usize).rev() {
             let entry = self.entries[self.list(at).first as usize + index];
-            if entry.signature.may_be_within(proposed) && is_within(&entry) {
+            if entry.signature.may_be_within(proposed) && is_within(entry.zone, entry.node) {
                 self.remove(at, index);
             }
         }
     }
 
-    /// Adds an entry.
-    pub(super) fn push(&mut self, discrete: DiscreteId, entry: Entry) {
+    /// Adds an entry. `signature_of` is asked for the signature of a zone that was alone.
+    pub(super) fn push(
+        &mut self,
+        discrete: DiscreteId,
+        entry: Entry,
+        signature_of: impl FnOnce(ZoneId) -> Signature,
+    ) {
         let mut at = At::Discrete(discrete);
+        let list = self.list(at);
+        if let Some((zone, node)) = list.only() {
+            let signature = signature_of(zone);
+            self.set(at, EMPTY);
+            self.push_at(
+                at,
+                Entry {
+                    signature,
+                    zone,
+                    node,
+                },
+            );
+        } else if list.len == 0
+            && let Some(alone) = List::alone(entry)
+        {
+            return self.set(at, alone);
+        }
         loop {
             let list = self.list(at);
             if list.len == SPLIT {
@@ -335,6 +388,7 @@ mod tests {
         let mut numbers = Numbers(u64::from(count) + spread);
         let mut lists = Lists::new(true);
         let mut vectors: [Vec<Entry>; 2] = Default::default();
+        let mut signatures: Vec<Signature> = Vec::new();
         lists.open();
         lists.open();
         for node in 0..count {
@@ -346,13 +400,16 @@ mod tests {
             let all = vectors[which].iter();
             let mut above = all.filter(|one| own.may_be_within(one.signature));
             let expected = above.any(|one| is_related(one.zone));
-            assert_eq!(lists.any_above(discrete, own, is_related), expected);
+            let contains =
+                |zone: ZoneId| own.may_be_within(signatures[zone.0 as usize]) && is_related(zone);
+            assert_eq!(lists.any_above(discrete, own, contains), expected);
             let is_below = |one: &Entry| one.signature.may_be_within(own) && is_related(one.zone);
             let mut gone: Vec<u32> = Vec::new();
-            lists.remove_below(discrete, own, |one| {
-                let is_related = is_related(one.zone);
-                gone.extend(is_related.then_some(one.node));
-                is_related
+            lists.remove_below(discrete, own, |zone, node| {
+                let signature = signatures[zone.0 as usize];
+                let is_within = signature.may_be_within(own) && is_related(zone);
+                gone.extend(is_within.then_some(node));
+                is_within
             });
             gone.sort_unstable();
             let below = vectors[which].iter().filter(|one| is_below(one));
@@ -363,7 +420,8 @@ mod tests {
                 zone: ZoneId(node),
                 node,
             };
-            lists.push(discrete, entry);
+            lists.push(discrete, entry, |zone| signatures[zone.0 as usize]);
+            signatures.push(own);
             vectors[which].push(entry);
         }
         assert!(spread < 9 || !lists.splits.is_empty());
