@@ -43,6 +43,10 @@ pub(super) struct Rows {
     roots: Groups,
     /// The numbers of all levels of the basis, then those of its root.
     basis: Vec<u32>,
+    /// Whether the basis is a row that was visited; else it is that which was stored last.
+    is_visited: bool,
+    /// What the basis had before a row was stored: places and numbers.
+    before: Vec<(u32, u32)>,
     /// Where the root begins there.
     root: usize,
     /// The groups that have changed in the level at hand, and in that above it.
@@ -69,6 +73,8 @@ impl Rows {
             groups: Groups::new(width),
             roots: Groups::new(below),
             basis: vec![0; first + below],
+            is_visited: false,
+            before: Vec::new(),
             root: first,
             changed_above: Vec::new(),
         };
@@ -81,23 +87,33 @@ impl Rows {
         self.groups.bytes() + self.roots.bytes()
     }
 
-    /// The number of a row, and whether it is new. It becomes the basis.
+    /// The number of a row, and whether it is new. It becomes the basis, unless that was visited.
     pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
         self.changed.clear();
+        self.before.clear();
         let groups = self.basis[..self.length].chunks_mut(self.width);
         let mut row = row;
         for (place, group) in groups.enumerate() {
             let mut is_changed = false;
-            for (known, number) in group.iter_mut().zip(&mut row) {
-                is_changed |= *known != number;
-                *known = number;
+            for (within, (known, number)) in group.iter_mut().zip(&mut row).enumerate() {
+                if *known != number {
+                    self.before.push(((place * self.width + within) as u32, *known));
+                    *known = number;
+                    is_changed = true;
+                }
             }
             if is_changed {
                 self.changed.push(place);
             }
         }
         self.change_upper();
-        self.roots.intern(&self.basis[self.root..])
+        let found = self.roots.intern(&self.basis[self.root..]);
+        if self.is_visited {
+            for &(place, number) in &self.before {
+                self.basis[place as usize] = number;
+            }
+        }
+        found
     }
 
     /// Computes what stands above the changed groups of the lowest level.
@@ -111,7 +127,9 @@ impl Rows {
             for &place in &self.changed {
                 let group = &self.basis[level.first + place * self.width..][..self.width];
                 let number = self.groups.intern(group).0;
-                if self.basis[above + place] != number {
+                let known = self.basis[above + place];
+                if known != number {
+                    self.before.push(((above + place) as u32, known));
                     self.basis[above + place] = number;
                     let group = place / self.width;
                     if self.changed_above.last() != Some(&group) {
@@ -137,6 +155,7 @@ impl Rows {
 
     /// Makes a stored row the basis, and returns it.
     pub(super) fn visit(&mut self, row: u32) -> &[u32] {
+        self.is_visited = true;
         self.changed.clear();
         let root = self.basis[self.root..].iter_mut();
         for (place, (known, &number)) in root.zip(self.roots.get(row)).enumerate() {
