@@ -14,6 +14,7 @@ mod great_differences;
 mod interrupts;
 mod live_variables;
 mod long_chains;
+mod long_runs;
 mod numbers;
 mod option_sets;
 mod partial_order;

@@ -448,7 +448,8 @@ mod tests {
                 first: 0,
                 set: None,
             }));
-            assert_eq!(store.scratch.len(), (3 * bytes).next_multiple_of(4));
+            let whole: usize = 3 * bytes;
+            assert_eq!(store.scratch.len(), whole.next_multiple_of(4));
             for state in [[low, high, 0], [high, high, low]] {
                 let (id, is_new) = store.intern(&state);
                 assert!(is_new && store.intern(&state) == (id, false));

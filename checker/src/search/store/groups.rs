@@ -142,7 +142,7 @@ mod tests {
                 assert_eq!(groups.intern(&group(number)), (number, false));
                 assert_eq!(groups.get(number), group(number));
             }
-            assert_eq!(groups.find(&vec![1; width]), None);
+            assert_eq!(groups.find(&vec![u32::MAX; width]), None);
             assert!(groups.bytes() >= 20_000 * 4 * (width + 1));
         }
     }

@@ -97,7 +97,8 @@ impl Rows {
             let mut is_changed = false;
             for (within, (known, number)) in group.iter_mut().zip(&mut row).enumerate() {
                 if *known != number {
-                    self.before.push(((place * self.width + within) as u32, *known));
+                    self.before
+                        .push(((place * self.width + within) as u32, *known));
                     *known = number;
                     is_changed = true;
                 }
