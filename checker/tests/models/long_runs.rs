@@ -31,7 +31,9 @@ fn every_state_of_a_long_run_is_left() {
 
 #[test]
 fn a_loop_to_a_state_far_below_is_a_run() {
-    let mut model = load(&counter("Counts -> Counts { guard n == 3000; assign n = 7; },"));
+    let mut model = load(&counter(
+        "Counts -> Counts { guard n == 3000; assign n = 7; },",
+    ));
     let options = Options {
         runs: true,
         ..interpreted()
