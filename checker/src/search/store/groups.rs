@@ -130,7 +130,7 @@ mod tests {
             let mut groups = Groups::new(width);
             let group = |number: u32| {
                 let mut group = vec![7; width];
-                group[width - 1] = number % 100 << 20;
+                group[width - 1] = (number % 100) << 20;
                 group[0] += number / 100;
                 group
             };
