@@ -113,6 +113,7 @@ bench: $(INSTALLED) ## Measure the engine (plans, syntheses, reductions, deadloc
 	$(BIN)/python tests/benchmarks/start.py
 	$(BIN)/python tests/benchmarks/reductions.py
 	$(BIN)/python tests/benchmarks/deadlocks.py
+	$(BIN)/python tests/benchmarks/machines.py
 	$(BIN)/python tests/benchmarks/tracker.py
 	$(BIN)/python tests/benchmarks/race.py
 	$(BIN)/python tests/benchmarks/race.py --threads 2 "fischer 10" "csmacd 11" peterson
