@@ -26,12 +26,14 @@ pub(super) struct NativeContext<'call> {
     pub(super) rounds_left: u64,
     /// The constant memory.
     pub(super) constants: *const i32,
+    /// The two vectors are apart: side by side they would be copied as one value right after they
+    /// were written as two, which a processor waits for.
+    constraints: &'call mut Vec<FixedConstraint>,
     /// How many rounds it may take beyond these.
     rounds_beyond: u64,
     /// The first site where a result wrapped round in this call, or [`Wraps::NOWHERE`]. Compiled
     /// code writes it.
     pub(super) wrapped: u32,
-    constraints: &'call mut Vec<FixedConstraint>,
     assignments: &'call mut Vec<EmittedAssignment>,
 }
 
