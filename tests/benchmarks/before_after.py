@@ -34,8 +34,13 @@ def _measured(python: str, member: ablation.Member) -> ablation.Measured:
     """What a member takes with the engine of an interpreter."""
     fields = dict(zip(("name", "kind", "text", "query", "options"), astuple(member), strict=True))
     folder = str(Path(__file__).parent)
+    # Python takes packages from the current folder first, which must not be a clone.
     done = subprocess.run(
-        [python, "-c", ASK, folder], input=json.dumps(fields), capture_output=True, text=True
+        [python, "-c", ASK, folder],
+        input=json.dumps(fields),
+        capture_output=True,
+        text=True,
+        cwd=folder,
     )
     if done.returncode:
         raise SystemExit(f"{member.name} with {python} failed:\n{done.stderr}")

@@ -39,7 +39,10 @@ def cost(python: str, model: Path, query: str, limit_s: float) -> Cost:
     """Asks a query in a new process."""
     command = [python, "-m", "ntagen", "check", str(model), "--query", query, "--json"]
     options = ["--timeout", str(limit_s)]
-    with subprocess.Popen([*command, *options], stdout=subprocess.PIPE, text=True) as run:
+    # Python takes packages from the current folder first, which must not be a clone.
+    with subprocess.Popen(
+        [*command, *options], stdout=subprocess.PIPE, text=True, cwd=FOLDER
+    ) as run:
         assert run.stdout is not None
         answer = json.loads(run.stdout.read().splitlines()[-1])
         _, run.returncode, usage = os.wait4(run.pid, 0)
