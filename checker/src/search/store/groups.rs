@@ -38,6 +38,11 @@ impl Groups {
         }
     }
 
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.count as usize
+    }
+
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
         let block = (self.width << self.block_bits) * size_of::<u32>();
@@ -105,15 +110,32 @@ fn is_same(one: &[u32], other: &[u32]) -> bool {
 /// Numbers that follow each other must differ in all bits: the table uses the upper and the lower
 /// ones.
 fn hash(group: &[u32]) -> u64 {
-    let mut mixed = 0x1656_67b1_9e37_79f9_u64;
-    let (pairs, rest) = group.as_chunks::<2>();
+    const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
+    // Of a long group four lanes are mixed apart, so that the multiplications overlap.
+    let (blocks, rest) = group.as_chunks::<8>();
+    let mut lanes = [0x1656_67b1_9e37_79f9_u64, 1, 2, 3];
+    for block in blocks {
+        for (lane, &[first, second]) in lanes.iter_mut().zip(block.as_chunks::<2>().0) {
+            let pair = u64::from(first) | u64::from(second) << 32;
+            *lane = (*lane ^ pair).wrapping_mul(FACTOR);
+            *lane ^= *lane >> 32;
+        }
+    }
+    let mut mixed = lanes[0];
+    if !blocks.is_empty() {
+        for lane in &lanes[1..] {
+            mixed = (mixed ^ lane).wrapping_mul(FACTOR);
+            mixed ^= mixed >> 32;
+        }
+    }
+    let (pairs, rest) = rest.as_chunks::<2>();
     for &[first, second] in pairs {
         let pair = u64::from(first) | u64::from(second) << 32;
-        mixed = (mixed ^ pair).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        mixed = (mixed ^ pair).wrapping_mul(FACTOR);
         mixed ^= mixed >> 32;
     }
     for &last in rest {
-        mixed = (mixed ^ u64::from(last)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        mixed = (mixed ^ u64::from(last)).wrapping_mul(FACTOR);
         mixed ^= mixed >> 32;
     }
     let mixed = mixed.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);

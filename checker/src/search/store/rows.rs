@@ -15,6 +15,9 @@
 //! SPIN 2011, also for the changes along a transition. They pair numbers; wider groups make fewer
 //! levels, and less time is spent in looking up.
 //!
+//! Rows that have little in common are kept as they are: each is a root, and there is no level
+//! below. The first few thousand rows decide.
+//!
 //! Cost: a row takes a root, and the groups that no other row has: at most as many as the depth of
 //! the tree for each place where it differs.
 
@@ -22,6 +25,12 @@ use super::groups::Groups;
 
 /// The most numbers in a group.
 const WIDEST: usize = 8;
+
+/// When there are so many rows, it is seen whether they have enough in common.
+const TRIAL: usize = 4096;
+
+/// Trees that take more than this part of the rows themselves are not worth the time.
+const WORTH: f64 = 0.3;
 
 /// Where a level stands: `length` groups of numbers.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +66,11 @@ pub(super) struct Rows {
 impl Rows {
     /// No rows. They will have so many numbers, at least one.
     pub(super) fn new(length: usize) -> Rows {
-        let width = width(length);
+        Rows::of_width(length, width(length))
+    }
+
+    /// No rows, in groups of this width.
+    fn of_width(length: usize, width: usize) -> Rows {
         let (mut levels, mut first, mut below) = (Vec::new(), 0, length);
         while below > width {
             let groups = below.div_ceil(width);
@@ -89,6 +102,12 @@ impl Rows {
 
     /// The number of a row, and whether it is new. It becomes the basis, unless that was visited.
     pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
+        if self.levels.is_empty() {
+            for (known, number) in self.basis.iter_mut().zip(row) {
+                *known = number;
+            }
+            return self.roots.intern(&self.basis);
+        }
         self.changed.clear();
         self.before.clear();
         let groups = self.basis[..self.length].chunks_mut(self.width);
@@ -114,7 +133,24 @@ impl Rows {
                 self.basis[place as usize] = number;
             }
         }
+        if found == (TRIAL as u32 - 1, true) && self.shares_little() {
+            *self = self.flat();
+        }
         found
+    }
+
+    fn shares_little(&self) -> bool {
+        let groups = self.groups.len() * self.width;
+        groups as f64 > WORTH * (self.roots.len() * self.length) as f64
+    }
+
+    /// The same rows with the same numbers, as they are.
+    fn flat(&self) -> Rows {
+        let mut flat = Rows::of_width(self.length, self.length);
+        for row in 0..self.roots.len() as u32 {
+            flat.intern(self.get(row).into_iter());
+        }
+        flat
     }
 
     /// Computes what stands above the changed groups of the lowest level.
@@ -156,6 +192,9 @@ impl Rows {
 
     /// Makes a stored row the basis, and returns it.
     pub(super) fn visit(&mut self, row: u32) -> &[u32] {
+        if self.levels.is_empty() {
+            return self.roots.get(row);
+        }
         self.is_visited = true;
         self.changed.clear();
         let root = self.basis[self.root..].iter_mut();
@@ -263,6 +302,21 @@ mod tests {
         }
         row.fill(7);
         assert_eq!(rows.find(row.iter().copied()), None);
+    }
+
+    #[test]
+    fn rows_that_share_little_are_kept_as_they_are() {
+        let mut rows = Rows::new(40);
+        let row = |number: u32| (0..40).map(move |place| number.wrapping_mul(2 * place + 3));
+        for number in 0..5000 {
+            assert_eq!(rows.intern(row(number)), (number, true));
+            assert_eq!(rows.levels.is_empty(), number + 1 >= super::TRIAL as u32);
+            assert!(rows.visit(number / 2).iter().copied().eq(row(number / 2)));
+        }
+        for number in 0..5000 {
+            assert_eq!(rows.find(row(number)), Some(number));
+            assert!(rows.get(number).into_iter().eq(row(number)));
+        }
     }
 
     #[test]
