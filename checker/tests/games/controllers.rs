@@ -303,7 +303,7 @@ fn check_every_second(first: usize) {
         }
     });
     assert!(controllers >= 20, "only {controllers} controllers");
-    assert!(points >= 5_000, "only {points} points");
+    assert!(points >= 7_500, "only {points} points");
 }
 
 #[test]
