@@ -13,7 +13,7 @@
 
 use crate::zones::{Bound, dbm};
 
-use crate::search::store::discrete_states::{hash_bytes, spread};
+use crate::search::store::hashing::{hash_bytes, spread};
 
 /// The least and the greatest number of places.
 const FEWEST_PLACES: usize = 1 << 8;

@@ -14,6 +14,7 @@
 
 use crate::ir::{Network, Shape};
 
+use super::hashing::hash_bytes;
 use super::records::Records;
 use super::rows::Rows;
 
@@ -132,20 +133,34 @@ fn widen<const N: usize>(bytes: &[u8], words: &mut [i32], from: impl Fn([u8; N])
     }
 }
 
+/// How the words of a state become a record.
+#[derive(Debug)]
+struct Format {
+    /// The words that decide identity.
+    identity: Vec<Run>,
+    /// The `meta` words that are stored.
+    meta: Vec<Run>,
+    /// The bytes that decide identity: whole numbers of a row, at least one.
+    identity_bytes: usize,
+}
+
+impl Format {
+    /// Writes a record, whose padding is 0; returns whether all words fit.
+    fn write(&self, words: &[i32], record: &mut [u8]) -> bool {
+        let (identity, meta) = record.split_at_mut(self.identity_bytes);
+        pack(&self.identity, words, identity) & pack(&self.meta, words, meta)
+    }
+}
+
 /// Stored discrete states.
 #[derive(Debug)]
 pub struct StateStore {
-    /// The words that are stored; those of the identity first.
-    runs: Vec<Run>,
-    /// How many runs belong to the identity.
-    identity_runs: usize,
-    /// The bytes of a record that decide identity: whole numbers of the row, at least one.
-    identity: usize,
+    format: Format,
     /// What the words are that are not stored.
     initial: Vec<i32>,
     rows: Rows,
-    /// By state: the bytes of its `meta` words.
-    meta: Records,
+    /// By state: the bytes of its `meta` words; nothing if there are none.
+    meta: Records<u8>,
     /// The record of the state that was packed last, or loaded.
     scratch: Vec<u8>,
 }
@@ -156,21 +171,21 @@ impl StateStore {
         let written = network.written_words();
         let widths = widths(network);
         let identity_words = network.layout.identity_words as usize;
-        let mut runs = runs_of(&written, &widths, 0, identity_words);
+        let identity = runs_of(&written, &widths, 0, identity_words);
+        let meta = runs_of(&written, &widths, identity_words, written.len());
         let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
-        let numbers = bytes(&runs).div_ceil(size_of::<u32>()).max(1);
-        let identity = numbers * size_of::<u32>();
-        let identity_runs = runs.len();
-        runs.extend(runs_of(&written, &widths, identity_words, written.len()));
-        let meta = bytes(&runs[identity_runs..]);
+        let numbers = bytes(&identity).div_ceil(size_of::<u32>()).max(1);
+        let (identity_bytes, meta_bytes) = (numbers * size_of::<u32>(), bytes(&meta));
         StateStore {
-            runs,
-            identity_runs,
-            identity,
+            format: Format {
+                identity,
+                meta,
+                identity_bytes,
+            },
             initial: network.initial.clone(),
             rows: Rows::new(numbers),
-            meta: Records::new(meta),
-            scratch: vec![0; identity + meta],
+            meta: Records::new(meta_bytes.max(1)),
+            scratch: vec![0; identity_bytes + meta_bytes],
         }
     }
 
@@ -184,11 +199,9 @@ impl StateStore {
     /// # Panics
     /// If a word lies outside the range of its variable.
     pub fn pack(&mut self, words: &[i32]) -> &[u8] {
-        let mut scratch = std::mem::take(&mut self.scratch);
-        let fits = self.write(words, &mut scratch);
+        let fits = self.format.write(words, &mut self.scratch);
         assert!(fits, "every word lies in the range of its variable");
-        self.scratch = scratch;
-        &self.scratch[..self.identity]
+        &self.scratch[..self.format.identity_bytes]
     }
 
     /// The id of a state, and whether it is new.
@@ -215,7 +228,7 @@ impl StateStore {
 
     /// The id of the state that was packed or taken over last, and whether it is new.
     pub(super) fn intern_proposed(&mut self) -> (DiscreteId, bool) {
-        let (identity, meta) = self.scratch.split_at(self.identity);
+        let (identity, meta) = self.scratch.split_at(self.format.identity_bytes);
         let (id, is_new) = self.rows.intern(row_of(identity));
         if is_new && !meta.is_empty() {
             self.meta.push(meta);
@@ -226,10 +239,12 @@ impl StateStore {
     /// The id of a stored state.
     pub fn find(&self, words: &[i32]) -> Option<DiscreteId> {
         let mut record = vec![0; self.scratch.len()];
-        if !self.write(words, &mut record) {
+        if !self.format.write(words, &mut record) {
             return None;
         }
-        let found = self.rows.find(row_of(&record[..self.identity]));
+        let found = self
+            .rows
+            .find(row_of(&record[..self.format.identity_bytes]));
         found.map(DiscreteId)
     }
 
@@ -242,7 +257,7 @@ impl StateStore {
 
     /// Writes the stored words of a state over those of another state of the same network.
     pub fn load(&self, id: DiscreteId, words: &mut [i32]) {
-        let mut bytes = vec![0; self.identity];
+        let mut bytes = vec![0; self.format.identity_bytes];
         set_row(&mut bytes, &self.rows.get(id.0));
         self.read(id, &bytes, words);
     }
@@ -250,23 +265,16 @@ impl StateStore {
     /// The same, but the next states that are stored are likely to differ from this one in few
     /// words: they are compared with it.
     pub fn visit(&mut self, id: DiscreteId, words: &mut [i32]) {
-        set_row(&mut self.scratch[..self.identity], self.rows.visit(id.0));
-        self.read(id, &self.scratch[..self.identity], words);
-    }
-
-    /// Writes a record, all of which is 0 or a record; returns whether all words fit.
-    fn write(&self, words: &[i32], record: &mut [u8]) -> bool {
-        let (identity, meta) = record.split_at_mut(self.identity);
-        let (of_identity, of_meta) = self.runs.split_at(self.identity_runs);
-        pack(of_identity, words, identity) & pack(of_meta, words, meta)
+        let identity = &mut self.scratch[..self.format.identity_bytes];
+        set_row(identity, self.rows.visit(id.0));
+        self.read(id, &self.scratch[..self.format.identity_bytes], words);
     }
 
     /// Writes the words of a state, whose identity has these bytes.
     fn read(&self, id: DiscreteId, identity: &[u8], words: &mut [i32]) {
-        let (of_identity, of_meta) = self.runs.split_at(self.identity_runs);
-        unpack(of_identity, identity, words);
-        if !of_meta.is_empty() {
-            unpack(of_meta, self.meta.get(id.0), words);
+        unpack(&self.format.identity, identity, words);
+        if !self.format.meta.is_empty() {
+            unpack(&self.format.meta, self.meta.get(id.0), words);
         }
     }
 }
@@ -354,45 +362,6 @@ fn runs_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec
         }
     }
     runs
-}
-
-/// A hash of bytes: four lanes of multiply and fold, so that the multiplications overlap.
-pub(in crate::search) fn hash_bytes(bytes: &[u8]) -> u32 {
-    const FACTORS: [u64; 4] = [
-        0x9e37_79b9_7f4a_7c15,
-        0xc2b2_ae3d_27d4_eb4f,
-        0x1656_67b1_9e37_79f9,
-        0xd6e8_feb8_6659_fd93,
-    ];
-    let mut lanes = FACTORS;
-    let (words, rest) = bytes.as_chunks::<8>();
-    let (blocks, others) = words.as_chunks::<4>();
-    let mut absorb = |lane: usize, word: [u8; 8]| {
-        lanes[lane] = fold(lanes[lane] ^ u64::from_le_bytes(word), FACTORS[lane]);
-    };
-    for block in blocks {
-        (0..4).for_each(|lane| absorb(lane, block[lane]));
-    }
-    for (lane, word) in others.iter().enumerate() {
-        absorb(lane, *word);
-    }
-    let mut last = [0; 8];
-    last[..rest.len()].copy_from_slice(rest);
-    absorb(3, last);
-    let all = lanes.iter().fold(bytes.len() as u64, |hash, lane| {
-        fold(hash ^ lane, FACTORS[0])
-    });
-    (all ^ (all >> 32)) as u32
-}
-
-fn fold(value: u64, factor: u64) -> u64 {
-    let product = value.wrapping_mul(factor);
-    product ^ (product >> 29)
-}
-
-/// The 64 bits that the table wants, from the 32 bits that are kept.
-pub(in crate::search) fn spread(hash: u32) -> u64 {
-    u64::from(hash).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
 
 #[cfg(test)]

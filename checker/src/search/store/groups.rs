@@ -6,22 +6,14 @@
 //!
 //! Cost: a group takes four bytes for each of its numbers, and six to eleven in the table.
 
-use crate::cancellation;
-
+use super::hashing::fold;
+use super::records::Records;
 use super::segmented_table::PiecedTable;
-
-/// Numbers in a block, about.
-const BLOCK_NUMBERS: usize = 1 << 14;
 
 /// Stored groups.
 #[derive(Debug)]
 pub(super) struct Groups {
-    width: usize,
-    /// The groups by their numbers, in blocks that are never moved.
-    blocks: Vec<Vec<u32>>,
-    /// Groups in a block, as a power of two.
-    block_bits: u32,
-    count: u32,
+    groups: Records<u32>,
     /// The numbers by the hashes of their groups.
     table: PiecedTable<u32>,
 }
@@ -30,29 +22,25 @@ impl Groups {
     /// No groups of this width.
     pub(super) fn new(width: usize) -> Groups {
         Groups {
-            width,
-            blocks: Vec::new(),
-            block_bits: (BLOCK_NUMBERS / width).max(1).ilog2(),
-            count: 0,
+            groups: Records::new(width),
             table: PiecedTable::new(),
         }
     }
 
     /// How many there are.
     pub(super) fn len(&self) -> usize {
-        self.count as usize
+        self.groups.len()
     }
 
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
-        let block = (self.width << self.block_bits) * size_of::<u32>();
-        self.blocks.len() * block + self.table.bytes()
+        self.groups.bytes() + self.table.bytes()
     }
 
     /// The group with a number.
     #[inline]
     pub(super) fn get(&self, number: u32) -> &[u32] {
-        at(&self.blocks, self.block_bits, self.width, number)
+        self.groups.get(number)
     }
 
     /// The number of a group, if it is stored.
@@ -79,27 +67,12 @@ impl Groups {
 
     #[inline(never)]
     fn push(&mut self, of_group: u64, group: &[u32]) -> u32 {
-        let number = cancellation::number(self.count as usize);
-        self.count += 1;
-        if number as usize >> self.block_bits == self.blocks.len() {
-            let block = Vec::with_capacity(self.width << self.block_bits);
-            self.blocks.push(block);
-        }
-        let block = self.blocks.last_mut();
-        block
-            .expect("a block was just made if there was none")
-            .extend_from_slice(group);
-        let (blocks, bits, width) = (&self.blocks, self.block_bits, self.width);
-        let hash_of = |&one: &u32| hash(at(blocks, bits, width, one));
-        self.table.insert_unique(of_group, number, hash_of);
+        let number = self.groups.push(group);
+        let groups = &self.groups;
+        self.table
+            .insert_unique(of_group, number, |&one| hash(groups.get(one)));
         number
     }
-}
-
-#[inline]
-fn at(blocks: &[Vec<u32>], bits: u32, width: usize, number: u32) -> &[u32] {
-    let within = number as usize & ((1 << bits) - 1);
-    &blocks[number as usize >> bits][within * width..][..width]
 }
 
 /// Whether two groups are the same. They are short, so that a call would take longer.
@@ -108,38 +81,27 @@ fn is_same(one: &[u32], other: &[u32]) -> bool {
 }
 
 /// Numbers that follow each other must differ in all bits: the table uses the upper and the lower
-/// ones.
+/// ones. Four lanes are mixed apart, so that the multiplications overlap.
 fn hash(group: &[u32]) -> u64 {
     const FACTOR: u64 = 0x9e37_79b9_7f4a_7c15;
-    // Of a long group four lanes are mixed apart, so that the multiplications overlap.
-    let (blocks, rest) = group.as_chunks::<8>();
     let mut lanes = [0x1656_67b1_9e37_79f9_u64, 1, 2, 3];
-    for block in blocks {
+    let mut absorb = |block: &[u32; 8]| {
         for (lane, &[first, second]) in lanes.iter_mut().zip(block.as_chunks::<2>().0) {
             let pair = u64::from(first) | u64::from(second) << 32;
-            *lane = (*lane ^ pair).wrapping_mul(FACTOR);
-            *lane ^= *lane >> 32;
+            *lane = fold(*lane ^ pair, FACTOR);
         }
+    };
+    let (blocks, rest) = group.as_chunks::<8>();
+    blocks.iter().for_each(&mut absorb);
+    if !rest.is_empty() {
+        let mut last = [0; 8];
+        last[..rest.len()].copy_from_slice(rest);
+        absorb(&last);
     }
-    let mut mixed = lanes[0];
-    if !blocks.is_empty() {
-        for lane in &lanes[1..] {
-            mixed = (mixed ^ lane).wrapping_mul(FACTOR);
-            mixed ^= mixed >> 32;
-        }
-    }
-    let (pairs, rest) = rest.as_chunks::<2>();
-    for &[first, second] in pairs {
-        let pair = u64::from(first) | u64::from(second) << 32;
-        mixed = (mixed ^ pair).wrapping_mul(FACTOR);
-        mixed ^= mixed >> 32;
-    }
-    for &last in rest {
-        mixed = (mixed ^ u64::from(last)).wrapping_mul(FACTOR);
-        mixed ^= mixed >> 32;
-    }
-    let mixed = mixed.wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
-    mixed ^ mixed >> 32
+    let all = lanes
+        .iter()
+        .fold(0, |mixed, lane| fold(mixed ^ lane, FACTOR));
+    all ^ (all >> 32)
 }
 
 #[cfg(test)]

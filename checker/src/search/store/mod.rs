@@ -2,6 +2,7 @@
 
 pub mod discrete_states;
 mod groups;
+pub(super) mod hashing;
 pub(super) mod packed_paths;
 pub(super) mod packed_zones;
 pub(super) mod passed_list;

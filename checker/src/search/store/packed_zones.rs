@@ -16,7 +16,7 @@ use crate::zones::simulation::{self, NO_DEMAND};
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
 
-use super::discrete_states::{hash_bytes, spread};
+use super::hashing::{hash_bytes, spread};
 use super::records::Records;
 use super::segmented_table::PiecedTable;
 use super::signature::{Signature, Signatures, widen_narrow};
@@ -210,7 +210,7 @@ pub(super) struct PackedZones {
     tuning: Tuning,
     signatures: Signatures,
     width: Width,
-    matrices: Records,
+    matrices: Records<u8>,
     /// The matrix that was proposed last.
     candidate: Vec<u8>,
     known: Known,

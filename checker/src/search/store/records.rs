@@ -1,37 +1,39 @@
-//! Byte strings of one length side by side, in blocks that are never moved.
+//! Records of one length, of bytes or of numbers, side by side in blocks that are never moved.
 
 use crate::cancellation;
 
 /// Bytes in one block, at least; a block holds a power of two of records.
 const BLOCK_BYTES: usize = 1 << 16;
 
-/// Byte strings of one length, by number from 0, in blocks that are never moved.
+/// Records of one length, by number from 0, in blocks that are never moved.
 #[derive(Debug)]
-pub(super) struct Records {
+pub(super) struct Records<T> {
+    /// How many parts a record has.
     size: usize,
     /// Records in a block, as a power of two.
     block_bits: u32,
-    pub(super) blocks: Vec<Vec<u8>>,
+    pub(super) blocks: Vec<Vec<T>>,
     count: u32,
 }
 
-impl Records {
-    pub(super) fn new(size: usize) -> Records {
+impl<T: Copy> Records<T> {
+    /// No records, of so many parts, at least one.
+    pub(super) fn new(size: usize) -> Records<T> {
         Records {
             size,
-            block_bits: (BLOCK_BYTES / size.max(1)).max(1).ilog2(),
+            block_bits: (BLOCK_BYTES / size_of::<T>() / size).max(1).ilog2(),
             blocks: Vec::new(),
             count: 0,
         }
     }
 
     #[inline]
-    pub(super) fn get(&self, id: u32) -> &[u8] {
+    pub(super) fn get(&self, id: u32) -> &[T] {
         let (block, first) = self.place(id);
         &self.blocks[block][first..first + self.size]
     }
 
-    pub(super) fn get_mut(&mut self, id: u32) -> &mut [u8] {
+    pub(super) fn get_mut(&mut self, id: u32) -> &mut [T] {
         let (block, first) = self.place(id);
         &mut self.blocks[block][first..first + self.size]
     }
@@ -43,7 +45,7 @@ impl Records {
         (id as usize >> self.block_bits, within * self.size)
     }
 
-    pub(super) fn push(&mut self, record: &[u8]) -> u32 {
+    pub(super) fn push(&mut self, record: &[T]) -> u32 {
         let id = cancellation::number(self.count as usize);
         self.count += 1;
         if id as usize >> self.block_bits == self.blocks.len() {
@@ -57,6 +59,18 @@ impl Records {
         id
     }
 
+    /// How many there are.
+    pub(super) fn len(&self) -> usize {
+        self.count as usize
+    }
+
+    /// The bytes that they take.
+    pub(super) fn bytes(&self) -> usize {
+        self.blocks.len() * (self.size << self.block_bits) * size_of::<T>()
+    }
+}
+
+impl Records<u8> {
     /// Doubles the bytes of entries, block by block, so that the old and the new blocks never exist
     /// together.
     pub(super) fn widen(&mut self, widened: impl Fn(&[u8], &mut Vec<u8>)) {
@@ -67,9 +81,5 @@ impl Records {
             widened(block, &mut wide);
             *block = wide;
         }
-    }
-
-    pub(super) fn bytes(&self) -> usize {
-        self.blocks.len() * (self.size << self.block_bits)
     }
 }

@@ -32,7 +32,7 @@ const TRIAL: usize = 4096;
 /// Trees that take more than this part of the rows themselves are not worth the time.
 const WORTH: f64 = 0.3;
 
-/// Where a level stands: `length` groups of numbers.
+/// Where a level stands, and how many groups it has.
 #[derive(Clone, Copy, Debug)]
 struct Level {
     first: usize,
@@ -52,12 +52,12 @@ pub(super) struct Rows {
     roots: Groups,
     /// The numbers of all levels of the basis, then those of its root.
     basis: Vec<u32>,
+    /// Where the root begins there.
+    root: usize,
     /// Whether the basis is a row that was visited; else it is that which was stored last.
     is_visited: bool,
     /// What the basis had before a row was stored: places and numbers.
     before: Vec<(u32, u32)>,
-    /// Where the root begins there.
-    root: usize,
     /// The groups that have changed in the level at hand, and in that above it.
     changed: Vec<usize>,
     changed_above: Vec<usize>,
@@ -101,7 +101,7 @@ impl Rows {
     }
 
     /// The number of a row, and whether it is new. It becomes the basis, unless that was visited.
-    pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
+    pub(super) fn intern(&mut self, mut row: impl Iterator<Item = u32>) -> (u32, bool) {
         if self.levels.is_empty() {
             for (known, number) in self.basis.iter_mut().zip(row) {
                 *known = number;
@@ -111,7 +111,6 @@ impl Rows {
         self.changed.clear();
         self.before.clear();
         let groups = self.basis[..self.length].chunks_mut(self.width);
-        let mut row = row;
         for (place, group) in groups.enumerate() {
             let mut is_changed = false;
             for (within, (known, number)) in group.iter_mut().zip(&mut row).enumerate() {
@@ -139,6 +138,7 @@ impl Rows {
         found
     }
 
+    /// Whether rows have so little in common that trees are not worth the time.
     fn shares_little(&self) -> bool {
         let groups = self.groups.len() * self.width;
         groups as f64 > WORTH * (self.roots.len() * self.length) as f64
