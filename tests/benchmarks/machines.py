@@ -38,11 +38,9 @@ class Cost:
 def cost(python: str, model: Path, query: str, limit_s: float) -> Cost:
     """Asks a query in a new process."""
     command = [python, "-m", "ntagen", "check", str(model), "--query", query, "--json"]
-    options = ["--timeout", str(limit_s)]
+    command += ["--timeout", str(limit_s)]
     # Python takes packages from the current folder first, which must not be a clone.
-    with subprocess.Popen(
-        [*command, *options], stdout=subprocess.PIPE, text=True, cwd=FOLDER
-    ) as run:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=FOLDER) as run:
         assert run.stdout is not None
         answer = json.loads(run.stdout.read().splitlines()[-1])
         _, run.returncode, usage = os.wait4(run.pid, 0)
@@ -82,16 +80,12 @@ def main() -> None:
                     f"{own.bytes_of_state / other.bytes_of_state:.2f}",
                     f"{own.us_of_state / other.us_of_state:.2f}",
                 ]
-            costs = f"{own.bytes_of_state:.0f}", f"{own.us_of_state:.2f}"
-            row = (
-                model.stem,
-                query,
-                own.verdict,
-                own.states,
-                *costs,
+            costs = [
+                f"{own.bytes_of_state:.0f}",
+                f"{own.us_of_state:.2f}",
                 f"{own.resident_mb:.0f}",
-                *ratios,
-            )
+            ]
+            row = [model.stem, query, own.verdict, own.states, *costs, *ratios]
             print(ROW.format(*row), flush=True)
     if not is_same:
         raise SystemExit("verdicts differ")
