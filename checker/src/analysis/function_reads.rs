@@ -1,4 +1,5 @@
-//! Which words of a state a function may read, if its code shows it without being run.
+//! Which words of a state a function may read, and which of its parameters, if its code shows it
+//! without being run.
 
 use std::ops::Range;
 
@@ -47,6 +48,23 @@ pub(crate) fn read_words(
         words.dedup();
     }
     (words.len() <= most).then_some(words)
+}
+
+/// Whether a function reads its parameters, for each of them.
+pub(crate) fn read_parameters(function: &Function) -> Vec<bool> {
+    let mut is_read = vec![false; function.parameters as usize];
+    let mut read = |register: Register| {
+        if let Some(is_read) = is_read.get_mut(register.0 as usize) {
+            *is_read = true;
+        }
+    };
+    for block in &function.blocks {
+        for instruction in &block.instructions {
+            instruction.each_use(&mut read);
+        }
+        block.terminator.used().into_iter().for_each(&mut read);
+    }
+    is_read
 }
 
 /// The words of the state that an access to `count` words may touch; `None` if that is not known,

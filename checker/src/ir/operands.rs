@@ -197,6 +197,21 @@ impl Instruction {
         found
     }
 
+    /// Visits the registers that it reads, those of its addresses and clocks included.
+    pub(crate) fn each_use(&self, visit: &mut dyn FnMut(Register)) {
+        self.each_operand(&mut |operand| match operand {
+            Operand::Target(_) => {}
+            Operand::Source(&register) => visit(register),
+            Operand::Memory(&address, _) => {
+                if let Base::Register(register) = address.base {
+                    visit(register);
+                }
+                address.index.into_iter().for_each(&mut *visit);
+            }
+            Operand::Clock(clock) => clock.index.into_iter().for_each(&mut *visit),
+        });
+    }
+
     /// Visits the registers that it reads, those of its addresses and clocks included, to change
     /// them.
     pub(crate) fn each_use_mut(&mut self, visit: &mut dyn FnMut(&mut Register)) {
@@ -234,6 +249,17 @@ impl Instruction {
 }
 
 impl Terminator {
+    /// The register that it reads.
+    pub(crate) fn used(&self) -> Option<Register> {
+        match *self {
+            Terminator::Branch(condition, ..) | Terminator::Switch(condition, ..) => {
+                Some(condition)
+            }
+            Terminator::Return(result) => result,
+            Terminator::Jump(_) | Terminator::Fail(..) => None,
+        }
+    }
+
     /// The register that it reads, to change it.
     pub(crate) fn used_mut(&mut self) -> Option<&mut Register> {
         match self {

@@ -2,6 +2,7 @@
 //! corpus and on random networks.
 
 mod activity;
+mod asked;
 mod certificates;
 #[path = "../common/checks.rs"]
 #[allow(dead_code, reason = "this program asks in some of the ways only")]

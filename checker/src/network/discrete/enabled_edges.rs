@@ -14,6 +14,8 @@ use super::edge_tables::EdgeEntry;
 use super::selects::select_values;
 use super::stepper::Stepper;
 use super::transition::Moves;
+use super::transition_cache::Record;
+use crate::analysis::function_reads::read_parameters;
 use crate::network::failure::Failure;
 
 /// The number that stands for no channel.
@@ -308,9 +310,36 @@ impl<'a> Stepper<'a> {
         function: FunctionId,
         words: &mut [i32],
     ) -> Result<i32, RunTimeError> {
-        if let Some(record) = &self.record
-            && let Some(answer) = record.answer(function, &self.arguments)
-        {
+        if let Some(mut record) = self.record.take() {
+            let answer = self.recorded_call(executor, function, words, &mut record);
+            self.record = Some(record);
+            return answer;
+        }
+        let mut context = Context {
+            state: words,
+            constraints: &mut self.constraints,
+            assignments: &mut self.assignments,
+        };
+        executor.call(function, &self.arguments, &mut context)
+    }
+
+    /// The same while a record is made: what was asked before is not asked again. That instances of
+    /// an edge differ in values that its function does not read is no reason to ask.
+    fn recorded_call(
+        &mut self,
+        executor: &dyn Executor,
+        function: FunctionId,
+        words: &mut [i32],
+        record: &mut Record,
+    ) -> Result<i32, RunTimeError> {
+        let code = &self.network.functions[function.0 as usize];
+        let is_read = self.read_parameters.entry(function);
+        let is_read = is_read.or_insert_with(|| read_parameters(code));
+        let read = self.arguments.iter().zip(is_read);
+        let arguments: Vec<i32> = read
+            .map(|(&value, &mut is_read)| if is_read { value } else { 0 })
+            .collect();
+        if let Some(answer) = record.answer(function, &arguments) {
             return Ok(answer);
         }
         let mut context = Context {
@@ -318,10 +347,8 @@ impl<'a> Stepper<'a> {
             constraints: &mut self.constraints,
             assignments: &mut self.assignments,
         };
-        let answer = executor.call(function, &self.arguments, &mut context)?;
-        if let Some(record) = &mut self.record {
-            record.note(function, &self.arguments, answer);
-        }
+        let answer = executor.call(function, &arguments, &mut context)?;
+        record.note(function, arguments.into(), answer);
         Ok(answer)
     }
 }

@@ -12,6 +12,8 @@
 
 use std::ops::Range;
 
+use rustc_hash::FxHashMap;
+
 use crate::cancellation;
 use crate::exec::{Context, EmittedAssignment, Executor, RunTimeError};
 use crate::ir::{
@@ -70,6 +72,8 @@ pub struct Stepper<'a> {
     pub(super) transitions: TransitionCache,
     /// What is evaluated while moves are made for the cache.
     pub(super) record: Option<Record>,
+    /// Which of its arguments a function reads, for those that were recorded.
+    pub(super) read_parameters: FxHashMap<FunctionId, Vec<bool>>,
 }
 
 /// What the cache knows about the moves of a state.
@@ -121,6 +125,7 @@ impl<'a> Stepper<'a> {
             moves_beside: 0,
             transitions: TransitionCache::new(network.processes.len()),
             record: None,
+            read_parameters: FxHashMap::default(),
         }
     }
 

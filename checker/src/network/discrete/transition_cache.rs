@@ -74,7 +74,8 @@ enum Knowledge {
     Unsuited,
 }
 
-/// The functions that were evaluated while moves were put together.
+/// The functions that were evaluated while moves were put together. Arguments that a function does
+/// not read are 0.
 #[derive(Debug, Default)]
 pub(super) struct Record {
     asked: Vec<(FunctionId, Box<[i32]>, i32)>,
@@ -92,10 +93,10 @@ impl Record {
     }
 
     /// Takes down an answer.
-    pub(super) fn note(&mut self, function: FunctionId, arguments: &[i32], answer: i32) {
+    pub(super) fn note(&mut self, function: FunctionId, arguments: Box<[i32]>, answer: i32) {
         self.is_unsuited |= self.asked.len() == MOST_QUESTIONS;
         if !self.is_unsuited {
-            self.asked.push((function, arguments.into(), answer));
+            self.asked.push((function, arguments, answer));
         }
     }
 
