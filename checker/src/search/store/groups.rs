@@ -4,18 +4,18 @@
 //! * Two groups get the same number exactly if they are equal.
 //! * Numbers count from 0 in the order of first insertion.
 //!
-//! Cost: a group takes four bytes for each of its numbers, and six to eleven in the table.
+//! Cost: a group takes four bytes for each of its numbers, and six to nine in the table.
 
+use super::bucket_table::BucketTable;
 use super::hashing::fold;
 use super::records::Records;
-use super::segmented_table::PiecedTable;
 
 /// Stored groups.
 #[derive(Debug)]
 pub(super) struct Groups {
     groups: Records<u32>,
     /// The numbers by the hashes of their groups.
-    table: PiecedTable<u32>,
+    table: BucketTable,
 }
 
 impl Groups {
@@ -23,7 +23,7 @@ impl Groups {
     pub(super) fn new(width: usize) -> Groups {
         Groups {
             groups: Records::new(width),
-            table: PiecedTable::new(),
+            table: BucketTable::new(),
         }
     }
 
@@ -51,8 +51,8 @@ impl Groups {
 
     #[inline]
     fn find_hashed(&self, hash: u64, group: &[u32]) -> Option<u32> {
-        let is_it = |&one: &u32| is_same(self.get(one), group);
-        self.table.find(hash, is_it).copied()
+        let is_it = |one| is_same(self.get(one), group);
+        self.table.find(hash, is_it)
     }
 
     /// The number of a group, and whether it is new.
@@ -69,8 +69,7 @@ impl Groups {
     fn push(&mut self, of_group: u64, group: &[u32]) -> u32 {
         let number = self.groups.push(group);
         let groups = &self.groups;
-        self.table
-            .insert_unique(of_group, number, |&one| hash(groups.get(one)));
+        self.table.push(of_group, |one| hash(groups.get(one)));
         number
     }
 }
@@ -94,9 +93,10 @@ fn hash(group: &[u32]) -> u64 {
     let (blocks, rest) = group.as_chunks::<8>();
     blocks.iter().for_each(&mut absorb);
     if !rest.is_empty() {
-        let mut last = [0; 8];
-        last[..rest.len()].copy_from_slice(rest);
-        absorb(&last);
+        // A copy of so few numbers is not worth a call.
+        absorb(&std::array::from_fn(|place| {
+            rest.get(place).copied().unwrap_or(0)
+        }));
     }
     let all = lanes
         .iter()

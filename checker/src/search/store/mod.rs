@@ -1,5 +1,6 @@
 //! Where states are kept: discrete states, packed zones, the passed list.
 
+mod bucket_table;
 pub mod discrete_states;
 mod groups;
 pub(super) mod hashing;
