@@ -18,6 +18,12 @@ use super::hashing::hash_bytes;
 use super::records::Records;
 use super::rows::Rows;
 
+/// Why a state is always packed.
+const FITS: &str = "every word lies in the range of its variable";
+
+/// Words that are compared at once.
+const BLOCK: usize = 16;
+
 /// The index of a stored discrete state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DiscreteId(pub u32);
@@ -47,6 +53,19 @@ impl Width {
         } else {
             Width::Whole
         }
+    }
+
+    /// The bytes of a value, the lowest first, if it fits.
+    #[inline]
+    fn packed(self, value: i32) -> Option<[u8; 4]> {
+        let fits = match self {
+            Width::Byte => value == i32::from(value as u8),
+            Width::SignedByte => value == i32::from(value as i8),
+            Width::Short => value == i32::from(value as u16),
+            Width::SignedShort => value == i32::from(value as i16),
+            Width::Whole => true,
+        };
+        fits.then_some(value.to_le_bytes())
     }
 
     fn bytes(self) -> usize {
@@ -142,6 +161,8 @@ struct Format {
     meta: Vec<Run>,
     /// The bytes that decide identity: whole numbers of a row, at least one.
     identity_bytes: usize,
+    /// By word that may decide identity: what it is stored as, and from which byte on.
+    places: Vec<(Width, u32)>,
 }
 
 impl Format {
@@ -163,6 +184,8 @@ pub struct StateStore {
     meta: Records<u8>,
     /// The record of the state that was packed last, or loaded.
     scratch: Vec<u8>,
+    /// The words of the state that was visited last.
+    visited: Vec<i32>,
 }
 
 impl StateStore {
@@ -176,11 +199,21 @@ impl StateStore {
         let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
         let numbers = bytes(&identity).div_ceil(size_of::<u32>()).max(1);
         let (identity_bytes, meta_bytes) = (numbers * size_of::<u32>(), bytes(&meta));
+        let mut places = vec![(Width::Whole, 0); identity_words];
+        let mut first = 0;
+        for run in &identity {
+            for place in &mut places[run.first..run.first + run.count] {
+                *place = (run.width, first);
+                first += run.width.bytes() as u32;
+            }
+        }
         StateStore {
+            visited: Vec::new(),
             format: Format {
                 identity,
                 meta,
                 identity_bytes,
+                places,
             },
             initial: network.initial.clone(),
             rows: Rows::new(numbers),
@@ -200,14 +233,51 @@ impl StateStore {
     /// If a word lies outside the range of its variable.
     pub fn pack(&mut self, words: &[i32]) -> &[u8] {
         let fits = self.format.write(words, &mut self.scratch);
-        assert!(fits, "every word lies in the range of its variable");
+        assert!(fits, "{FITS}");
         &self.scratch[..self.format.identity_bytes]
     }
 
     /// The id of a state, and whether it is new.
+    ///
+    /// # Panics
+    /// If a word lies outside the range of its variable.
     pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
-        self.pack(words);
-        self.intern_proposed()
+        if !self.rows.is_visited() {
+            self.pack(words);
+            return self.intern_proposed();
+        }
+        self.change(words);
+        let (id, is_new) = self.rows.intern_set();
+        if is_new && !self.format.meta.is_empty() {
+            let meta = &mut self.scratch[self.format.identity_bytes..];
+            assert!(pack(&self.format.meta, words, meta), "{FITS}");
+            self.meta.push(meta);
+        }
+        (DiscreteId(id), is_new)
+    }
+
+    /// Changes the row of the state that was visited last where these words differ from it.
+    fn change(&mut self, words: &[i32]) {
+        let places = &self.format.places;
+        let blocks = words[..places.len()].chunks(BLOCK);
+        let visited = self.visited[..places.len()].chunks(BLOCK);
+        for (number, (block, visited)) in blocks.zip(visited).enumerate() {
+            if block == visited {
+                continue;
+            }
+            for (within, (word, visited)) in block.iter().zip(visited).enumerate() {
+                if word == visited {
+                    continue;
+                }
+                let (width, first) = places[number * BLOCK + within];
+                let bytes = width.packed(*word).expect(FITS);
+                for (byte, place) in bytes[..width.bytes()].iter().zip(first..) {
+                    let (place, shift) = (place as usize / 4, place % 4 * 8);
+                    let others = self.rows.number(place) & !(0xff << shift);
+                    self.rows.set(place, others | u32::from(*byte) << shift);
+                }
+            }
+        }
     }
 
     /// Packs a state, for [`StateStore::intern_proposed`] or for another store of the same network;
@@ -268,6 +338,8 @@ impl StateStore {
         let identity = &mut self.scratch[..self.format.identity_bytes];
         set_row(identity, self.rows.visit(id.0));
         self.read(id, &self.scratch[..self.format.identity_bytes], words);
+        self.visited.clear();
+        self.visited.extend_from_slice(words);
     }
 
     /// Writes the words of a state, whose identity has these bytes.
@@ -366,6 +438,8 @@ fn runs_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec
 
 #[cfg(test)]
 mod tests {
+    use rustc_hash::FxHashMap;
+
     use super::*;
     use crate::ir::Layout;
     use crate::ir::Update;
@@ -390,6 +464,7 @@ mod tests {
                     meta: false,
                 }],
             },
+            initial: vec![0; words as usize],
             before_update: Some(update),
             ..Network::default()
         }
@@ -426,6 +501,42 @@ mod tests {
                 store.load(id, &mut loaded);
                 assert_eq!(loaded, state);
             }
+        }
+    }
+
+    #[test]
+    fn states_that_differ_from_a_visited_one_in_few_words_come_back() {
+        let field = |low, high| (String::new(), Shape::Integer { low, high });
+        let record = Shape::Struct(vec![field(0, 200), field(-300, 300), field(-9, 9)]);
+        let whole = Shape::Array {
+            part: Box::new(record),
+            length: 40,
+            first: 0,
+            set: None,
+        };
+        let mut store = StateStore::new(&network(whole));
+        let mut known: FxHashMap<Vec<i32>, DiscreteId> = FxHashMap::default();
+        let (mut words, mut state) = (vec![0; 120], 1_u64);
+        let mut next = |below: usize| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005) + 1;
+            (state >> 33) as usize % below
+        };
+        for _ in 0..4000 {
+            let visited = DiscreteId(next(known.len().max(1)) as u32);
+            let (first, is_new) = store.intern(&words);
+            assert_eq!(*known.entry(words.clone()).or_insert(first), first);
+            assert!(!is_new || first.0 as usize + 1 == known.len());
+            store.visit(visited, &mut words);
+            assert_eq!(known[&words], visited);
+            for _ in 0..next(4) {
+                let (record, field) = (next(40), next(3));
+                words[3 * record + field] = [3, -256, -1][field] * next(3) as i32;
+            }
+        }
+        for id in (0..known.len() as u32).map(DiscreteId) {
+            let words = store.words(id);
+            assert_eq!(known[&words], id);
+            assert_eq!(store.find(&words), Some(id));
         }
     }
 

@@ -101,8 +101,8 @@ impl PassedList {
 
     /// Stores a state, unless a stored one contains it.
     pub(in crate::search) fn add(&mut self, words: &[i32], zone: Kept<'_>) -> Option<Stored> {
-        self.store.pack(words);
-        self.add_proposed(zone)
+        let interned = self.store.intern(words);
+        self.add_interned(interned, zone)
     }
 
     /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another
@@ -123,7 +123,16 @@ impl PassedList {
 
     /// As [`PassedList::add`], for the words that were proposed last.
     pub(in crate::search) fn add_proposed(&mut self, zone: Kept<'_>) -> Option<Stored> {
-        let (discrete, is_new) = self.store.intern_proposed();
+        let interned = self.store.intern_proposed();
+        self.add_interned(interned, zone)
+    }
+
+    /// Adds a zone to a discrete state that is or is not new.
+    fn add_interned(
+        &mut self,
+        (discrete, is_new): (DiscreteId, bool),
+        zone: Kept<'_>,
+    ) -> Option<Stored> {
         if !self.has_clocks {
             return is_new.then(|| self.stored(discrete, ZoneId(0)));
         }

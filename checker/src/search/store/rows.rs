@@ -92,6 +92,8 @@ impl Rows {
             changed_above: Vec::new(),
         };
         rows.change_upper();
+        rows.changed.clear();
+        rows.before.clear();
         rows
     }
 
@@ -100,38 +102,57 @@ impl Rows {
         self.groups.bytes() + self.roots.bytes()
     }
 
+    /// Whether rows are compared with one that was visited.
+    pub(super) fn is_visited(&self) -> bool {
+        self.is_visited
+    }
+
     /// The number of a row, and whether it is new. It becomes the basis, unless that was visited.
-    pub(super) fn intern(&mut self, mut row: impl Iterator<Item = u32>) -> (u32, bool) {
+    pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
         if self.levels.is_empty() {
             for (known, number) in self.basis.iter_mut().zip(row) {
                 *known = number;
             }
             return self.roots.intern(&self.basis);
         }
-        self.changed.clear();
-        self.before.clear();
-        let groups = self.basis[..self.length].chunks_mut(self.width);
-        for (place, group) in groups.enumerate() {
-            let mut is_changed = false;
-            for (within, (known, number)) in group.iter_mut().zip(&mut row).enumerate() {
-                if *known != number {
-                    self.before
-                        .push(((place * self.width + within) as u32, *known));
-                    *known = number;
-                    is_changed = true;
-                }
-            }
-            if is_changed {
-                self.changed.push(place);
+        for (place, number) in row.enumerate() {
+            self.set(place, number);
+        }
+        self.intern_set()
+    }
+
+    /// Changes a number of the basis, until [`Rows::intern_set`]. Places must ascend.
+    #[inline]
+    pub(super) fn set(&mut self, place: usize, number: u32) {
+        let known = self.basis[place];
+        if known != number {
+            self.before.push((place as u32, known));
+            self.basis[place] = number;
+            let group = place / self.width;
+            if self.changed.last() != Some(&group) {
+                self.changed.push(group);
             }
         }
+    }
+
+    /// A number of the basis, as it was set.
+    #[inline]
+    pub(super) fn number(&self, place: usize) -> u32 {
+        self.basis[place]
+    }
+
+    /// Like [`Rows::intern`], for the basis as it was set.
+    pub(super) fn intern_set(&mut self) -> (u32, bool) {
         self.change_upper();
         let found = self.roots.intern(&self.basis[self.root..]);
         if self.is_visited {
-            for &(place, number) in &self.before {
+            // A place that was set twice has what it was at first.
+            for &(place, number) in self.before.iter().rev() {
                 self.basis[place as usize] = number;
             }
         }
+        self.changed.clear();
+        self.before.clear();
         if found == (TRIAL as u32 - 1, true) && self.shares_little() {
             *self = self.flat();
         }
