@@ -184,8 +184,8 @@ pub struct StateStore {
     meta: Records<u8>,
     /// The record of the state that was packed last, or loaded.
     scratch: Vec<u8>,
-    /// The words of the state that was visited last.
-    visited: Vec<i32>,
+    /// The words of the state with which rows are compared; none if they are not known.
+    basis: Vec<i32>,
 }
 
 impl StateStore {
@@ -208,7 +208,7 @@ impl StateStore {
             }
         }
         StateStore {
-            visited: Vec::new(),
+            basis: Vec::new(),
             format: Format {
                 identity,
                 meta,
@@ -242,12 +242,15 @@ impl StateStore {
     /// # Panics
     /// If a word lies outside the range of its variable.
     pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
-        if !self.rows.is_visited() {
+        if self.basis.is_empty() || self.rows.is_flat() {
             self.pack(words);
-            return self.intern_proposed();
+            let found = self.intern_proposed();
+            self.stored(words);
+            return found;
         }
         self.change(words);
         let (id, is_new) = self.rows.intern_set();
+        self.stored(words);
         if is_new && !self.format.meta.is_empty() {
             let meta = &mut self.scratch[self.format.identity_bytes..];
             assert!(pack(&self.format.meta, words, meta), "{FITS}");
@@ -256,17 +259,25 @@ impl StateStore {
         (DiscreteId(id), is_new)
     }
 
-    /// Changes the row of the state that was visited last where these words differ from it.
+    /// Notes that rows are compared with this state, which was just stored, unless one was visited.
+    fn stored(&mut self, words: &[i32]) {
+        if !self.rows.is_visited() && !self.rows.is_flat() {
+            self.basis.clear();
+            self.basis.extend_from_slice(words);
+        }
+    }
+
+    /// Changes the basis of rows where these words differ from it.
     fn change(&mut self, words: &[i32]) {
         let places = &self.format.places;
         let blocks = words[..places.len()].chunks(BLOCK);
-        let visited = self.visited[..places.len()].chunks(BLOCK);
-        for (number, (block, visited)) in blocks.zip(visited).enumerate() {
-            if block == visited {
+        let basis = self.basis[..places.len()].chunks(BLOCK);
+        for (number, (block, basis)) in blocks.zip(basis).enumerate() {
+            if block == basis {
                 continue;
             }
-            for (within, (word, visited)) in block.iter().zip(visited).enumerate() {
-                if word == visited {
+            for (within, (word, known)) in block.iter().zip(basis).enumerate() {
+                if word == known {
                     continue;
                 }
                 let (width, first) = places[number * BLOCK + within];
@@ -300,6 +311,9 @@ impl StateStore {
     pub(super) fn intern_proposed(&mut self) -> (DiscreteId, bool) {
         let (identity, meta) = self.scratch.split_at(self.format.identity_bytes);
         let (id, is_new) = self.rows.intern(row_of(identity));
+        if !self.rows.is_visited() {
+            self.basis.clear();
+        }
         if is_new && !meta.is_empty() {
             self.meta.push(meta);
         }
@@ -338,8 +352,8 @@ impl StateStore {
         let identity = &mut self.scratch[..self.format.identity_bytes];
         set_row(identity, self.rows.visit(id.0));
         self.read(id, &self.scratch[..self.format.identity_bytes], words);
-        self.visited.clear();
-        self.visited.extend_from_slice(words);
+        self.basis.clear();
+        self.basis.extend_from_slice(words);
     }
 
     /// Writes the words of a state, whose identity has these bytes.
@@ -505,7 +519,12 @@ mod tests {
     }
 
     #[test]
-    fn states_that_differ_from_a_visited_one_in_few_words_come_back() {
+    fn states_that_differ_in_few_words_come_back() {
+        check_few_changes(true);
+        check_few_changes(false);
+    }
+
+    fn check_few_changes(visits: bool) {
         let field = |low, high| (String::new(), Shape::Integer { low, high });
         let record = Shape::Struct(vec![field(0, 200), field(-300, 300), field(-9, 9)]);
         let whole = Shape::Array {
@@ -526,8 +545,16 @@ mod tests {
             let (first, is_new) = store.intern(&words);
             assert_eq!(*known.entry(words.clone()).or_insert(first), first);
             assert!(!is_new || first.0 as usize + 1 == known.len());
-            store.visit(visited, &mut words);
+            if visits {
+                store.visit(visited, &mut words);
+            } else {
+                store.load(visited, &mut words);
+            }
             assert_eq!(known[&words], visited);
+            if next(9) == 0 {
+                store.pack(&words);
+                assert_eq!(store.intern_proposed(), (visited, false));
+            }
             for _ in 0..next(4) {
                 let (record, field) = (next(40), next(3));
                 words[3 * record + field] = [3, -256, -1][field] * next(3) as i32;

@@ -107,9 +107,14 @@ impl Rows {
         self.is_visited
     }
 
+    /// Whether rows are kept as they are.
+    pub(super) fn is_flat(&self) -> bool {
+        self.levels.is_empty()
+    }
+
     /// The number of a row, and whether it is new. It becomes the basis, unless that was visited.
     pub(super) fn intern(&mut self, row: impl Iterator<Item = u32>) -> (u32, bool) {
-        if self.levels.is_empty() {
+        if self.is_flat() {
             for (known, number) in self.basis.iter_mut().zip(row) {
                 *known = number;
             }
@@ -213,7 +218,7 @@ impl Rows {
 
     /// Makes a stored row the basis, and returns it.
     pub(super) fn visit(&mut self, row: u32) -> &[u32] {
-        if self.levels.is_empty() {
+        if self.is_flat() {
             return self.roots.get(row);
         }
         self.is_visited = true;
@@ -253,11 +258,11 @@ impl Rows {
     pub(super) fn get(&self, row: u32) -> Vec<u32> {
         let mut numbers = self.roots.get(row).to_vec();
         for level in self.levels.iter().rev() {
-            let groups = numbers[..level.groups].iter();
-            numbers = groups
-                .flat_map(|&number| self.groups.get(number))
-                .copied()
-                .collect();
+            let mut below = Vec::with_capacity(level.groups * self.width);
+            for &number in &numbers[..level.groups] {
+                below.extend_from_slice(self.groups.get(number));
+            }
+            numbers = below;
         }
         numbers.truncate(self.length);
         numbers
