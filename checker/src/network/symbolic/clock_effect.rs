@@ -46,17 +46,25 @@ impl ClockEffect {
     /// Whether the move is possible at all valuations of a zone; false if it copies clocks, since
     /// then this is not known.
     pub fn keeps_all_of(&self, zone: &Zone) -> bool {
-        let dimension = zone.dimension();
-        let mut after = zone.clone();
-        let holds = |zone: &Zone, one: &Constraint| {
-            zone.bounds()[one.left * dimension + one.right] <= one.bound
-        };
+        self.guard.iter().all(|one| holds(zone, one)) && self.enters_from_all_of(zone)
+    }
+
+    /// The part of a zone in which the guard holds, if the move is known to be possible in all of
+    /// it.
+    pub fn guarded_part(&self, zone: &Zone) -> Option<Zone> {
+        let mut part = zone.clone();
+        let is_known = part.constrain_all(&self.guard) && self.enters_from_all_of(&part);
+        is_known.then_some(part)
+    }
+
+    /// Whether nothing but the guard can forbid the move in a zone; false if that is not known.
+    fn enters_from_all_of(&self, zone: &Zone) -> bool {
         let only_sets = |one: &Assignment| matches!(one, Assignment::Value { .. });
-        self.excluded.is_empty()
-            && self.assignments.iter().all(only_sets)
-            && self.guard.iter().all(|one| holds(zone, one))
-            && after.assign(&self.assignments)
-            && self.invariant.iter().all(|one| holds(&after, one))
+        if !self.excluded.is_empty() || !self.assignments.iter().all(only_sets) {
+            return false;
+        }
+        let mut after = zone.clone();
+        after.assign(&self.assignments) && self.invariant.iter().all(|one| holds(&after, one))
     }
 
     /// The zones on entry of the target: those valuations of the source's zone that satisfy the
@@ -115,6 +123,11 @@ impl ClockEffect {
             federation.subtract_conjunction(conjunction);
         }
     }
+}
+
+/// Whether a constraint holds in all of a zone.
+fn holds(zone: &Zone, one: &Constraint) -> bool {
+    zone.bounds()[one.left * zone.dimension() + one.right] <= one.bound
 }
 
 pub(super) fn check_limit(value: i32) -> Result<(), Failure> {

@@ -42,15 +42,34 @@ impl<'z> Entry<'z> {
     }
 }
 
-impl Inside {
-    /// What a run inside the predicate can reach by delay from its entry into a state.
-    pub(super) fn of(
+/// Finds what runs inside a predicate can reach by delay.
+#[derive(Debug)]
+pub(super) struct Delays<'p> {
+    keep: &'p Predicate,
+    /// The moves of a state, and the words after one of them.
+    moves: Moves,
+    target: Vec<i32>,
+}
+
+impl<'p> Delays<'p> {
+    /// For runs inside this predicate.
+    pub(super) fn inside(keep: &'p Predicate) -> Delays<'p> {
+        Delays {
+            keep,
+            moves: Moves::default(),
+            target: Vec::new(),
+        }
+    }
+
+    /// What a run can reach by delay from its entry into a state.
+    pub(super) fn from(
+        &mut self,
         symbolic: &mut Symbolic<'_>,
-        keep: &Predicate,
         words: &mut [i32],
         entry: Entry<'_>,
         invariant: &[Constraint],
     ) -> Result<Inside, Failure> {
+        let keep = self.keep;
         let dimension = symbolic.dimension();
         let may_delay = symbolic.may_delay(words)?;
         let mut whole = entry.zone.clone();
@@ -59,6 +78,13 @@ impl Inside {
             Extent::Nowhere => {
                 return Ok(Inside {
                     zones: Vec::new(),
+                    ending: None,
+                    is_coarse: false,
+                });
+            }
+            Extent::Everywhere if self.goes_on(symbolic, words, &whole, may_delay)? => {
+                return Ok(Inside {
+                    zones: vec![whole],
                     ending: None,
                     is_coarse: false,
                 });
@@ -79,6 +105,38 @@ impl Inside {
             ending,
             is_coarse: passage.is_coarse(),
         })
+    }
+
+    /// Whether it is easy to see that no run ends in a state, in all of which the predicate holds:
+    /// time is bounded, and one move is possible everywhere, or after a wait. Most states are so.
+    fn goes_on(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        whole: &Zone,
+        may_delay: bool,
+    ) -> Result<bool, Failure> {
+        let stopped = symbolic.stopped(words)?;
+        let (bounds, dimension) = (whole.bounds(), whole.dimension());
+        let is_bounded = !may_delay || dbm::is_delay_bounded(bounds, dimension, &stopped);
+        if symbolic.has_barriers() || !stopped.is_empty() || !is_bounded {
+            return Ok(false);
+        }
+        symbolic.moves_within(words, bounds, &mut self.moves)?;
+        self.target.resize(words.len(), 0);
+        for one in self.moves.iter() {
+            let effect = symbolic.fire_within(one, words, bounds, &mut self.target)?;
+            let Some(mut part) = effect.and_then(|effect| effect.guarded_part(whole)) else {
+                continue;
+            };
+            if may_delay {
+                part.down(&stopped);
+            }
+            if whole.is_subset(&part) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 }
 

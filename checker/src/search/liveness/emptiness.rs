@@ -30,7 +30,7 @@ use crate::zones::Zone;
 use crate::zones::dbm;
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 
-use super::delay_inside::{Entry, Inside};
+use super::delay_inside::{Delays, Entry};
 use super::ending::RunEnding;
 use super::stack::{Frame, Stack};
 use crate::search::limits::{Counters, Watch, states_between_checks};
@@ -65,7 +65,7 @@ struct Node {
 /// Searches for runs inside `keep`. Several searches share what is known about nodes that start no
 /// run.
 pub struct Liveness<'p> {
-    keep: &'p Predicate,
+    delays: Delays<'p>,
     store: StateStore,
     zones: ZoneTable,
     nodes: Vec<Node>,
@@ -83,7 +83,7 @@ impl<'p> Liveness<'p> {
     /// Searches in the network of `symbolic` for runs inside `keep`.
     pub fn new(symbolic: &Symbolic<'_>, keep: &'p Predicate) -> Liveness<'p> {
         Liveness {
-            keep,
+            delays: Delays::inside(keep),
             store: StateStore::new(symbolic.stepper.network()),
             zones: ZoneTable::new(symbolic.dimension()),
             nodes: Vec::new(),
@@ -152,7 +152,7 @@ impl<'p> Liveness<'p> {
         let Some(invariant) = symbolic.invariant(words)? else {
             return Ok(Outcome::Exhausted);
         };
-        let mut inside = Inside::of(symbolic, self.keep, words, entry, &invariant)?;
+        let mut inside = self.delays.from(symbolic, words, entry, &invariant)?;
         self.is_coarse |= inside.is_coarse;
         if let Some(ending) = inside.ending {
             let mut trace = Trace::default();
@@ -191,7 +191,7 @@ impl<'p> Liveness<'p> {
             return self.visit(symbolic, zone);
         }
         if frame.next_move < frame.moves.len() {
-            return take_next(symbolic, self.keep, frame, &mut self.is_coarse);
+            return take_next(symbolic, &mut self.delays, frame, &mut self.is_coarse);
         }
         let node = frame.node;
         self.stack.pop();
@@ -210,7 +210,7 @@ impl<'p> Liveness<'p> {
         frame.next_move = below.next_move as usize;
         if below.pending > 0 {
             frame.next_move -= 1;
-            take_next(symbolic, self.keep, frame, &mut self.is_coarse)?;
+            take_next(symbolic, &mut self.delays, frame, &mut self.is_coarse)?;
             frame.pending.truncate(below.pending as usize);
         }
         Ok(None)
@@ -364,7 +364,7 @@ impl<'p> Liveness<'p> {
 /// Takes the next move of a state: fills its pending zones.
 fn take_next(
     symbolic: &mut Symbolic<'_>,
-    keep: &Predicate,
+    delays: &mut Delays<'_>,
     frame: &mut Frame,
     is_coarse: &mut bool,
 ) -> Result<Option<RunEnding>, Failure> {
@@ -379,7 +379,7 @@ fn take_next(
     for entry in &entries {
         let entry = Entry::at(entry);
         let target = &mut frame.target;
-        let inside = Inside::of(symbolic, keep, target, entry, &effect.invariant)?;
+        let inside = delays.from(symbolic, target, entry, &effect.invariant)?;
         *is_coarse |= inside.is_coarse;
         frame.pending.extend(inside.zones);
         if inside.ending.is_some() {

@@ -24,7 +24,7 @@ use crate::zones::dbm::{self, Constraint};
 use crate::zones::zone_table::{ZoneId, ZoneTable};
 use crate::zones::{Bound, Zone};
 
-use super::delay_inside::{Entry, Inside};
+use super::delay_inside::{Delays, Entry};
 use super::emptiness::{EndlessRun, push_state};
 use super::ending::RunEnding;
 use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
@@ -82,6 +82,7 @@ enum Stay {
 pub struct LassoSearch<'s, 'a> {
     symbolic: &'s mut Symbolic<'a>,
     wanted: Wanted<'s>,
+    delays: Delays<'s>,
     store: StateStore,
     zones: ZoneTable,
     nodes: Vec<Node>,
@@ -100,6 +101,7 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
             store: StateStore::new(symbolic.stepper.network()),
             zones: ZoneTable::new(symbolic.dimension()),
             symbolic,
+            delays: Delays::inside(wanted.keep),
             wanted,
             nodes: Vec::new(),
             open_nodes: HashMap::new(),
@@ -269,13 +271,9 @@ impl<'s, 'a> LassoSearch<'s, 'a> {
         entry: &Zone,
         invariant: &[Constraint],
     ) -> Result<(), Failure> {
-        let inside = Inside::of(
-            self.symbolic,
-            self.wanted.keep,
-            words,
-            Entry::at(entry),
-            invariant,
-        )?;
+        let inside = self
+            .delays
+            .from(self.symbolic, words, Entry::at(entry), invariant)?;
         let mut zones = inside.zones;
         if let Some(ending) = inside.ending {
             let moves = self.distance_after(from);
