@@ -269,8 +269,11 @@ impl Rows {
     }
 }
 
-/// The least width of groups with which rows have the fewest levels.
+/// The least width of groups with which rows have the fewest levels, but one below the root.
 fn width(length: usize) -> usize {
+    if (3..=WIDEST).contains(&length) {
+        return length.div_ceil(2);
+    }
     let levels = |width: usize| {
         let mut levels = 0;
         let mut below = length;
