@@ -28,6 +28,8 @@ use crate::search::store::passed_list::{PassedList, Stored};
 
 /// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
+/// So many states are stored at once: see [`Tree::wait`].
+const AT_ONCE: usize = 32;
 /// The greatest number of moves between two checks of the limits.
 const LOOK_EVERY_MOVES: u64 = 1 << 12;
 
@@ -79,16 +81,27 @@ struct Store {
     waiting: VecDeque<Stored>,
     /// The state that is being explored.
     current: Origin,
+    /// Whether states may wait to be stored: nobody must know at once whether they are new.
+    may_wait: bool,
 }
 
 impl Sink for Store {
     fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        if self.may_wait
+            && let Some(count) = self.tree.wait(words, self.current, way)
+        {
+            if count == AT_ONCE {
+                self.tree.add_waiting(&mut self.waiting);
+            }
+            return false;
+        }
         let stored = self.tree.add(words, zone, self.current, way);
         self.waiting.extend(stored);
         stored.is_some()
     }
 
     fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
+        self.tree.add_waiting(&mut self.waiting);
         self.tree.add(words, zone, self.current, way).is_some()
     }
 
@@ -104,12 +117,14 @@ impl<'s, 'a> Search<'s, 'a> {
         order: Order,
         watch: &'s mut dyn Watch,
     ) -> Search<'s, 'a> {
+        let may_wait = order == Order::BreadthFirst && symbolic.order().is_none();
         Search {
             explorer: Explorer::new(symbolic, goal),
             store: Store {
                 tree: Tree::new(symbolic),
                 waiting: VecDeque::new(),
                 current: Origin::NOWHERE,
+                may_wait,
             },
             random: if let Order::Random(seed) = order {
                 seed | 1
@@ -179,8 +194,12 @@ impl<'s, 'a> Search<'s, 'a> {
     }
 
     fn next_waiting(&mut self) -> Option<Stored> {
+        let Store { tree, waiting, .. } = &mut self.store;
         match self.order {
-            Order::BreadthFirst => self.store.waiting.pop_front(),
+            Order::BreadthFirst => waiting.pop_front().or_else(|| {
+                tree.add_waiting(waiting);
+                waiting.pop_front()
+            }),
             Order::DepthFirst | Order::Random(_) => self.store.waiting.pop_back(),
         }
     }

@@ -59,6 +59,17 @@ pub(super) struct Tree {
     pub(super) passed: PassedList,
     nodes: Vec<Node>,
     paths: Vec<u32>,
+    waiting: Waiting,
+}
+
+/// How the states that wait to be stored were reached.
+#[derive(Debug, Default)]
+struct Waiting {
+    /// Of each: its origin, and where the moves from there end.
+    ways: Vec<(Origin, usize)>,
+    moves: Vec<Step>,
+    /// What became of each.
+    found: Vec<Option<Stored>>,
 }
 
 impl Tree {
@@ -68,6 +79,7 @@ impl Tree {
             passed: PassedList::new(symbolic),
             nodes: Vec::new(),
             paths: Vec::new(),
+            waiting: Waiting::default(),
         }
     }
 
@@ -88,6 +100,38 @@ impl Tree {
         let stored = self.passed.add(words, zone)?;
         self.add_node(origin, path);
         Some(stored)
+    }
+
+    /// Lets a state without a zone wait until [`Tree::add_waiting`]; returns how many wait, or
+    /// `None` if it cannot.
+    pub(super) fn wait(&mut self, words: &[i32], origin: Origin, path: &[Step]) -> Option<usize> {
+        if !self.passed.may_wait() {
+            return None;
+        }
+        self.passed.wait(words);
+        let Waiting { ways, moves, .. } = &mut self.waiting;
+        moves.extend_from_slice(path);
+        ways.push((origin, moves.len()));
+        Some(ways.len())
+    }
+
+    /// Stores the states that wait, unless they were stored before; those that are new are added to
+    /// `out`.
+    pub(super) fn add_waiting(&mut self, out: &mut impl Extend<Stored>) {
+        let mut waiting = std::mem::take(&mut self.waiting);
+        let Waiting { ways, moves, found } = &mut waiting;
+        self.passed.add_waiting(|stored| found.push(stored));
+        let mut first = 0;
+        for (stored, &(origin, end)) in found.iter().zip(&*ways) {
+            if stored.is_some() {
+                self.add_node(origin, &moves[first..end]);
+            }
+            first = end;
+        }
+        ways.clear();
+        moves.clear();
+        out.extend(found.drain(..).flatten());
+        self.waiting = waiting;
     }
 
     /// Like [`Tree::add`], for the words that were proposed last.

@@ -106,6 +106,21 @@ impl BucketTable {
         }
     }
 
+    /// The first number whose hash has the bits of this one that its bucket shows, if there is one:
+    /// probably the one that [`BucketTable::find`] finds.
+    #[inline]
+    pub(super) fn guess(&self, hash: u64) -> Option<u32> {
+        let bucket = &self.buckets[self.place(hash)];
+        let equal = bucket.with_tag(tag(hash));
+        (equal != 0).then(|| bucket.numbers[slot(equal)])
+    }
+
+    /// Reads the bucket of a hash, so that it is in the cache; the result says nothing.
+    #[inline]
+    pub(super) fn touch(&self, hash: u64) -> u8 {
+        self.buckets[self.place(hash)].tags[0]
+    }
+
     /// Enters the next number; `hash_of` says the hash of every number before it.
     #[inline]
     pub(super) fn push(&mut self, hash: u64, hash_of: impl Fn(u32) -> u64) {

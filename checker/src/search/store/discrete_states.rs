@@ -194,8 +194,10 @@ impl StateStore {
         let written = network.written_words();
         let widths = widths(network);
         let identity_words = network.layout.identity_words as usize;
-        let identity = runs_of(&written, &widths, 0, identity_words);
-        let meta = runs_of(&written, &widths, identity_words, written.len());
+        let identity = (0..identity_words).filter(|&word| written[word]);
+        let identity = runs_of(identity, &widths);
+        let meta = (identity_words..written.len()).filter(|&word| written[word]);
+        let meta = runs_of(meta, &widths);
         let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
         let numbers = bytes(&identity).div_ceil(size_of::<u32>()).max(1);
         let (identity_bytes, meta_bytes) = (numbers * size_of::<u32>(), bytes(&meta));
@@ -257,6 +259,34 @@ impl StateStore {
             self.meta.push(meta);
         }
         (DiscreteId(id), is_new)
+    }
+
+    /// Whether states may wait to be stored.
+    pub(super) fn may_wait(&self) -> bool {
+        self.format.meta.is_empty() && self.rows.may_wait()
+    }
+
+    /// Lets a state wait until [`StateStore::intern_waiting`].
+    ///
+    /// # Panics
+    /// If a word lies outside the range of its variable.
+    pub(super) fn wait(&mut self, words: &[i32]) {
+        if self.basis.is_empty() || self.rows.is_flat() {
+            self.pack(words);
+            let identity = &self.scratch[..self.format.identity_bytes];
+            self.rows.wait(row_of(identity));
+        } else {
+            self.change(words);
+            self.rows.wait_set();
+        }
+        self.stored(words);
+    }
+
+    /// Stores the states that wait, in their order, with what [`StateStore::intern`] returns of
+    /// each.
+    pub(super) fn intern_waiting(&mut self, mut each: impl FnMut(DiscreteId, bool)) {
+        self.rows
+            .intern_waiting(|id, is_new| each(DiscreteId(id), is_new));
     }
 
     /// Notes that rows are compared with this state, which was just stored, unless one was visited.
@@ -433,10 +463,10 @@ fn add_widths(shape: &Shape, widths: &mut Vec<Width>) {
     }
 }
 
-/// The maximal runs of written words of the same width from `first` up to `last`.
-fn runs_of(written: &[bool], widths: &[Width], first: usize, last: usize) -> Vec<Run> {
+/// The maximal runs of successive words of the same width.
+fn runs_of(words: impl Iterator<Item = usize>, widths: &[Width]) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
-    for word in (first..last).filter(|&word| written[word]) {
+    for word in words {
         let width = widths[word];
         match runs.last_mut() {
             Some(run) if run.first + run.count == word && run.width == width => run.count += 1,

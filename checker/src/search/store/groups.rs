@@ -10,37 +10,51 @@ use super::bucket_table::BucketTable;
 use super::hashing::fold;
 use super::records::Records;
 
+/// Groups that wait to be stored.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    /// One after the other.
+    pub(super) groups: Vec<u32>,
+    hashes: Vec<u64>,
+}
+
 /// Stored groups.
 #[derive(Debug)]
 pub(super) struct Groups {
-    groups: Records<u32>,
+    records: Records<u32>,
     /// The numbers by the hashes of their groups.
     table: BucketTable,
+    /// Some groups that were asked for lately, by their hashes.
+    recent: Vec<u32>,
 }
+
+/// How many groups are known as recent.
+const RECENT: usize = 1 << 14;
 
 impl Groups {
     /// No groups of this width.
     pub(super) fn new(width: usize) -> Groups {
         Groups {
-            groups: Records::new(width),
+            records: Records::new(width),
             table: BucketTable::new(),
+            recent: Vec::new(),
         }
     }
 
     /// How many there are.
     pub(super) fn len(&self) -> usize {
-        self.groups.len()
+        self.records.len()
     }
 
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
-        self.groups.bytes() + self.table.bytes()
+        self.records.bytes() + self.table.bytes()
     }
 
     /// The group with a number.
     #[inline]
     pub(super) fn get(&self, number: u32) -> &[u32] {
-        self.groups.get(number)
+        self.records.get(number)
     }
 
     /// The number of a group, if it is stored.
@@ -55,6 +69,26 @@ impl Groups {
         self.table.find(hash, is_it)
     }
 
+    /// The number of a group, which is stored if it is new; quick for those that come again soon.
+    #[inline]
+    pub(super) fn intern_recent(&mut self, group: &[u32]) -> u32 {
+        let hash = hash(group);
+        let place = (hash >> 16) as usize % RECENT;
+        if let Some(&guess) = self.recent.get(place)
+            && (guess as usize) < self.records.len()
+            && is_same(self.get(guess), group)
+        {
+            return guess;
+        }
+        let number = match self.find_hashed(hash, group) {
+            Some(known) => known,
+            None => self.push(hash, group),
+        };
+        self.recent.resize(RECENT, 0);
+        self.recent[place] = number;
+        number
+    }
+
     /// The number of a group, and whether it is new.
     #[inline]
     pub(super) fn intern(&mut self, group: &[u32]) -> (u32, bool) {
@@ -65,11 +99,39 @@ impl Groups {
         }
     }
 
+    /// Like [`Groups::intern`], for several groups in their order.
+    ///
+    /// What they are compared with lies where no cache has it. So first it is read for all of them,
+    /// without a decision, so that the reads overlap.
+    pub(super) fn intern_all(&mut self, batch: &mut Batch, mut each: impl FnMut(u32, bool)) {
+        let width = self.records.size();
+        let Batch { groups, hashes } = batch;
+        hashes.clear();
+        let mut touched = 0;
+        for group in groups.chunks_exact(width) {
+            let hash = hash(group);
+            touched ^= u32::from(self.table.touch(hash));
+            hashes.push(hash);
+        }
+        for &hash in &*hashes {
+            let guess = self.table.guess(hash).unwrap_or(0);
+            touched ^= self.records.first(guess);
+        }
+        std::hint::black_box(touched);
+        for (&hash, group) in hashes.iter().zip(groups.chunks_exact(width)) {
+            match self.find_hashed(hash, group) {
+                Some(known) => each(known, false),
+                None => each(self.push(hash, group), true),
+            }
+        }
+        groups.clear();
+    }
+
     #[inline(never)]
     fn push(&mut self, of_group: u64, group: &[u32]) -> u32 {
-        let number = self.groups.push(group);
-        let groups = &self.groups;
-        self.table.push(of_group, |one| hash(groups.get(one)));
+        let number = self.records.push(group);
+        let records = &self.records;
+        self.table.push(of_group, |one| hash(records.get(one)));
         number
     }
 }

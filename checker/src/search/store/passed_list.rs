@@ -105,6 +105,22 @@ impl PassedList {
         self.add_interned(interned, zone)
     }
 
+    /// Whether states may wait to be stored: they are words alone.
+    pub(in crate::search) fn may_wait(&self) -> bool {
+        !self.has_clocks && self.store.may_wait()
+    }
+
+    /// Lets a state wait until [`PassedList::add_waiting`].
+    pub(in crate::search) fn wait(&mut self, words: &[i32]) {
+        self.store.wait(words);
+    }
+
+    /// Stores the states that wait, in their order, with what [`PassedList::add`] returns of each.
+    pub(in crate::search) fn add_waiting(&mut self, mut each: impl FnMut(Option<Stored>)) {
+        let PassedList { store, nodes, .. } = self;
+        store.intern_waiting(|discrete, is_new| each(is_new.then(|| numbered(nodes, discrete))));
+    }
+
     /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another
     /// list; returns their hash.
     pub(in crate::search) fn propose(&mut self, words: &[i32]) -> u32 {
@@ -134,7 +150,7 @@ impl PassedList {
         zone: Kept<'_>,
     ) -> Option<Stored> {
         if !self.has_clocks {
-            return is_new.then(|| self.stored(discrete, ZoneId(0)));
+            return is_new.then(|| numbered(&mut self.nodes, discrete));
         }
         if is_new {
             self.lists.open();
@@ -152,7 +168,10 @@ impl PassedList {
         }
         let limits = zone.limits;
         let zone = self.zones.keep();
-        let stored = self.stored(discrete, zone);
+        let stored = Stored {
+            zone,
+            ..numbered(&mut self.nodes, discrete)
+        };
         let entry = Entry {
             signature,
             zone,
@@ -162,16 +181,6 @@ impl PassedList {
         let signature_of = |zone| zones.signature(zone, limits);
         self.lists.push(discrete, entry, signature_of);
         Some(stored)
-    }
-
-    fn stored(&mut self, discrete: DiscreteId, zone: ZoneId) -> Stored {
-        let node = cancellation::number(self.nodes as usize);
-        self.nodes += 1;
-        Stored {
-            node,
-            discrete,
-            zone,
-        }
     }
 
     /// Forgets the zones of a discrete state that the proposed one contains.
@@ -192,6 +201,17 @@ impl PassedList {
             }
             is_within
         });
+    }
+}
+
+/// A state without a zone, with the next number.
+fn numbered(nodes: &mut u32, discrete: DiscreteId) -> Stored {
+    let node = cancellation::number(*nodes as usize);
+    *nodes += 1;
+    Stored {
+        node,
+        discrete,
+        zone: ZoneId(0),
     }
 }
 

@@ -27,6 +27,22 @@ impl<T: Copy> Records<T> {
         }
     }
 
+    /// How many parts a record has.
+    pub(super) fn size(&self) -> usize {
+        self.size
+    }
+
+    /// The first part of a record; 0 if there is no such record.
+    #[inline]
+    pub(super) fn first(&self, id: u32) -> T
+    where
+        T: Default,
+    {
+        let (block, first) = self.place(id);
+        let part = self.blocks.get(block).and_then(|block| block.get(first));
+        part.copied().unwrap_or_default()
+    }
+
     #[inline]
     pub(super) fn get(&self, id: u32) -> &[T] {
         let (block, first) = self.place(id);

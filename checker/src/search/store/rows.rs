@@ -21,7 +21,7 @@
 //! Cost: a row takes a root, and the groups that no other row has: at most as many as the depth of
 //! the tree for each place where it differs.
 
-use super::groups::Groups;
+use super::groups::{Batch, Groups};
 
 /// The most numbers in a group.
 const WIDEST: usize = 8;
@@ -56,6 +56,8 @@ pub(super) struct Rows {
     root: usize,
     /// Whether the basis is a row that was visited; else it is that which was stored last.
     is_visited: bool,
+    /// The roots of rows that wait to be stored.
+    waiting: Batch,
     /// What the basis had before a row was stored: places and numbers.
     before: Vec<(u32, u32)>,
     /// The groups that have changed in the level at hand, and in that above it.
@@ -88,6 +90,7 @@ impl Rows {
             basis: vec![0; first + below],
             is_visited: false,
             before: Vec::new(),
+            waiting: Batch::default(),
             root: first,
             changed_above: Vec::new(),
         };
@@ -146,10 +149,19 @@ impl Rows {
         self.basis[place]
     }
 
-    /// Like [`Rows::intern`], for the basis as it was set.
+    /// Like [`Rows::intern`], for the basis as it was set. No row may wait.
     pub(super) fn intern_set(&mut self) -> (u32, bool) {
         self.change_upper();
         let found = self.roots.intern(&self.basis[self.root..]);
+        self.restore();
+        if found == (TRIAL as u32 - 1, true) && self.shares_little() {
+            *self = self.flat();
+        }
+        found
+    }
+
+    /// Makes the basis that which was visited again.
+    fn restore(&mut self) {
         if self.is_visited {
             // A place that was set twice has what it was at first.
             for &(place, number) in self.before.iter().rev() {
@@ -158,10 +170,37 @@ impl Rows {
         }
         self.changed.clear();
         self.before.clear();
-        if found == (TRIAL as u32 - 1, true) && self.shares_little() {
-            *self = self.flat();
+    }
+
+    /// Whether rows may wait to be stored: how they are kept was decided.
+    pub(super) fn may_wait(&self) -> bool {
+        self.roots.len() >= TRIAL
+    }
+
+    /// Lets a row wait until [`Rows::intern_waiting`].
+    pub(super) fn wait(&mut self, row: impl Iterator<Item = u32>) {
+        if self.is_flat() {
+            self.waiting.groups.extend(row);
+            return;
         }
-        found
+        for (place, number) in row.enumerate() {
+            self.set(place, number);
+        }
+        self.wait_set();
+    }
+
+    /// Like [`Rows::wait`], for the basis as it was set.
+    pub(super) fn wait_set(&mut self) {
+        self.change_upper();
+        self.waiting
+            .groups
+            .extend_from_slice(&self.basis[self.root..]);
+        self.restore();
+    }
+
+    /// Stores the rows that wait, in their order, with what [`Rows::intern`] returns of each.
+    pub(super) fn intern_waiting(&mut self, each: impl FnMut(u32, bool)) {
+        self.roots.intern_all(&mut self.waiting, each);
     }
 
     /// Whether rows have so little in common that trees are not worth the time.
@@ -189,7 +228,7 @@ impl Rows {
             self.changed_above.clear();
             for &place in &self.changed {
                 let group = &self.basis[level.first + place * self.width..][..self.width];
-                let number = self.groups.intern(group).0;
+                let number = self.groups.intern_recent(group);
                 let known = self.basis[above + place];
                 if known != number {
                     self.before.push(((above + place) as u32, known));
@@ -331,6 +370,39 @@ mod tests {
         }
         row.fill(7);
         assert_eq!(rows.find(row.iter().copied()), None);
+    }
+
+    /// Rows that wait get the numbers that they would have got at once.
+    #[test]
+    fn rows_may_wait_whatever_their_length() {
+        for length in [5, 40, 100] {
+            for factor in [1, 3] {
+                let (mut rows, mut waiting) = (Rows::new(length), Rows::new(length));
+                // With the factor 1 only two places differ, and rows become trees.
+                let row = |number: u32| {
+                    let places = 0..length as u32;
+                    places.map(move |place| match (place, factor) {
+                        (0, _) => number % 97,
+                        (1, _) => number / 7,
+                        (_, 1) => place,
+                        _ => number.wrapping_mul(2 * place + factor),
+                    })
+                };
+                for number in 0..5000 {
+                    assert_eq!(rows.intern(row(number)), waiting.intern(row(number)));
+                }
+                assert!(waiting.may_wait());
+                for first in (4000..9000).step_by(50) {
+                    waiting.visit(first / 2);
+                    let all = (first..first + 40).map(|number| number / 2 * 2);
+                    all.clone().for_each(|number| waiting.wait(row(number)));
+                    let mut found = Vec::new();
+                    waiting.intern_waiting(|number, is_new| found.push((number, is_new)));
+                    let expected = all.map(|number| rows.intern(row(number)));
+                    assert_eq!(found, expected.collect::<Vec<_>>());
+                }
+            }
+        }
     }
 
     #[test]
