@@ -45,21 +45,23 @@ impl LoadedModel {
                 None => return,
             },
         };
+        let (failure, witness) = self.completed(witness, &predicates, failure, options.runs);
         answer.verdict = Verdict::Error(failure);
-        let witness = self.completed(witness, &predicates, failure, options.runs);
         answer.evidence.witnesses.push(witness);
     }
 
-    /// A way to a failure with its last state, the move that fails, and a run that goes so far.
+    /// A way to a failure with its last state, the move that fails, and a run that goes so far; and
+    /// the failure to which it leads.
     fn completed(
         &self,
         mut witness: Witness,
         predicates: &[&Predicate],
         failure: Failure,
         has_run: bool,
-    ) -> Witness {
+    ) -> (Failure, Witness) {
         let before = witness.trace.states.len();
-        witness.failing = self.failing_move(predicates, &mut witness.trace, failure);
+        let (failure, failing) = self.failing_move(predicates, &mut witness.trace, failure);
+        witness.failing = failing;
         let is_timed = witness.run.is_some() && witness.trace.states.len() == before;
         if has_run && !is_timed && !witness.trace.states.is_empty() {
             let mut symbolic = self.symbolic();
@@ -78,26 +80,30 @@ impl LoadedModel {
             // The initial state is where it happens, although nobody can be in it.
             witness.trace.states.extend(self.symbolic().origin());
         }
-        witness
+        (failure, witness)
     }
 
     /// The move at the end of a trace that fails, if it is one that does; a state is added if the
-    /// failure is one move further on.
+    /// failure is one move further on. If another move fails before that, its failure is returned
+    /// instead: the way to it is shorter.
     fn failing_move(
         &self,
         predicates: &[&Predicate],
         trace: &mut Trace,
         failure: Failure,
-    ) -> Option<Vec<Part>> {
-        let (words, zone) = trace.states.last()?.clone();
+    ) -> (Failure, Option<Vec<Part>>) {
+        let Some((words, zone)) = trace.states.last().cloned() else {
+            return (failure, None);
+        };
         let last = Point { words, zone };
         if self.breaks(predicates, &last, failure) {
-            return None;
+            return (failure, None);
         }
         let mut symbolic = self.symbolic();
         let successors = match successors_or_failure(&mut symbolic, &last) {
             Ok(successors) => successors,
-            Err((found, parts)) => return parts.filter(|_| found == failure),
+            Err((found, Some(parts))) => return (found, Some(parts)),
+            Err((_, None)) => return (failure, None),
         };
         for (parts, point) in successors {
             let next = match successors_or_failure(&mut symbolic, &point) {
@@ -107,9 +113,9 @@ impl LoadedModel {
             };
             trace.moves.push(parts);
             trace.states.push((point.words, point.zone));
-            return next;
+            return (failure, next);
         }
-        None
+        (failure, None)
     }
 
     /// Whether looking at the state for the query is what fails.
