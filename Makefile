@@ -58,13 +58,6 @@ test: $(INSTALLED) ## Run all tests, Rust and Python
 	source $(RUST) && cd checker && cargo test --locked --quiet
 	source $(RUST) && $(BIN)/python -m pytest --numprocesses=auto --dist=worksteal
 
-.PHONY: built
-built: $(INSTALLED) built-tests ## Build the engine, and the tests of Rust beside it
-
-.PHONY: built-tests
-built-tests: $(RUST)
-	source $(RUST) && cd checker && cargo test --locked --quiet --no-run
-
 .PHONY: quick
 quick: $(INSTALLED) ## Run the tests of single modules that take at most a second or so each, Rust and Python side by side
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-rust quick-python
