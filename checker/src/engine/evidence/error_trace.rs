@@ -84,8 +84,9 @@ impl LoadedModel {
     }
 
     /// The move at the end of a trace that fails, if it is one that does; a state is added if the
-    /// failure is one move further on. If another move fails before that, its failure is returned
-    /// instead: the way to it is shorter.
+    /// failure is one move further on. If both it and that of a move before are run-time errors,
+    /// the latter is returned instead: the way to it is shorter. All else that fails here may fail
+    /// only because zones are not extrapolated.
     fn failing_move(
         &self,
         predicates: &[&Predicate],
@@ -102,8 +103,10 @@ impl LoadedModel {
         let mut symbolic = self.symbolic();
         let successors = match successors_or_failure(&mut symbolic, &last) {
             Ok(successors) => successors,
-            Err((found, Some(parts))) => return (found, Some(parts)),
-            Err((_, None)) => return (failure, None),
+            Err((found, Some(parts))) if found == failure || both_run_time(found, failure) => {
+                return (found, Some(parts));
+            }
+            Err(_) => return (failure, None),
         };
         for (parts, point) in successors {
             let next = match successors_or_failure(&mut symbolic, &point) {
@@ -172,6 +175,11 @@ impl LoadedModel {
         });
         looked_for.ok().flatten()
     }
+}
+
+/// Whether both are run-time errors of the model.
+fn both_run_time(one: Failure, other: Failure) -> bool {
+    matches!((one, other), (Failure::RunTime(_), Failure::RunTime(_)))
 }
 
 /// Whether play ends in a state of the trace before its last one.
