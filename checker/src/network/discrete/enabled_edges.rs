@@ -311,7 +311,7 @@ impl<'a> Stepper<'a> {
         words: &mut [i32],
     ) -> Result<i32, RunTimeError> {
         if let Some(mut record) = self.record.take() {
-            let answer = self.recorded_call(executor, function, words, &mut record);
+            let answer = self.recorded_call(function, words, &mut record);
             self.record = Some(record);
             return answer;
         }
@@ -327,7 +327,6 @@ impl<'a> Stepper<'a> {
     /// an edge differ in values that its function does not read is no reason to ask.
     fn recorded_call(
         &mut self,
-        executor: &dyn Executor,
         function: FunctionId,
         words: &mut [i32],
         record: &mut Record,
@@ -342,12 +341,7 @@ impl<'a> Stepper<'a> {
         if let Some(answer) = record.answer(function, &arguments) {
             return Ok(answer);
         }
-        let mut context = Context {
-            state: words,
-            constraints: &mut self.constraints,
-            assignments: &mut self.assignments,
-        };
-        let answer = executor.call(function, &arguments, &mut context)?;
+        let answer = self.run(function, &arguments, words)?;
         record.note(function, arguments.into(), answer);
         Ok(answer)
     }

@@ -24,7 +24,7 @@ pub(super) struct Groups {
     records: Records<u32>,
     /// The numbers by the hashes of their groups.
     table: BucketTable,
-    /// Some groups that were asked for lately, by their hashes.
+    /// Some groups that were asked for lately, by their hashes; none while there are few.
     recent: Vec<u32>,
 }
 
@@ -48,7 +48,7 @@ impl Groups {
 
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
-        self.records.bytes() + self.table.bytes()
+        self.records.bytes() + self.table.bytes() + size_of_val(&*self.recent)
     }
 
     /// The group with a number.
@@ -73,17 +73,17 @@ impl Groups {
     #[inline]
     pub(super) fn intern_recent(&mut self, group: &[u32]) -> u32 {
         let hash = hash(group);
+        // So few groups lie in a cache in any case.
+        if self.records.len() < RECENT {
+            return self.intern_hashed(hash, group).0;
+        }
         let place = (hash >> 16) as usize % RECENT;
         if let Some(&guess) = self.recent.get(place)
-            && (guess as usize) < self.records.len()
             && is_same(self.get(guess), group)
         {
             return guess;
         }
-        let number = match self.find_hashed(hash, group) {
-            Some(known) => known,
-            None => self.push(hash, group),
-        };
+        let number = self.intern_hashed(hash, group).0;
         self.recent.resize(RECENT, 0);
         self.recent[place] = number;
         number
@@ -92,7 +92,11 @@ impl Groups {
     /// The number of a group, and whether it is new.
     #[inline]
     pub(super) fn intern(&mut self, group: &[u32]) -> (u32, bool) {
-        let hash = hash(group);
+        self.intern_hashed(hash(group), group)
+    }
+
+    #[inline]
+    fn intern_hashed(&mut self, hash: u64, group: &[u32]) -> (u32, bool) {
         match self.find_hashed(hash, group) {
             Some(known) => (known, false),
             None => (self.push(hash, group), true),
@@ -119,10 +123,8 @@ impl Groups {
         }
         std::hint::black_box(touched);
         for (&hash, group) in hashes.iter().zip(groups.chunks_exact(width)) {
-            match self.find_hashed(hash, group) {
-                Some(known) => each(known, false),
-                None => each(self.push(hash, group), true),
-            }
+            let (number, is_new) = self.intern_hashed(hash, group);
+            each(number, is_new);
         }
         groups.clear();
     }
