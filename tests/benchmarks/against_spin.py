@@ -7,7 +7,7 @@ of states must be the same, or the program ends with 1. SPIN's verifier is compi
 says for safety (``-O2 -DSAFETY -DNOREDUCE``), once as it is and once with ``-DCOLLAPSE``. ``spin``
 and ``gcc`` must be on the PATH.
 
-Seconds are of processor time, the compilation of both models not counted; the medians are printed.
+Seconds are those of the clock, the compilation of both models not counted; the medians are printed.
 Bytes of SPIN are what it says that states take, without its hash table; those of the engine are all
 that it counts, its tables included.
 """
