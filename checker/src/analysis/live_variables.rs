@@ -11,6 +11,8 @@
 //! it: the sender before the receivers read, the one receiver after the sender. What a query reads
 //! is live everywhere, and so is what is read around every transition.
 
+use std::ops::Range;
+
 use crate::ir::{Edge, FunctionId, Network, Process, Shape};
 
 use super::function_reads::read_words;
@@ -92,6 +94,27 @@ impl LiveVariables {
             words: kept.iter().map(with_value).collect(),
             readers: readers.collect(),
         })
+    }
+
+    /// Those of these words that are dead somewhere, and in how many locations of all processes any
+    /// of them is live. They are set to their initial values while no process is in one of these
+    /// locations.
+    pub fn dead_somewhere(&self, words: Range<u32>) -> (usize, usize) {
+        let place = |word| self.words.partition_point(|one| one.0 < word);
+        let (first, end) = (place(words.start), place(words.end));
+        if first == end {
+            return (0, 0);
+        }
+        let width = self.words.len().div_ceil(64);
+        let masks = (first / 64..=(end - 1) / 64).map(|chunk| {
+            let bits = first.max(64 * chunk)..end.min(64 * chunk + 64);
+            (chunk, bits.fold(0, |mask, bit| mask | 1_u64 << (bit % 64)))
+        });
+        let masks: Vec<(usize, u64)> = masks.collect();
+        let locations = self.readers.iter().flat_map(|one| one.live.chunks(width));
+        let live =
+            locations.filter(|live| masks.iter().any(|&(chunk, mask)| live[chunk] & mask != 0));
+        (end - first, live.count())
     }
 
     /// Whether a word is dead in a state.

@@ -17,6 +17,7 @@ pub mod query;
 pub mod query_form;
 mod rejection;
 pub mod session;
+pub mod stored_state;
 mod unsupported;
 
 pub use crate::search::reachability::report::MOST_THREADS;

@@ -11,4 +11,4 @@ pub mod timed_trace;
 
 pub use limits::{Counters, StopReason, Watch};
 pub use outcome::{Outcome, Trace};
-pub use store::discrete_states::{DiscreteId, StateStore};
+pub use store::discrete_states::{DiscreteId, RecordSize, StateStore};

@@ -56,10 +56,19 @@ pub(super) fn live_variables(
     if !problem.options.reductions.live_variables || problem.under.is_some() {
         return None;
     }
+    forgotten(problem.network, functions, symmetry.map(Arc::as_ref)).map(Arc::new)
+}
+
+/// The same, if nothing keeps the search from forgetting.
+pub(crate) fn forgotten(
+    network: &Network,
+    functions: impl IntoIterator<Item = FunctionId>,
+    symmetry: Option<&Symmetry>,
+) -> Option<LiveVariables> {
     // An initial value is the same member for all, so that states would no longer be each other's
     // images.
     let keeps_scalars = symmetry.is_some();
-    LiveVariables::new(problem.network, functions, keeps_scalars).map(Arc::new)
+    LiveVariables::new(network, functions, keeps_scalars)
 }
 
 /// Whether the network or a query compares two clocks.

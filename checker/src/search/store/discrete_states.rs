@@ -166,11 +166,64 @@ struct Format {
 }
 
 impl Format {
+    /// How the states of a network become records.
+    fn new(network: &Network) -> Format {
+        let written = network.written_words();
+        let widths = widths(network);
+        let identity_words = network.layout.identity_words as usize;
+        let identity = (0..identity_words).filter(|&word| written[word]);
+        let identity = runs_of(identity, &widths);
+        let meta = (identity_words..written.len()).filter(|&word| written[word]);
+        let meta = runs_of(meta, &widths);
+        let numbers = bytes_of(&identity).div_ceil(size_of::<u32>()).max(1);
+        let mut places = vec![(Width::Whole, 0); identity_words];
+        let mut first = 0;
+        for run in &identity {
+            for place in &mut places[run.first..run.first + run.count] {
+                *place = (run.width, first);
+                first += run.width.bytes() as u32;
+            }
+        }
+        Format {
+            identity,
+            meta,
+            identity_bytes: numbers * size_of::<u32>(),
+            places,
+        }
+    }
+
+    /// The bytes of a record.
+    fn bytes(&self) -> usize {
+        self.identity_bytes + bytes_of(&self.meta)
+    }
+
+    /// What a record consists of.
+    fn size(&self, words: usize) -> RecordSize {
+        let mut word_bits = vec![0; words];
+        for run in self.identity.iter().chain(&self.meta) {
+            word_bits[run.first..run.first + run.count].fill(8 * run.width.bytes());
+        }
+        let padding = self.identity_bytes - bytes_of(&self.identity);
+        RecordSize {
+            word_bits,
+            padding_bits: 8 * padding,
+        }
+    }
+
     /// Writes a record, whose padding is 0; returns whether all words fit.
     fn write(&self, words: &[i32], record: &mut [u8]) -> bool {
         let (identity, meta) = record.split_at_mut(self.identity_bytes);
         pack(&self.identity, words, identity) & pack(&self.meta, words, meta)
     }
+}
+
+/// What the record of a state consists of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordSize {
+    /// By word: how many bits it takes; none if it is not stored.
+    pub word_bits: Vec<usize>,
+    /// How many bits fill up the last number of a row.
+    pub padding_bits: usize,
 }
 
 /// Stored discrete states.
@@ -191,37 +244,21 @@ pub struct StateStore {
 impl StateStore {
     /// An empty store for the states of a network.
     pub fn new(network: &Network) -> StateStore {
-        let written = network.written_words();
-        let widths = widths(network);
-        let identity_words = network.layout.identity_words as usize;
-        let identity = (0..identity_words).filter(|&word| written[word]);
-        let identity = runs_of(identity, &widths);
-        let meta = (identity_words..written.len()).filter(|&word| written[word]);
-        let meta = runs_of(meta, &widths);
-        let bytes = |runs: &[Run]| runs.iter().map(Run::bytes).sum::<usize>();
-        let numbers = bytes(&identity).div_ceil(size_of::<u32>()).max(1);
-        let (identity_bytes, meta_bytes) = (numbers * size_of::<u32>(), bytes(&meta));
-        let mut places = vec![(Width::Whole, 0); identity_words];
-        let mut first = 0;
-        for run in &identity {
-            for place in &mut places[run.first..run.first + run.count] {
-                *place = (run.width, first);
-                first += run.width.bytes() as u32;
-            }
-        }
+        let format = Format::new(network);
         StateStore {
             basis: Vec::new(),
-            format: Format {
-                identity,
-                meta,
-                identity_bytes,
-                places,
-            },
             initial: network.initial.clone(),
-            rows: Rows::new(numbers),
-            meta: Records::new(meta_bytes.max(1)),
-            scratch: vec![0; identity_bytes + meta_bytes],
+            rows: Rows::new(format.identity_bytes / size_of::<u32>()),
+            meta: Records::new(bytes_of(&format.meta).max(1)),
+            scratch: vec![0; format.bytes()],
+            format,
         }
+    }
+
+    /// What a stored state of this network consists of, before anything that it has in common with
+    /// others is taken out.
+    pub fn record_size(network: &Network) -> RecordSize {
+        Format::new(network).size(network.layout.words as usize)
     }
 
     /// The bytes that the store takes.
@@ -409,6 +446,10 @@ fn set_row(bytes: &mut [u8], row: &[u32]) {
     }
 }
 
+fn bytes_of(runs: &[Run]) -> usize {
+    runs.iter().map(Run::bytes).sum()
+}
+
 /// Writes the words of all runs from their bytes.
 fn unpack(runs: &[Run], mut bytes: &[u8], words: &mut [i32]) {
     for run in runs {
@@ -546,6 +587,25 @@ mod tests {
                 assert_eq!(loaded, state);
             }
         }
+    }
+
+    #[test]
+    fn what_words_take_and_the_padding_are_the_whole_record() {
+        let field = |low, high| (String::new(), Shape::Integer { low, high });
+        let fields = vec![
+            field(0, 200),
+            field(-300, 300),
+            field(i32::MIN, 0),
+            field(0, 9),
+        ];
+        let mut network = network(Shape::Struct(fields));
+        // Nothing writes the last one.
+        network.before_update.as_mut().unwrap().writes = vec![(0, 3)];
+        let size = StateStore::record_size(&network);
+        assert_eq!(size.word_bits, [8, 16, 32, 0]);
+        assert_eq!(size.padding_bits, 8);
+        let stored = size.word_bits.iter().sum::<usize>() + size.padding_bits;
+        assert_eq!(stored, 8 * StateStore::new(&network).scratch.len());
     }
 
     #[test]
