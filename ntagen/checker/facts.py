@@ -8,7 +8,7 @@ channels are those of the network after all templates have been instantiated.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -131,6 +131,62 @@ class StateSize:
 
 
 @dataclass(frozen=True, slots=True)
+class StoredPart:
+    """The location of a process or a variable, as a search stores it.
+
+    Attributes:
+        kind: What it is; ``left out`` are all variables that only random runs know.
+        name: The name of the process or of the variable; empty for what is left out.
+        process: The process it belongs to; ``None`` if it is global.
+        meta: Whether it is ``meta``: it is stored with the first of the states that differ only in
+            it, and not compared.
+        words: How many 32-bit words it has.
+        stored_bits: How many bits all of them take in a stored state.
+        constant_words: How many of them are not stored, because nothing writes them.
+        reset_words: How many of them have their initial value wherever nothing may still read
+            them. A query that reads them keeps them.
+        live_locations: In how many locations of all processes any of these may still be read. While
+            a process is in one of these locations, they are kept.
+    """
+
+    kind: Literal["location", "variable", "left out"]
+    name: str
+    process: str | None
+    meta: bool
+    words: int
+    stored_bits: int
+    constant_words: int
+    reset_words: int
+    live_locations: int
+
+
+@dataclass(frozen=True, slots=True)
+class StoredState(StateSize):
+    """The size of the discrete part of a state, and what a search stores of it.
+
+    Its attributes are those of `StateSize`, and these.
+
+    Attributes:
+        stored_bits: How many bits all parts take in a stored state, before what it has in common
+            with others is taken out. ``None`` if only random runs have a meaning: they store no
+            states.
+        padding_bits: How many bits fill it up to whole words; ``None`` likewise.
+        constant_words: How many words are not stored, because nothing writes them; ``None``
+            likewise.
+        reset_words: How many words have their initial value wherever nothing may still read them.
+            A query that reads them keeps them. ``None`` likewise.
+        parts: The location of each process, then the variables in the order of their words, then
+            what only random runs know; none if nothing is stored.
+    """
+
+    stored_bits: int | None
+    padding_bits: int | None
+    constant_words: int | None
+    reset_words: int | None
+    parts: tuple[StoredPart, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ScalarSet:
     """A scalar set.
 
@@ -184,3 +240,8 @@ class Facts:
             for one in found["processes"]
         ]
         return msgspec.convert(found | {"processes": processes}, cls)
+
+
+def stored_state_from(text: str) -> StoredState:
+    """Reads what the engine says of a stored state."""
+    return msgspec.json.decode(text, type=StoredState)

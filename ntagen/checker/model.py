@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         Process,
         ScalarSet,
         StateSize,
+        StoredState,
         Template,
         Variable,
     )
@@ -79,9 +80,13 @@ class Model:
         more = ", …" if len(self.processes) > _PROCESSES_SHOWN else ""
         return f"<Model of {len(self.processes)} processes: {names}{more}>"
 
-    def facts_json(self) -> str:
-        """The description of the model as one JSON object, as ``ntagen info --json`` prints it."""
-        return self._raw.facts_json()
+    def facts_json(self, *, with_stored: bool = False) -> str:
+        """The description of the model as one JSON object, as ``ntagen info --json`` prints it.
+
+        Args:
+            with_stored: Whether it says what is stored of a state, as with ``--state``.
+        """
+        return self._raw.facts_json(with_stored=with_stored)
 
     def network_json(self) -> str:
         """The processes, clocks and variables by number as one JSON object.
@@ -151,6 +156,15 @@ class Model:
     def state(self) -> StateSize:
         """How large the discrete part of a state is."""
         return self.facts.state
+
+    def stored_state(self) -> StoredState:
+        """What a search stores of a state: how many bits each part takes, and what is left out.
+
+        It is found out anew with each call, which takes long for a large model.
+        """
+        from ntagen.checker.facts import stored_state_from
+
+        return stored_state_from(self._raw.stored_state_json())
 
     @property
     def state_words(self) -> int:

@@ -156,6 +156,11 @@ impl LoadedModel {
         self.symbolic.network()
     }
 
+    /// Whether only statistical queries can be asked of it.
+    pub fn has_only_random_runs(&self) -> bool {
+        self.symbolic_refusal.is_some()
+    }
+
     /// Where a span lies, as `file:line:column`, with the text it covers.
     pub fn place(&self, span: Span) -> (String, String) {
         let source = self.sources.get(span.source);

@@ -119,7 +119,7 @@ fn json_list(entries: Vec<serde_json::Value>) -> String {
 /// Writes something of a model as JSON, unless a signal comes.
 fn written(
     model: &Bound<'_, Model>,
-    describe: fn(&LoadedModel) -> serde_json::Value,
+    describe: impl FnOnce(&LoadedModel) -> serde_json::Value + Send + 'static,
 ) -> PyResult<String> {
     let held = model.clone().unbind();
     until_signal_apart(model.py(), move || {
@@ -174,9 +174,16 @@ impl Model {
         self.with(|model| model.load_seconds)
     }
 
-    /// What is in the model, as JSON; see `engine::format::model_json`.
-    fn facts_json(slf: &Bound<'_, Self>) -> PyResult<String> {
-        written(slf, model_json::facts)
+    /// What is in the model, as JSON, and what is stored of a state if that is wanted; see
+    /// `engine::format::model_json`.
+    #[pyo3(signature = (*, with_stored))]
+    fn facts_json(slf: &Bound<'_, Self>, with_stored: bool) -> PyResult<String> {
+        written(slf, move |model| model_json::facts(model, with_stored))
+    }
+
+    /// How large a state is and what is stored of it, as JSON.
+    fn stored_state_json(slf: &Bound<'_, Self>) -> PyResult<String> {
+        written(slf, model_json::stored_state)
     }
 
     /// The network, as JSON; see `engine::format::network_json`.

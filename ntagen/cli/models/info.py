@@ -19,7 +19,15 @@ from ntagen.cli.terminal import echo, print_table
 
 if TYPE_CHECKING:
     from ntagen.checker import Model
-    from ntagen.checker.facts import Channel, Clock, Process, Template, Variable
+    from ntagen.checker.facts import (
+        Channel,
+        Clock,
+        Process,
+        StoredPart,
+        StoredState,
+        Template,
+        Variable,
+    )
 
     _Part = TypeVar("_Part", bound=Process | Clock | Channel)
 
@@ -35,9 +43,15 @@ ROWS_SHOWN: Final = 40
 )
 @path_argument("path", metavar="MODEL")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as one JSON object.")
+@click.option(
+    "--state",
+    "with_stored",
+    is_flag=True,
+    help="Also show what a search stores of a state: the bits of each part, and what is left out.",
+)
 @include_option()
 @bounded
-def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
+def command(path: Path, as_json: bool, with_stored: bool, include: tuple[Path, ...]) -> None:
     """Show what is in a model: templates, processes, variables, clocks, channels, features.
 
     MODEL is an environment (.nsl) or a UPPAAL model (.xml, .xta).
@@ -46,6 +60,7 @@ def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
     Examples:
       ntagen info model.xml
       ntagen info model.xml --json | jq .features
+      ntagen info model.xml --state
 
     For an environment, it also shows each region (its volume, its bounds, and its distance from
     the straight way between the tip and the middle of the last target; negative if it is in the
@@ -64,7 +79,14 @@ def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
       features   names of what the model uses beyond plain timed automata
       scalar_sets  size, whether symmetry reduction applies (reduced), else why not (obstacle) and
                  where (place, at)
-      state      words (of 32 bits) of the discrete state: location_, variable_ and meta_words
+      state      words (of 32 bits) of the discrete state: location_, variable_ and meta_words;
+                 with --state also stored_bits, the padding_bits to whole words, constant_words
+                 (not stored, since nothing writes them), reset_words (they have their initial value
+                 wherever nothing may still read them, unless the query does), all null if only
+                 random runs have a meaning; and parts: kind (location, variable, or left out: those
+                 that only random runs know), name, process, meta, words, stored_bits,
+                 constant_words, reset_words, and live_locations (of all processes: where any of
+                 the latter may still be read)
       queries    text, comment, expect (the verdict that the file states, or null)
       warnings, load_seconds
       settings   of an environment: by their words, field, value, shown and origin
@@ -80,7 +102,7 @@ def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
     model, task = loaded.model, loaded.task
     if as_json:
         with doing("describing the model"):
-            text = model.facts_json()
+            text = model.facts_json(with_stored=with_stored)
         if task is not None:
             from ntagen.cli.needle.task_facts import task_facts
 
@@ -88,6 +110,10 @@ def command(path: Path, as_json: bool, include: tuple[Path, ...]) -> None:
         echo(text)
         return
     _show(path, model)
+    if with_stored:
+        with doing("finding out what is stored"):
+            stored = model.stored_state()
+        _show_stored(model, stored)
     if task is not None:
         from ntagen.cli.needle.steering import show_settings
         from ntagen.cli.needle.task_facts import task_lines
@@ -146,7 +172,7 @@ def _show_table(rows: Iterable[Sequence[str]], *headings: str) -> None:
     if len(shown) > ROWS_SHOWN:
         cells.append([f"… {len(shown) - ROWS_SHOWN} more (all of them: --json)"])
     echo()
-    numbers = ("locations", "edges", "words", "priority")
+    numbers = ("locations", "edges", "words", "bits", "priority")
     print_table([headings[i] for i in used], cells, numbers)
 
 
@@ -192,6 +218,75 @@ def _variable_rows(variables: Sequence[Variable]) -> Iterable[list[str]]:
         members = list(group)
         names = _joined([variable.name for variable in members])
         yield [names, text, str(sum(variable.words for variable in members))]
+
+
+def _show_stored(model: Model, stored: StoredState) -> None:
+    """Shows what a search stores of a state, the largest parts first."""
+    if stored.stored_bits is None:
+        echo("\nstored state: none, because only random runs of this model have a meaning")
+        return
+    _show_table(_stored_rows(model, stored.parts), "stored", "type", "words", "bits", "remark")
+    size = f"a stored state takes at most {stored.stored_bits} of {32 * stored.words} bits"
+    if stored.padding_bits:
+        size = f"{size}, and {stored.padding_bits} of padding"
+    sentence = [size]
+    if stored.constant_words:
+        some = f"{stored.constant_words} of {_count(stored.words, 'word')}"
+        sentence.append(f"nothing writes {some}, which {_are(stored.constant_words)} not stored")
+    if stored.reset_words:
+        some = f"{_count(stored.reset_words, 'word')} {_are(stored.reset_words)} reset"
+        sentence.append(
+            f"{some} where not read, unless the query reads {_them(stored.reset_words)}"
+        )
+    echo(f"\n{'; '.join(sentence)}")
+
+
+def _stored_rows(model: Model, parts: Sequence[StoredPart]) -> Iterable[list[str]]:
+    """A row for neighbours that differ only in the indexes of their names; most bits first."""
+    locations = sum(process.location_count for process in model.processes)
+    types = ["location"] * len(model.processes) + [_type(one) for one in model.variables]
+    types += [""] * (len(parts) - len(types))
+    found = []
+
+    def kind(pair: tuple[StoredPart, str]) -> tuple[str, str, str]:
+        part, text = pair
+        return _family(part.name), text, _remark(part, locations)
+
+    for (_, text, remark), group in groupby(zip(parts, types, strict=True), kind):
+        members = [part for part, _ in group]
+        words = sum(part.words for part in members)
+        bits = sum(part.stored_bits for part in members)
+        names = _joined([part.name or "variables that only random runs know" for part in members])
+        found.append((bits, words, [names, text, str(words), str(bits), remark]))
+    found.sort(key=lambda row: row[:2], reverse=True)
+    return [cells for _, _, cells in found]
+
+
+def _remark(part: StoredPart, locations: int) -> str:
+    """What is not stored or compared of a part of a state, and why."""
+    remarks = ["meta: not compared"] * part.meta
+    constant, reset = part.constant_words, part.reset_words
+    if constant:
+        remarks.append(f"{_some(constant, part)}not stored: nothing writes {_them(constant)}")
+    if reset and part.live_locations:
+        where = f"live in {part.live_locations} of {_count(locations, 'location')}"
+        remarks.append(f"{_some(reset, part)}reset where not read ({where})")
+    elif reset:
+        remarks.append(f"{_some(reset, part)}always reset: nothing reads {_them(reset)}")
+    return "; ".join(remarks)
+
+
+def _some(words: int, part: StoredPart) -> str:
+    """How many of its words it is about, if not about all."""
+    return "" if words == part.words else f"{_count(words, 'word')} "
+
+
+def _are(number: int) -> str:
+    return "is" if number == 1 else "are"
+
+
+def _them(number: int) -> str:
+    return "it" if number == 1 else "them"
 
 
 def _type(variable: Variable) -> str:

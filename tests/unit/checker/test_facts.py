@@ -10,7 +10,7 @@ import pytest
 
 import ntagen
 from ntagen.checker import load
-from ntagen.checker.facts import Channel, Clock, Query, StateSize, Variable
+from ntagen.checker.facts import Channel, Clock, Query, StateSize, StoredPart, Variable
 
 PAPER = Path(__file__).resolve().parents[3] / "examples" / "paper.nsl"
 
@@ -112,6 +112,50 @@ def test_processes_variables_clocks_and_channels_are_those_of_the_network(
     )
     assert model.state == StateSize(14, location_words=2, variable_words=11, meta_words=1)
     assert model.state_words == 14
+
+
+def test_the_bits_of_all_parts_are_those_of_a_stored_state(model: ntagen.Model) -> None:
+    stored = model.stored_state()
+    assert (stored.words, stored.meta_words) == (model.state.words, model.state.meta_words)
+    parts = [part for part in stored.parts if part.kind != "left out"]
+    names = [one.name for one in (*model.processes, *model.variables)]
+    assert [part.name for part in parts] == names
+    assert sum(part.words for part in stored.parts) == stored.words
+    assert sum(part.stored_bits for part in stored.parts) == stored.stored_bits
+    assert sum(part.constant_words for part in stored.parts) == stored.constant_words
+    a, _, s, f, *_, m = parts
+    assert a == StoredPart(
+        "location",
+        "A",
+        "A",
+        meta=False,
+        words=1,
+        stored_bits=8,
+        constant_words=0,
+        reset_words=0,
+        live_locations=0,
+    )
+    # Nothing writes the array; nothing reads the flag.
+    assert (s.words, s.stored_bits, s.constant_words, s.reset_words) == (6, 0, 6, 0)
+    assert (f.stored_bits, f.reset_words, f.live_locations) == (8, 1, 0)
+    assert (m.meta, m.stored_bits) == (True, 8)
+
+
+@pytest.mark.parametrize("path", ["paper.nsl", "liver/liver.nsl"])
+def test_parts_of_environments_are_their_states(path: str) -> None:
+    stored = ntagen.load(PAPER.parent / path).stored_state()
+    assert sum(part.words for part in stored.parts) == stored.words
+    assert sum(part.stored_bits for part in stored.parts) == stored.stored_bits
+
+
+def test_random_runs_store_no_states() -> None:
+    model = load(
+        "clock x; double d; "
+        "process P() { state A; init A; trans A -> A { guard x > d; }; } system P;"
+    )
+    stored = model.stored_state()
+    assert (stored.stored_bits, stored.reset_words, stored.parts) == (None, None, ())
+    assert stored.words == model.state_words
 
 
 def test_features_are_named(model: ntagen.Model) -> None:

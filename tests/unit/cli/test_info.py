@@ -84,6 +84,78 @@ def test_environments_are_models_too(capsys: pytest.CaptureFixture[str]) -> None
     assert "4 processes of 4 templates" in out
 
 
+STORED = """
+const int N = 4;
+int[0,1] cells[N]; int[0,300] passed; int never; meta bool seen; int32_t wide;
+process P(int[0,1] id) {
+  state A, B; init A;
+  trans A -> A { guard seen; },
+        A -> B { assign passed = 7, cells[1] = 1, seen = true; },
+        B -> A { guard passed + cells[1] + cells[0] + never < 9; };
+}
+process Q() { state A; init A; trans A -> A { guard wide < 9; assign wide = 3; }; }
+system P, Q;
+"""
+
+
+def test_what_is_stored_of_a_state(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "stored.xta"
+    path.write_text(STORED)
+    out, _ = info_run(capsys, 0, path, "--state")
+    lines = [" ".join(line.split()) for line in out.splitlines()]
+    first = lines.index("stored type words bits remark")
+    # By bits, and then by words.
+    where = "(live in 2 of 5 locations)"
+    assert lines[first + 2 : first + 11] == [
+        "wide int32_t 1 32",
+        "P(0) … P(1) (2) location 2 16",
+        f"passed int[0,300] 1 16 reset where not read {where}",
+        "cells int[0,1] array [4] 4 8 3 words not stored: nothing writes them; "
+        f"1 word reset where not read {where}",
+        "Q location 1 8",
+        "seen meta bool 1 8 meta: not compared",
+        "never int 1 0 not stored: nothing writes it",
+        "",
+        "a stored state takes at most 88 of 352 bits, and 16 of padding; nothing writes 4 of 11 "
+        "words, which are not stored; 2 words are reset where not read, unless the query reads "
+        "them",
+    ]
+    assert "stored" not in info_run(capsys, 0, path)[0].replace(str(path), "")
+
+
+def test_json_says_on_request_what_is_stored(
+    capsys: pytest.CaptureFixture[str], worker: Path
+) -> None:
+    plain = json.loads(info_run(capsys, 0, worker, "--json")[0])
+    found = json.loads(info_run(capsys, 0, worker, "--json", "--state")[0])
+    added = {"stored_bits", "padding_bits", "constant_words", "reset_words", "parts"}
+    assert set(found["state"]) - set(plain["state"]) == added
+    assert {key: found["state"][key] for key in plain["state"]} == plain["state"]
+    assert set(found) == set(plain)
+    assert sum(part["stored_bits"] for part in found["state"]["parts"]) == 24
+    total = found["state"]["parts"][-1]
+    assert (total["name"], total["words"], total["stored_bits"]) == ("total", 1, 0)
+    assert (total["constant_words"], total["process"]) == (1, None)
+
+
+def test_what_is_stored_of_an_environment_and_of_random_runs(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out, _ = info_run(capsys, 0, PAPER, "--state")
+    assert "a stored state takes at most " in out
+    path = tmp_path / "runs.xta"
+    path.write_text(
+        "clock x; double d; process P() { state A; init A; trans A -> A { guard x > d; }; } "
+        "system P;"
+    )
+    out, _ = info_run(capsys, 0, path, "--state")
+    assert "stored state: none, because only random runs of this model have a meaning" in out
+    path.write_text("process P() { state A; init B; } system P;")
+    out, err = info_run(capsys, 2, path, "--state")
+    assert out == ""
+    assert "error[E0254]" in err
+
+
 def test_pictures_are_written(
     capsys: pytest.CaptureFixture[str], worker: Path, tmp_path: Path
 ) -> None:

@@ -20,7 +20,15 @@
 //!   (`obstacle`, a text) and, if something tells members apart, its place and text (`place`,
 //!   `at`), or null.
 //! * `state`: the 32-bit `words` of the discrete state, and of these the `location_words`,
-//!   `variable_words`, `meta_words`.
+//!   `variable_words`, `meta_words`. On request it also says what a search stores of a state:
+//!   `stored_bits`, the `padding_bits` that fill up the record, the `constant_words` (not stored,
+//!   since nothing writes them), and the `reset_words` (they have their initial value wherever
+//!   nothing may still read them, unless the query reads them). If only random runs have a meaning,
+//!   nothing is stored, and these are null. `parts` are the locations of processes, then the
+//!   variables, then all variables that only random runs know: `kind` ("location", "variable",
+//!   "left out"), `name` (empty for the last), `process` (null if global), `meta`, `words`,
+//!   `stored_bits`, `constant_words`, `reset_words`, and `live_locations`: in how many locations of
+//!   all processes any of the latter may still be read.
 //! * `queries`: `text`, `comment`, `expect` (the verdict that the file states, or null), and where
 //!   the text begins: `path`, `line`, `column`.
 //! * `warnings` as text, and `load_seconds`.
@@ -30,6 +38,7 @@ use serde_json::{Map, Value as Json, json};
 use crate::cancellation;
 use crate::diagnostics::{SourceMap, Span};
 use crate::engine::loaded_model::LoadedModel;
+use crate::engine::stored_state::{PartOf, StoredPart, StoredState};
 use crate::ir::{Features, Network, ProcessId, Shape, Urgency};
 use crate::network::{Obstacle, Symmetry};
 use crate::syntax::ast::{
@@ -43,8 +52,13 @@ const INT_RANGE: (i32, i32) = (-32768, 32767);
 /// What it takes to write a location or an edge: see [`cancellation::work`].
 const UNITS_FOR_OBJECT: usize = 2_000;
 
-/// What is in a model.
-pub fn facts(model: &LoadedModel) -> Json {
+/// What is in a model; what its states consist of only if that is wanted, since it takes long.
+pub fn facts(model: &LoadedModel, with_stored: bool) -> Json {
+    let state = if with_stored {
+        stored_state(model)
+    } else {
+        state(model.network())
+    };
     let network = model.network();
     let templates = model.templates.iter();
     json!({
@@ -57,7 +71,7 @@ pub fn facts(model: &LoadedModel) -> Json {
         "channels": channels(network),
         "features": features(model),
         "scalar_sets": scalar_sets(model),
-        "state": state(network),
+        "state": state,
         "queries": queries(model, &model.queries),
         "warnings": model.warnings,
         "load_seconds": model.load_seconds,
@@ -311,6 +325,49 @@ fn state(network: &Network) -> Json {
         "location_words": locations,
         "variable_words": layout.identity_words - locations,
         "meta_words": layout.words - layout.identity_words,
+    })
+}
+
+/// How large a state is, and what is stored of it.
+pub fn stored_state(model: &LoadedModel) -> Json {
+    let network = model.network();
+    let stored = (!model.has_only_random_runs()).then(|| StoredState::new(network));
+    let parts = stored.iter().flat_map(|stored| &stored.parts);
+    let parts: Vec<Json> = parts.map(|part| stored_part(network, part)).collect();
+    let mut state = state(network);
+    let stored = stored.as_ref();
+    state["stored_bits"] = json!(stored.map(StoredState::stored_bits));
+    state["padding_bits"] = json!(stored.map(|stored| stored.padding_bits));
+    state["constant_words"] = json!(stored.map(StoredState::constant_words));
+    state["reset_words"] = json!(stored.map(StoredState::reset_words));
+    state["parts"] = json!(parts);
+    state
+}
+
+fn stored_part(network: &Network, part: &StoredPart) -> Json {
+    cancellation::work(UNITS_FOR_OBJECT);
+    let (kind, name, process, meta) = match part.of {
+        PartOf::Location(index) => {
+            let name = network.processes[index].name.as_str();
+            ("location", name, Some(name), false)
+        }
+        PartOf::Variable(index) => {
+            let variable = &network.layout.variables[index];
+            let process = owner(network, variable.owner);
+            ("variable", variable.name.as_str(), process, variable.meta)
+        }
+        PartOf::LeftOut { meta } => ("left out", "", None, meta),
+    };
+    json!({
+        "kind": kind,
+        "name": name,
+        "process": process,
+        "meta": meta,
+        "words": part.words,
+        "stored_bits": part.stored_bits,
+        "constant_words": part.constant_words,
+        "reset_words": part.reset_words,
+        "live_locations": part.live_locations,
     })
 }
 
