@@ -199,9 +199,9 @@ class Answer:
         wrapped: The first place, in the order of the model, where a result of integer arithmetic
             did not fit into 32 bits and wrapped round. `Model.overflow` can make it an error.
         warnings: The warnings about the query, one text each.
-        stop: ``states``, ``memory``, ``time`` or ``clocks`` if a limit stopped the search;
-            ``interrupted`` if the user ended random runs, and this is the answer of those until
-            then.
+        stop: ``states``, ``memory``, ``disk``, ``time`` or ``clocks`` if a limit stopped the
+            search; ``interrupted`` if the user ended random runs, and this is the answer of those
+            until then.
         explored: The number of states whose successors were computed.
         stored: The number of states that are stored at the end; a state that was replaced by one
             with a larger zone does not count.
@@ -398,6 +398,8 @@ class Answer:
         """What stopped the search, in words, for example ``state limit``; or ``user``."""
         if self.stop == "interrupted":
             return "user"
+        if self.stop == "disk":
+            return "disk, which cannot be written: it may be full"
         return f"{(self.stop or 'unknown').removesuffix('s')} limit"
 
     @property

@@ -204,6 +204,13 @@ class Options:
     memory_bytes: int | None = None
     """The search stops when its states take this many bytes."""
 
+    spill: Path | None = None
+    """A folder on a disk: states that have no room in memory go there, in ``E<>``, ``A[]``,
+    ``E[]``, ``A<>``, ``-->``, ``sup``, ``inf`` and ``bounds``, and the folder is as it was when the
+    search ends. They stay in `memory_bytes` of memory or, without it, in half of what is free. The
+    tables by which states are found stay in memory, too. What a process that was killed has left
+    in the folder is removed."""
+
     timeout_s: float | None = None
     """The search stops after this time, in seconds."""
 

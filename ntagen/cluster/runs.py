@@ -191,7 +191,8 @@ class DaskRuns:
         """Gives the `ntagen.checker.Options.run_source` for a query."""
         own = replace(options, progress=None, run_progress=None, run_source=None, timeout_s=None)
         # Paths and limits of this process count for nothing there.
-        own = replace(own, folder=None, allow_write=(), memory_bytes=None, states=None, threads=1)
+        own = replace(own, folder=None, allow_write=(), memory_bytes=None, states=None)
+        own = replace(own, spill=None, threads=1)
         followed = None
         form = form_of(query)
         if form is not None and form.uses is not None:

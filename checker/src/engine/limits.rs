@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use crate::cancellation::{self, Cut, Look, OUT_OF_NUMBERS};
 use crate::network::Failure;
 use crate::search::limits::{Counters, StopReason, Watch};
+use crate::search::store::disk::Disk;
 
 /// Is shown the counters now and then; a reason ends the search. It may watch limits of its own,
 /// such as the memory of the whole process.
@@ -19,6 +20,8 @@ pub struct Limits {
     pub states: Option<u64>,
     /// Bytes of stored states with their tables.
     pub memory_bytes: Option<u64>,
+    /// Where states go that have no room in that memory, in searches that can do so.
+    pub disk: Option<Arc<Disk>>,
     /// Time.
     pub timeout: Option<Duration>,
     /// Sees the progress, and can interrupt.
@@ -41,12 +44,14 @@ impl std::fmt::Debug for Limits {
         let Limits {
             states,
             memory_bytes,
+            disk,
             timeout,
             observer,
         } = self;
         f.debug_struct("Limits")
             .field("states", states)
             .field("memory_bytes", memory_bytes)
+            .field("disk", disk)
             .field("timeout", timeout)
             .field("observer", &observer.is_some())
             .finish()
@@ -235,11 +240,16 @@ pub(crate) const CLOCKS_GREW: &str = "clocks, or differences of them, grow beyon
 /// What is said where there are more states than numbers for them.
 pub(crate) const OUT_OF_STATES: &str = "there are more than 4,294,967,295 states or moves between them, as many as a search has numbers for";
 
+/// What is said where states cannot be written to disk.
+pub(crate) const DISK_FAILED: &str =
+    "states that have no room in memory cannot be written to disk; it may be full";
+
 /// What ended work after the verdict.
 pub(crate) fn ended_text(reason: StopReason) -> &'static str {
     match reason {
         StopReason::States => "stopped by the state limit",
         StopReason::Memory => "stopped by the memory limit",
+        StopReason::Disk => DISK_FAILED,
         StopReason::Time => "stopped by the time limit",
         StopReason::Interrupted => "interrupted",
         StopReason::Clocks => CLOCKS_GREW,
@@ -251,6 +261,7 @@ pub(crate) fn stop_text(reason: StopReason) -> &'static str {
     match reason {
         StopReason::States => "the search for it was stopped by the state limit",
         StopReason::Memory => "the search for it was stopped by the memory limit",
+        StopReason::Disk => DISK_FAILED,
         StopReason::Time => "the search for it was stopped by the time limit",
         StopReason::Interrupted => "the search for it was interrupted",
         StopReason::Clocks => CLOCKS_GREW,
@@ -291,5 +302,9 @@ impl Watch for LimitWatch {
             return Some(StopReason::Memory);
         }
         self.shared.look_beside(0)
+    }
+
+    fn disk(&self) -> Option<Arc<Disk>> {
+        self.limits.disk.clone()
     }
 }

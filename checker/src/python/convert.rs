@@ -78,6 +78,7 @@ pub(super) fn stop_name(reason: StopReason) -> Option<&'static str> {
     match reason {
         StopReason::States => Some("states"),
         StopReason::Memory => Some("memory"),
+        StopReason::Disk => Some("disk"),
         StopReason::Time => Some("time"),
         StopReason::Interrupted => None,
         StopReason::Clocks => Some("clocks"),

@@ -241,6 +241,7 @@ impl Model {
         let limits = Limits {
             states,
             memory_bytes,
+            disk: None,
             timeout: time_limit(timeout_s)?,
             observer: Some(observer(None)),
         };

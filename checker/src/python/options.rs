@@ -1,11 +1,12 @@
 //! The options of a query, read from an `Options` of `ntagen.checker.options`: a row for each.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
+use pyo3::exceptions::{PyKeyboardInterrupt, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -18,6 +19,7 @@ use crate::engine::{Limits, Options, RareEvent, Reductions, StrategyWanted, Trac
 use crate::learning::{Learning, Method};
 use crate::search::limits::StopReason;
 use crate::search::reachability::report::Order;
+use crate::search::store::disk::Disk;
 use crate::shield::{Outside, Sampling};
 use crate::stochastic::{MeanMethod, Precision, RunSource, UnderChoice};
 use crate::tuning::Tuning;
@@ -51,6 +53,19 @@ impl Raised {
     }
 }
 
+/// The file for states that have no room in memory, if there is a folder for it.
+fn disk(given: &Bound<'_, PyAny>) -> PyResult<Option<Arc<Disk>>> {
+    let Some(place) = field::<Option<PathBuf>>(given, "spill")? else {
+        return Ok(None);
+    };
+    let disk = Disk::new(&place, field(given, "memory_bytes")?);
+    let disk = disk.map_err(|error| {
+        let place = place.display();
+        PyOSError::new_err(format!("{place}: states cannot be written there: {error}"))
+    })?;
+    Ok(Some(Arc::new(disk)))
+}
+
 /// The options that a Python value holds, and what its functions will have raised.
 pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
     let text = |name| field::<String>(given, name);
@@ -65,6 +80,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<(Options, Raised)> {
         limits: Limits {
             states: field(given, "states")?,
             memory_bytes: field(given, "memory_bytes")?,
+            disk: disk(given)?,
             timeout: time_limit(field(given, "timeout_s")?)?,
             observer: Some(or_raised(
                 observer(field(given, "progress")?),

@@ -2,6 +2,10 @@
 //!
 //! The search itself reads no clock and knows no limit; its caller does.
 
+use std::sync::Arc;
+
+use super::store::disk::Disk;
+
 /// What a search has done until now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
@@ -35,6 +39,8 @@ pub enum StopReason {
     States,
     /// The memory limit.
     Memory,
+    /// States that have no room in memory cannot be written to disk.
+    Disk,
     /// The time limit.
     Time,
     /// The user interrupted.
@@ -47,6 +53,11 @@ pub enum StopReason {
 pub trait Watch {
     /// Looks at the counters; a reason ends the search. Called every few hundred states.
     fn look(&mut self, counters: &Counters) -> Option<StopReason>;
+
+    /// Where states go that have no room in memory.
+    fn disk(&self) -> Option<Arc<Disk>> {
+        None
+    }
 }
 
 /// The states that a search may explore between two checks of the limits, at most `most`, for zones

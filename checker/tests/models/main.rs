@@ -27,6 +27,7 @@ mod replay;
 #[path = "../common/searches.rs"]
 mod searches;
 mod shown;
+mod spilled;
 mod state_space;
 mod stopwatches;
 mod stored;

@@ -73,6 +73,8 @@ def idle_options(
         "here: of the reductions games make live-variables only, and strategies and plans are "
         "about states with all their values",
     )
+    spills = any(_is_plain_search(query) for query in queries)
+    idle("spill", not spills, "here: games and random runs keep everything in memory")
     _find_idle_statistics(idle, given, values, queries)
     saves = any(query.kind == "saveStrategy" for query in queries)
     idle("allow_write", not saves, "here: no query saves a strategy")
@@ -112,6 +114,11 @@ def _find_idle_statistics(
     idle("seed", is_fixed, "without --search random or a statistical query")
     is_under = any(one.is_statistical and one.uses for one in queries)
     idle("under_choice", not is_under, "here: no statistical query is under a strategy")
+
+
+def _is_plain_search(query: QueryForm) -> bool:
+    """Whether a query is answered by a search of symbolic states."""
+    return not (query.is_game or query.is_statistical or query.is_learned or query.is_shield)
 
 
 def _takes_threads(query: QueryForm, values: Mapping[str, object]) -> bool:

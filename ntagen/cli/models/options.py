@@ -387,6 +387,14 @@ OPTIONS: Final[dict[str, Decorator]] = {
         "which is slower. Answers do not depend on it.  [default: jit]",
     ),
     **LIMITS,
+    "spill": path_option(
+        "--spill",
+        metavar="DIR",
+        help="Keep states that have no room in memory in files in this folder, which is made if it "
+        "is missing: in as much memory as --memory says, else in half of what is free. For E<>, "
+        "A[], E[], A<>, -->, sup, inf and bounds. The files go when the search ends; what a killed "
+        "run has left there is removed.",
+    ),
     "allow_write": path_option(
         "--allow-write",
         metavar="DIR",

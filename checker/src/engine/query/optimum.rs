@@ -260,6 +260,7 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
             "there are more than 10 million states, or they take more than 4 GiB".to_owned()
         }
         Inexact::Limit(reason) => match reason {
+            StopReason::Disk => crate::engine::limits::DISK_FAILED.to_owned(),
             StopReason::Memory => "its states take more memory than allowed".to_owned(),
             _ => "there are more states than allowed".to_owned(),
         },

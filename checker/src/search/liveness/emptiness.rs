@@ -33,7 +33,7 @@ use crate::zones::zone_table::{ZoneId, ZoneTable};
 use super::delay_inside::{Delays, Entry};
 use super::ending::RunEnding;
 use super::stack::{Frame, Stack};
-use crate::search::limits::{Counters, Watch, states_between_checks};
+use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
@@ -173,13 +173,26 @@ impl<'p> Liveness<'p> {
                 if self.explored >= self.next_look {
                     let dimension = symbolic.dimension();
                     self.next_look = self.explored + states_between_checks(LOOK_EVERY, dimension);
-                    if let Some(reason) = watch.look(&(self.counters() + before)) {
+                    let stopped = self.make_room(before, watch).err();
+                    let counters = self.counters() + before;
+                    if let Some(reason) = stopped.or_else(|| watch.look(&counters)) {
                         return Ok(Outcome::Stopped(reason));
                     }
                 }
             }
         }
         Ok(Outcome::Exhausted)
+    }
+
+    /// Puts on disk what is cold if there is no room for it.
+    fn make_room(&mut self, before: Counters, watch: &mut dyn Watch) -> Result<(), StopReason> {
+        let Some(disk) = watch.disk() else {
+            return Ok(());
+        };
+        let (bytes, growth) = ((self.counters() + before).bytes, self.store.growth());
+        let mut cold: Vec<_> = self.store.cold().collect();
+        disk.make_room(bytes, growth, &mut cold)
+            .map_err(|_| StopReason::Disk)
     }
 
     /// Moves one node down, to the next move, or one node up.

@@ -36,7 +36,7 @@ use super::report::Report;
 use super::retrace;
 use super::shard::{Mail, Shard};
 use super::tree::{self, Origin, Tree};
-use crate::search::limits::{Counters, Unlimited, Watch, moves_between_checks};
+use crate::search::limits::{Counters, StopReason, Unlimited, Watch, moves_between_checks};
 use crate::search::outcome::{Outcome, Trace};
 
 /// Moves of a worker between two checks of the time.
@@ -287,6 +287,9 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
                 return outcome;
             }
             self.exchange();
+            if let Err(reason) = self.make_room() {
+                return Ok(Outcome::Stopped(reason));
+            }
             let counters = self.counters();
             if let Some(reason) = self.watch.look(&counters) {
                 return Ok(Outcome::Stopped(reason));
@@ -322,6 +325,20 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
     fn counters(&self) -> Counters {
         let workers = self.workers.iter().flatten();
         workers.fold(Counters::default(), |sum, one| sum + one.counters())
+    }
+
+    /// Puts on disk what is cold if there is no room for it.
+    fn make_room(&mut self) -> Result<(), StopReason> {
+        let Some(disk) = self.watch.disk() else {
+            return Ok(());
+        };
+        let bytes = self.counters().bytes;
+        let workers = self.workers.iter_mut().flatten();
+        let shards: Vec<_> = workers.map(|worker| &mut worker.shard).collect();
+        let growth = shards.iter().map(|shard| shard.tree.growth()).sum();
+        let mut cold: Vec<_> = shards.into_iter().flat_map(Shard::cold).collect();
+        disk.make_room(bytes, growth, &mut cold)
+            .map_err(|_| StopReason::Disk)
     }
 
     /// Delivers all mail.

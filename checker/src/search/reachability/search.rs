@@ -10,7 +10,7 @@
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
 
-use std::collections::VecDeque;
+use std::sync::Arc;
 
 use crate::network::{Failure, Symbolic};
 use crate::zones::Bound;
@@ -21,10 +21,14 @@ use super::parallel;
 use super::report::{Manner, Order, Report};
 use super::retrace;
 use super::tree::{self, Origin, Tree};
-use crate::search::limits::{Counters, Watch, moves_between_checks, states_between_checks};
+use crate::search::limits::{
+    Counters, StopReason, Watch, moves_between_checks, states_between_checks,
+};
 use crate::search::outcome::{Outcome, Step, Trace};
+use crate::search::store::disk::Disk;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};
+use crate::search::store::queue::Queue;
 
 /// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
@@ -72,13 +76,14 @@ struct Search<'s, 'a> {
     order: Order,
     explorer: Explorer,
     store: Store,
+    disk: Option<Arc<Disk>>,
     random: u64,
 }
 
 /// All stored states, and those of them that wait.
 struct Store {
     tree: Tree,
-    waiting: VecDeque<Stored>,
+    waiting: Queue,
     /// The state that is being explored.
     current: Origin,
     /// Whether states may wait to be stored: nobody must know at once whether they are new.
@@ -118,11 +123,12 @@ impl<'s, 'a> Search<'s, 'a> {
         watch: &'s mut dyn Watch,
     ) -> Search<'s, 'a> {
         let may_wait = order == Order::BreadthFirst && symbolic.order().is_none();
+        let tree = Tree::new(symbolic);
         Search {
             explorer: Explorer::new(symbolic, goal),
             store: Store {
-                tree: Tree::new(symbolic),
-                waiting: VecDeque::new(),
+                waiting: Queue::new(tree.passed.has_zones()),
+                tree,
                 current: Origin::NOWHERE,
                 may_wait,
             },
@@ -131,6 +137,7 @@ impl<'s, 'a> Search<'s, 'a> {
             } else {
                 1
             },
+            disk: watch.disk(),
             symbolic,
             goal,
             watch,
@@ -144,10 +151,7 @@ impl<'s, 'a> Search<'s, 'a> {
 
     fn own_counters(&self) -> Counters {
         let Store { tree, waiting, .. } = &self.store;
-        let bytes = tree.bytes()
-            + self.explorer.bytes()
-            + self.symbolic.bytes()
-            + waiting.capacity() * size_of::<Stored>();
+        let bytes = tree.bytes() + self.explorer.bytes() + self.symbolic.bytes() + waiting.bytes();
         Counters {
             explored: self.explorer.explored(),
             stored: tree.passed.len() as u64,
@@ -184,13 +188,27 @@ impl<'s, 'a> Search<'s, 'a> {
             self.shuffle_from(first);
             if self.explorer.explored() >= next_look {
                 next_look = self.explorer.explored() + look_every;
-                let counters = self.counters();
-                if let Some(reason) = self.watch.look(&counters) {
+                if let Some(reason) = self.look() {
                     return Ok(Outcome::Stopped(reason));
                 }
             }
         }
         Ok(Outcome::Exhausted)
+    }
+
+    /// Looks at the limits, and makes room in memory.
+    fn look(&mut self) -> Option<StopReason> {
+        if let Some(disk) = &self.disk {
+            let bytes = self.counters().bytes;
+            let Store { tree, waiting, .. } = &mut self.store;
+            let growth = tree.growth();
+            let mut cold: Vec<_> = tree.cold().chain([waiting.cold()]).collect();
+            if disk.make_room(bytes, growth, &mut cold).is_err() {
+                return Some(StopReason::Disk);
+            }
+        }
+        let counters = self.counters();
+        self.watch.look(&counters)
     }
 
     fn next_waiting(&mut self) -> Option<Stored> {
@@ -250,8 +268,7 @@ impl<'s, 'a> Search<'s, 'a> {
             match self.explorer.explore(&mut scene, moves)? {
                 Visit::Paused => {
                     *moves = moves_between_checks(LOOK_EVERY_MOVES, self.symbolic.dimension());
-                    let counters = self.counters();
-                    if let Some(reason) = self.watch.look(&counters) {
+                    if let Some(reason) = self.look() {
                         return Ok(Visit::Stopped(reason));
                     }
                 }

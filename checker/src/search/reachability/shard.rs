@@ -6,15 +6,15 @@
 //!
 //! Cost: a state for another shard is copied twice.
 
-use std::collections::VecDeque;
-
 use crate::zones::Bound;
 
 use super::expand::Sink;
 use super::tree::{Origin, Tree};
 use crate::search::outcome::Step;
+use crate::search::store::disk::Cold;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};
+use crate::search::store::queue::Queue;
 
 /// A state that is sent.
 #[derive(Clone, Copy, Debug)]
@@ -78,9 +78,9 @@ pub(super) struct Shard {
     pub(super) current: Origin,
     index: usize,
     /// The states that wait in the current level.
-    now: VecDeque<Stored>,
+    now: Queue,
     /// Those of the next level.
-    next: VecDeque<Stored>,
+    next: Queue,
     /// For each shard: the states that will be sent to it.
     pub(super) outgoing: Vec<Mail>,
     /// The bytes of the states that were collected since [`Shard::begin_round`].
@@ -91,11 +91,11 @@ impl Shard {
     /// The shard with this index, of `count` shards, with an empty tree.
     pub(super) fn new(tree: Tree, index: usize, count: usize) -> Shard {
         Shard {
+            now: Queue::new(tree.passed.has_zones()),
+            next: Queue::new(tree.passed.has_zones()),
             tree,
             current: Origin::NOWHERE,
             index,
-            now: VecDeque::new(),
-            next: VecDeque::new(),
             outgoing: (0..count).map(|_| Mail::default()).collect(),
             sent_bytes: 0,
         }
@@ -162,12 +162,16 @@ impl Shard {
         mail.clear();
     }
 
+    /// What may be put on disk.
+    pub(super) fn cold(&mut self) -> impl Iterator<Item = &mut dyn Cold> {
+        let waiting = [self.now.cold(), self.next.cold()];
+        self.tree.cold().chain(waiting)
+    }
+
     /// The bytes that the shard takes.
     pub(super) fn bytes(&self) -> usize {
-        let waiting = self.now.capacity() + self.next.capacity();
-        self.tree.bytes()
-            + waiting * size_of::<Stored>()
-            + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
+        let waiting = self.now.bytes() + self.next.bytes();
+        self.tree.bytes() + waiting + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
     }
 
     /// Stores a state that belongs here, unless a stored one contains it, and returns it; collects

@@ -10,9 +10,11 @@ use crate::cancellation;
 use crate::network::Symbolic;
 
 use crate::search::outcome::Step;
+use crate::search::store::disk::Cold;
 use crate::search::store::packed_paths;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};
+use crate::search::store::records::Records;
 
 /// The greatest number of trees that form one.
 pub(super) const MOST_SHARDS: usize = 1 << (31 - SHARD_SHIFT);
@@ -43,22 +45,15 @@ impl Origin {
     };
 }
 
-/// How a stored state was reached.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    parent: u32,
-    /// The only move from the parent, with the parent's shard. With [`MANY_STEPS`]: the place in
-    /// `paths` that has the number of words of the path with the shard, and then these words (see
-    /// [`paths`]).
-    path: u32,
-}
-
 /// Stored states with how they were reached.
 #[derive(Debug)]
 pub(super) struct Tree {
     pub(super) passed: PassedList,
-    nodes: Vec<Node>,
-    paths: Vec<u32>,
+    /// How each was reached: the parent, and the only move from there with the parent's shard.
+    /// With [`MANY_STEPS`]: the place in `paths` that has the number of words of the path with the
+    /// shard, and then these words (see [`packed_paths`]).
+    nodes: Records<u32>,
+    paths: Records<u32>,
     waiting: Waiting,
 }
 
@@ -77,16 +72,26 @@ impl Tree {
     pub(super) fn new(symbolic: &Symbolic<'_>) -> Tree {
         Tree {
             passed: PassedList::new(symbolic),
-            nodes: Vec::new(),
-            paths: Vec::new(),
+            nodes: Records::new(2),
+            paths: Records::new(1),
             waiting: Waiting::default(),
         }
     }
 
     /// The bytes that the tree takes.
     pub(super) fn bytes(&self) -> usize {
-        let ways = self.nodes.len() * size_of::<Node>() + size_of_val(&*self.paths);
-        self.passed.bytes() + ways
+        self.passed.bytes() + self.nodes.bytes() + self.paths.bytes()
+    }
+
+    /// The most bytes that the next state may take.
+    pub(super) fn growth(&self) -> usize {
+        self.passed.growth()
+    }
+
+    /// What may be put on disk.
+    pub(super) fn cold(&mut self) -> impl Iterator<Item = &mut dyn Cold> {
+        let ways: [&mut dyn Cold; 2] = [&mut self.nodes, &mut self.paths];
+        self.passed.cold().chain(ways)
     }
 
     /// Stores a state with the way to it, unless a stored one contains it.
@@ -154,16 +159,16 @@ impl Tree {
             step as u32 | shard
         } else {
             let first = self.paths.len();
-            self.paths.push(0);
-            packed_paths::pack(path, &mut self.paths);
-            let words = self.paths.len() - first - 1;
-            self.paths[first] = cancellation::number_below(1 << SHARD_SHIFT, words) | shard;
+            let mut words = Vec::new();
+            packed_paths::pack(path, &mut words);
+            let length = cancellation::number_below(1 << SHARD_SHIFT, words.len());
+            self.paths.push(&[length | shard]);
+            for &word in &words {
+                self.paths.push(&[word]);
+            }
             cancellation::number_below(MANY_STEPS as usize, first) | MANY_STEPS
         };
-        self.nodes.push(Node {
-            parent: origin.node,
-            path,
-        });
+        self.nodes.push(&[origin.node, path]);
     }
 }
 
@@ -173,15 +178,17 @@ pub(super) fn way(trees: &[&Tree], mut origin: Origin, last: &[Step]) -> Vec<Ste
     let mut steps: Vec<Step> = last.iter().rev().copied().collect();
     while origin.node != NONE {
         let Tree { nodes, paths, .. } = trees[origin.shard as usize];
-        let Node { parent, path } = nodes[origin.node as usize];
+        let (parent, path) = (nodes.get(origin.node)[0], nodes.get(origin.node)[1]);
         let shard = if path < MANY_STEPS {
             steps.push(Step::from(path & LENGTH));
             path >> SHARD_SHIFT
         } else {
-            let first = (path - MANY_STEPS) as usize;
-            let length = (paths[first] & LENGTH) as usize;
-            packed_paths::unpack_reversed(&paths[first + 1..=first + length], &mut steps);
-            paths[first] >> SHARD_SHIFT
+            let first = path - MANY_STEPS;
+            let head = paths.first(first);
+            let words = (first + 1..).take((head & LENGTH) as usize);
+            let words: Vec<u32> = words.map(|place| paths.first(place)).collect();
+            packed_paths::unpack_reversed(&words, &mut steps);
+            head >> SHARD_SHIFT
         };
         origin = Origin {
             shard,

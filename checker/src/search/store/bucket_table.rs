@@ -131,11 +131,20 @@ impl BucketTable {
         self.count += 1;
     }
 
+    /// The buckets by which it grows.
+    fn more(&self) -> usize {
+        (self.buckets.len() as f64 * (GROWTH - 1.0)) as usize + 1
+    }
+
+    /// The bytes by which it grows.
+    pub(super) fn growth(&self) -> usize {
+        self.more() * size_of::<Bucket>()
+    }
+
     #[inline(never)]
     fn grow(&mut self, hash_of: impl Fn(u32) -> u64) {
-        let more = (self.buckets.len() as f64 * (GROWTH - 1.0)) as usize + 1;
-        cancellation::ask_for(more * size_of::<Bucket>());
-        let buckets = self.buckets.len() + more;
+        cancellation::ask_for(self.growth());
+        let buckets = self.buckets.len() + self.more();
         self.buckets = Vec::new();
         self.buckets = vec![Bucket::EMPTY; buckets];
         for number in 0..self.count {

@@ -14,6 +14,7 @@
 
 use crate::ir::{Network, Shape};
 
+use super::disk::Cold;
 use super::hashing::hash_bytes;
 use super::records::Records;
 use super::rows::Rows;
@@ -264,6 +265,17 @@ impl StateStore {
     /// The bytes that the store takes.
     pub fn bytes(&self) -> usize {
         self.rows.bytes() + self.meta.bytes()
+    }
+
+    /// The most bytes that the next state may take.
+    pub(in crate::search) fn growth(&self) -> usize {
+        self.rows.growth()
+    }
+
+    /// What may be put on disk.
+    pub(in crate::search) fn cold(&mut self) -> impl Iterator<Item = &mut dyn Cold> {
+        let meta: &mut dyn Cold = &mut self.meta;
+        self.rows.cold().into_iter().chain([meta])
     }
 
     /// The bytes of the state that decide identity, valid until the next call.

@@ -7,6 +7,7 @@
 //! Cost: a group takes four bytes for each of its numbers, and six to nine in the table.
 
 use super::bucket_table::BucketTable;
+use super::disk::Cold;
 use super::hashing::fold;
 use super::records::Records;
 
@@ -49,6 +50,16 @@ impl Groups {
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
         self.records.bytes() + self.table.bytes() + size_of_val(&*self.recent)
+    }
+
+    /// The most bytes that the next group may take.
+    pub(super) fn growth(&self) -> usize {
+        self.table.growth()
+    }
+
+    /// What may be put on disk.
+    pub(super) fn cold(&mut self) -> &mut dyn Cold {
+        &mut self.records
     }
 
     /// The group with a number.
@@ -133,7 +144,8 @@ impl Groups {
     fn push(&mut self, of_group: u64, group: &[u32]) -> u32 {
         let number = self.records.push(group);
         let records = &self.records;
-        self.table.push(of_group, |one| hash(records.get(one)));
+        self.table
+            .push(of_group, |one| hash(records.get_in_order(one)));
         number
     }
 }

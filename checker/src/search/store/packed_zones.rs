@@ -16,6 +16,7 @@ use crate::zones::simulation::{self, NO_DEMAND};
 use crate::zones::zone_table::ZoneId;
 use crate::zones::{Bound, dbm};
 
+use super::disk::Cold;
 use super::hashing::{hash_bytes, spread};
 use super::records::Records;
 use super::segmented_table::PiecedTable;
@@ -255,6 +256,11 @@ impl PackedZones {
             self.widen();
         }
         self
+    }
+
+    /// What may be put on disk.
+    pub(super) fn cold(&mut self) -> &mut dyn Cold {
+        &mut self.matrices
     }
 
     fn get(&self, id: u32) -> &[u8] {
@@ -596,8 +602,7 @@ mod tests {
         }
         assert_eq!(packed.width, Width::Four);
         // Nothing beyond the account was made room for.
-        let room = packed.matrices.blocks.iter().map(Vec::capacity);
-        assert_eq!(room.sum::<usize>(), packed.matrices.bytes());
+        assert_eq!(packed.matrices.room(), packed.matrices.bytes());
     }
 
     #[test]

@@ -18,6 +18,7 @@ use crate::zones::Bound;
 use crate::zones::zone_table::ZoneId;
 
 use super::discrete_states::{DiscreteId, StateStore};
+use super::disk::Cold;
 use super::packed_zones::{Kept, PackedZones};
 use super::signature::Signature;
 use super::zone_lists::{Entry, Lists};
@@ -29,6 +30,27 @@ pub(in crate::search) struct Stored {
     pub(in crate::search) node: u32,
     discrete: DiscreteId,
     zone: ZoneId,
+}
+
+impl Stored {
+    /// Its numbers: the first is enough if it has no zone.
+    pub(super) fn numbers(self) -> [u32; 3] {
+        [self.node, self.discrete.0, self.zone.0]
+    }
+
+    /// The state with these numbers. Where states have no zones, they are counted as their words
+    /// are.
+    pub(super) fn of_numbers(numbers: &[u32]) -> Stored {
+        let (discrete, zone) = match *numbers {
+            [_, discrete, zone] => (discrete, zone),
+            _ => (numbers[0], 0),
+        };
+        Stored {
+            node: numbers[0],
+            discrete: DiscreteId(discrete),
+            zone: ZoneId(zone),
+        }
+    }
 }
 
 /// Stored symbolic states.
@@ -72,6 +94,16 @@ impl PassedList {
         self.store.bytes() + self.zones.bytes() + self.lists.bytes() + covered
     }
 
+    /// The most bytes that the next state may take.
+    pub(in crate::search) fn growth(&self) -> usize {
+        self.store.growth()
+    }
+
+    /// What may be put on disk.
+    pub(in crate::search) fn cold(&mut self) -> impl Iterator<Item = &mut dyn Cold> {
+        self.store.cold().chain([self.zones.cold()])
+    }
+
     /// Whether a state was contained by one that was stored later.
     pub(in crate::search) fn is_covered(&self, stored: Stored) -> bool {
         let node = stored.node as usize;
@@ -92,6 +124,11 @@ impl PassedList {
         if self.has_clocks {
             self.zones.load(stored.zone, zone);
         }
+    }
+
+    /// Whether states have zones.
+    pub(in crate::search) fn has_zones(&self) -> bool {
+        self.has_clocks
     }
 
     /// The bytes of a state's words that decide identity; see [`StateStore::pack`].

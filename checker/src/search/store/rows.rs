@@ -21,6 +21,7 @@
 //! Cost: a row takes a root, and the groups that no other row has: at most as many as the depth of
 //! the tree for each place where it differs.
 
+use super::disk::Cold;
 use super::groups::{Batch, Groups};
 
 /// The most numbers in a group.
@@ -103,6 +104,16 @@ impl Rows {
     /// The bytes that they take.
     pub(super) fn bytes(&self) -> usize {
         self.groups.bytes() + self.roots.bytes()
+    }
+
+    /// The most bytes that the next row may take; its groups are not all new.
+    pub(super) fn growth(&self) -> usize {
+        self.groups.growth() + self.roots.growth()
+    }
+
+    /// What may be put on disk.
+    pub(super) fn cold(&mut self) -> [&mut dyn Cold; 2] {
+        [self.groups.cold(), self.roots.cold()]
     }
 
     /// Whether rows are compared with one that was visited.
