@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::statistical::{precision_of, without_runs};
 use super::watched_runs::SHOW_EVERY;
 use crate::engine::answer::{Answer, Optimised, Verdict};
-use crate::engine::limits::LimitWatch;
+use crate::engine::limits::{DISK_FAILED, LimitWatch};
 use crate::engine::loaded_model::{ANALYSED, Decider, LoadedModel, NamedStrategy, PreparedQuery};
 use crate::engine::options::{RunObserver, RunsSoFar};
 use crate::engine::query_form::unnamed;
@@ -260,7 +260,7 @@ fn not_exact(network: &Network, reason: Inexact) -> String {
             "there are more than 10 million states, or they take more than 4 GiB".to_owned()
         }
         Inexact::Limit(reason) => match reason {
-            StopReason::Disk => crate::engine::limits::DISK_FAILED.to_owned(),
+            StopReason::Disk => DISK_FAILED.to_owned(),
             StopReason::Memory => "its states take more memory than allowed".to_owned(),
             _ => "there are more states than allowed".to_owned(),
         },
