@@ -132,6 +132,7 @@ impl Shard {
 
     /// Stores the states of a mail from another shard, and empties it.
     pub(super) fn deliver(&mut self, mail: &mut Mail, sender: usize) {
+        self.tree.passed.leave();
         let count = mail.heads.len().max(1);
         let record_bytes = mail.records.len() / count;
         let zone_bounds = mail.zones.len() / count;
@@ -150,8 +151,7 @@ impl Shard {
                 shard: sender as u32,
                 node: head.origin,
             };
-            self.tree.passed.propose_record(record);
-            let stored = self.tree.add_proposed(zone, origin, way);
+            let stored = self.tree.add_record(record, zone, origin, way);
             let queue = if head.steps & IS_CHOICE == 0 {
                 &mut self.next
             } else {
@@ -183,17 +183,17 @@ impl Shard {
         way: &[Step],
         is_choice: bool,
     ) -> Option<Stored> {
-        let hash = self.tree.passed.propose(words);
+        let hash = self.tree.passed.identity_hash(words);
         let owner = owner(hash, self.outgoing.len());
         if owner == self.index {
-            return self.tree.add_proposed(zone, self.current, way);
+            return self.tree.add(words, zone, self.current, way);
         }
         let mail = &mut self.outgoing[owner];
         mail.heads.push(Head {
             origin: self.current.node,
             steps: way.len() as u32 | if is_choice { IS_CHOICE } else { 0 },
         });
-        let record = self.tree.passed.proposed();
+        let record = self.tree.passed.record(words);
         mail.records.extend_from_slice(record);
         mail.zones.extend_from_slice(zone.matrix);
         mail.limits.extend_from_slice(zone.limits);
@@ -223,7 +223,5 @@ impl Sink for Shard {
 
 /// The shard of states with this hash.
 fn owner(hash: u32, shards: usize) -> usize {
-    // The upper bits decide, so that the lower bits still distinguish entries in the tables of the
-    // shards.
     ((u64::from(hash) * shards as u64) >> 32) as usize
 }

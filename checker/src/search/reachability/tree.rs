@@ -139,14 +139,15 @@ impl Tree {
         self.waiting = waiting;
     }
 
-    /// Like [`Tree::add`], for the words that were proposed last.
-    pub(super) fn add_proposed(
+    /// Like [`Tree::add`], for words that another tree has packed.
+    pub(super) fn add_record(
         &mut self,
+        record: &[u8],
         zone: Kept<'_>,
         origin: Origin,
         path: &[Step],
     ) -> Option<Stored> {
-        let stored = self.passed.add_proposed(zone)?;
+        let stored = self.passed.add_record(record, zone)?;
         self.add_node(origin, path);
         Some(stored)
     }

@@ -295,7 +295,7 @@ impl StateStore {
     pub fn intern(&mut self, words: &[i32]) -> (DiscreteId, bool) {
         if self.basis.is_empty() || self.rows.is_flat() {
             self.pack(words);
-            let found = self.intern_proposed();
+            let found = self.intern_packed();
             self.stored(words);
             return found;
         }
@@ -370,24 +370,35 @@ impl StateStore {
         }
     }
 
-    /// Packs a state, for [`StateStore::intern_proposed`] or for another store of the same network;
-    /// returns its hash, which depends only on its identity.
-    pub(super) fn propose(&mut self, words: &[i32]) -> u32 {
-        hash_bytes(self.pack(words))
+    /// A hash of the words that decide identity, the same in all stores of a network.
+    pub(super) fn identity_hash(&self, words: &[i32]) -> u32 {
+        hash_bytes(bytemuck::cast_slice(&words[..self.format.places.len()]))
     }
 
-    /// The record of the state that was packed last.
-    pub(super) fn proposed(&self) -> &[u8] {
+    /// The record of a state, for [`StateStore::intern_record`] of another store of this network.
+    ///
+    /// # Panics
+    /// If a word lies outside the range of its variable.
+    pub(super) fn record(&mut self, words: &[i32]) -> &[u8] {
+        self.pack(words);
         &self.scratch
     }
 
-    /// Takes over a record that another store of the same network has packed.
-    pub(super) fn propose_record(&mut self, record: &[u8]) {
-        self.scratch.copy_from_slice(record);
+    /// Prepares for records of another store: they are compared with each other, and not with the
+    /// state that was visited.
+    pub(super) fn leave(&mut self) {
+        self.rows.leave();
+        self.basis.clear();
     }
 
-    /// The id of the state that was packed or taken over last, and whether it is new.
-    pub(super) fn intern_proposed(&mut self) -> (DiscreteId, bool) {
+    /// The id of a state that another store of the same network has packed, and whether it is new.
+    pub(super) fn intern_record(&mut self, record: &[u8]) -> (DiscreteId, bool) {
+        self.scratch.copy_from_slice(record);
+        self.intern_packed()
+    }
+
+    /// The id of the state that was packed last, and whether it is new.
+    fn intern_packed(&mut self) -> (DiscreteId, bool) {
         let (identity, meta) = self.scratch.split_at(self.format.identity_bytes);
         let (id, is_new) = self.rows.intern(row_of(identity));
         if !self.rows.is_visited() {
@@ -654,8 +665,11 @@ mod tests {
             }
             assert_eq!(known[&words], visited);
             if next(9) == 0 {
-                store.pack(&words);
-                assert_eq!(store.intern_proposed(), (visited, false));
+                let record = store.record(&words).to_vec();
+                if next(2) == 0 {
+                    store.leave();
+                }
+                assert_eq!(store.intern_record(&record), (visited, false));
             }
             for _ in 0..next(4) {
                 let (record, field) = (next(40), next(3));

@@ -158,25 +158,29 @@ impl PassedList {
         store.intern_waiting(|discrete, is_new| each(is_new.then(|| numbered(nodes, discrete))));
     }
 
-    /// Packs the words of a state, to be stored by [`PassedList::add_proposed`] or sent to another
-    /// list; returns their hash.
-    pub(in crate::search) fn propose(&mut self, words: &[i32]) -> u32 {
-        self.store.propose(words)
+    /// See [`StateStore::identity_hash`].
+    pub(in crate::search) fn identity_hash(&self, words: &[i32]) -> u32 {
+        self.store.identity_hash(words)
     }
 
-    /// The packed words of the state that was proposed last.
-    pub(in crate::search) fn proposed(&self) -> &[u8] {
-        self.store.proposed()
+    /// The packed words of a state, for [`PassedList::add_record`] of another list for the same
+    /// network.
+    pub(in crate::search) fn record(&mut self, words: &[i32]) -> &[u8] {
+        self.store.record(words)
     }
 
-    /// Takes over words that another list for the same network has packed.
-    pub(in crate::search) fn propose_record(&mut self, record: &[u8]) {
-        self.store.propose_record(record);
+    /// Prepares for records of another list; see [`StateStore::leave`].
+    pub(in crate::search) fn leave(&mut self) {
+        self.store.leave();
     }
 
-    /// As [`PassedList::add`], for the words that were proposed last.
-    pub(in crate::search) fn add_proposed(&mut self, zone: Kept<'_>) -> Option<Stored> {
-        let interned = self.store.intern_proposed();
+    /// As [`PassedList::add`], for words that another list has packed.
+    pub(in crate::search) fn add_record(
+        &mut self,
+        record: &[u8],
+        zone: Kept<'_>,
+    ) -> Option<Stored> {
+        let interned = self.store.intern_record(record);
         self.add_interned(interned, zone)
     }
 

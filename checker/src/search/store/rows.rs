@@ -27,6 +27,9 @@ use super::groups::{Batch, Groups};
 /// The most numbers in a group.
 const WIDEST: usize = 8;
 
+/// Numbers that are compared at once.
+const BLOCK: usize = 16;
+
 /// When there are so many rows, it is seen whether they have enough in common.
 const TRIAL: usize = 4096;
 
@@ -59,6 +62,8 @@ pub(super) struct Rows {
     is_visited: bool,
     /// The roots of rows that wait to be stored.
     waiting: Batch,
+    /// The numbers of the row that is given.
+    given: Vec<u32>,
     /// What the basis had before a row was stored: places and numbers.
     before: Vec<(u32, u32)>,
     /// The groups that have changed in the level at hand, and in that above it.
@@ -91,6 +96,7 @@ impl Rows {
             basis: vec![0; first + below],
             is_visited: false,
             before: Vec::new(),
+            given: Vec::new(),
             waiting: Batch::default(),
             root: first,
             changed_above: Vec::new(),
@@ -121,6 +127,12 @@ impl Rows {
         self.is_visited
     }
 
+    /// Lets rows be compared with that which was stored last; the first one with that which was
+    /// visited.
+    pub(super) fn leave(&mut self) {
+        self.is_visited = false;
+    }
+
     /// Whether rows are kept as they are.
     pub(super) fn is_flat(&self) -> bool {
         self.levels.is_empty()
@@ -134,10 +146,24 @@ impl Rows {
             }
             return self.roots.intern(&self.basis);
         }
-        for (place, number) in row.enumerate() {
-            self.set(place, number);
-        }
+        self.set_all(row);
         self.intern_set()
+    }
+
+    /// Changes all numbers of the basis, until [`Rows::intern_set`].
+    fn set_all(&mut self, row: impl Iterator<Item = u32>) {
+        let mut given = std::mem::take(&mut self.given);
+        given.clear();
+        given.extend(row);
+        for (block, first) in given.chunks(BLOCK).zip((0..).step_by(BLOCK)) {
+            if *block == self.basis[first..first + block.len()] {
+                continue;
+            }
+            for (place, number) in (first..).zip(block) {
+                self.set(place, *number);
+            }
+        }
+        self.given = given;
     }
 
     /// Changes a number of the basis, until [`Rows::intern_set`]. Places must ascend.
@@ -194,9 +220,7 @@ impl Rows {
             self.waiting.groups.extend(row);
             return;
         }
-        for (place, number) in row.enumerate() {
-            self.set(place, number);
-        }
+        self.set_all(row);
         self.wait_set();
     }
 
