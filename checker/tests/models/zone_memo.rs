@@ -3,11 +3,13 @@
 
 use checker::analysis::{Abstraction, ClockBounds};
 use checker::exec::Interpreter;
+use checker::ir::{LocationId, Predicate, ProcessId};
 use checker::network::{Failure, MemoLimits, Stepper, Symbolic};
 use checker::search::Outcome;
 use checker::search::limits::Unlimited;
+use checker::search::liveness::leads_to::Unanswered;
 use checker::search::reachability::goal::{Goal, SharedGoal};
-use checker::search::reachability::report::{Manner, Order};
+use checker::search::reachability::report::{Manner, Order, Report};
 use checker::search::reachability::search;
 use checker::tuning::Tuning;
 use checker::zones::{Bound, Zone};
@@ -43,6 +45,25 @@ process Machine() {
         busy -> free { select i : int[0, N - 1]; sync give[i]?; };
 }
 system Worker, Machine;
+";
+
+/// Processes who enter a room one at a time, as M. J. Fischer lets them.
+const ROOM: &str = "
+const int N = 4;
+int[0, N] id;
+
+process P(const int[1, N] pid) {
+    clock x;
+    state idle, request { x <= 2 }, waiting, critical;
+    init idle;
+    trans
+        idle -> request { guard id == 0; assign x = 0; },
+        request -> waiting { guard x <= 2; assign x = 0, id = pid; },
+        waiting -> request { guard id == 0; assign x = 0; },
+        waiting -> critical { guard x > 2 && id == pid; },
+        critical -> idle { assign id = 0; };
+}
+system P;
 ";
 
 /// Looks for a state in which processes are in locations, and a clock can be at least so great, if
@@ -96,7 +117,15 @@ fn end(wanted: &Wanted, abstraction: Abstraction, threads: usize, limits: MemoLi
         threads,
     };
     let mut wanted = wanted.clone();
-    let report = search::search_shared(&mut symbolic, &mut wanted, manner, &mut Unlimited);
+    end_of(search::search_shared(
+        &mut symbolic,
+        &mut wanted,
+        manner,
+        &mut Unlimited,
+    ))
+}
+
+fn end_of(report: Report) -> End {
     let (explored, stored) = (report.counters.explored, report.counters.stored);
     match report.outcome.expect("nothing fails") {
         Outcome::Found(trace) => (true, explored, stored, trace.moves.len()),
@@ -146,6 +175,46 @@ fn limits_of_memory_change_nothing() {
                     let found = end(goal, abstraction, threads, limits);
                     assert_eq!(found, expected, "{limits:?}");
                 }
+            }
+        }
+    }
+}
+
+/// The goal and the search share the cache: what one of them forgets, the other does not use.
+#[test]
+fn limits_of_memory_change_nothing_where_runs_begin_that_do_not_end() {
+    let is_in = |location| Predicate::Location(ProcessId(0), LocationId(location));
+    let end = |from, to, abstraction, limits| {
+        let model = load(ROOM);
+        let network = model.network();
+        let interpreter = Interpreter::new(&network.functions, &network.constants);
+        let bounds = ClockBounds::new(network, &[], abstraction, Tuning::default());
+        let symbolic = Symbolic::new(Stepper::new(network, &interpreter), bounds);
+        let mut symbolic = symbolic.comparing_as_sets().remembering(limits);
+        let (open, keep) = (is_in(from), Predicate::Not(Box::new(is_in(to))));
+        let mut goal = Unanswered::new(&symbolic, &open, &keep);
+        let order = Order::BreadthFirst;
+        end_of(search::search(
+            &mut symbolic,
+            &mut goal,
+            order,
+            &mut Unlimited,
+        ))
+    };
+    // Who asks will wait; who waits may do so for ever.
+    for (is_found, from, to) in [(false, 1, 2), (true, 2, 3)] {
+        for abstraction in [Abstraction::LowerUpper, Abstraction::Maximum] {
+            let expected = end(from, to, abstraction, MemoLimits::default());
+            assert_eq!(expected.0, is_found);
+            for (bytes, misses, pause) in
+                [(0, u32::MAX, 1), (1 << 14, u32::MAX, 1), (1 << 20, 8, 4)]
+            {
+                let limits = MemoLimits {
+                    bytes,
+                    misses,
+                    pause,
+                };
+                assert_eq!(end(from, to, abstraction, limits), expected, "{limits:?}");
             }
         }
     }

@@ -63,6 +63,9 @@ impl ClockEffect {
         if !self.excluded.is_empty() || !self.assignments.iter().all(only_sets) {
             return false;
         }
+        if self.assignments.is_empty() && self.invariant.is_empty() {
+            return true;
+        }
         let mut after = zone.clone();
         after.assign(&self.assignments) && self.invariant.iter().all(|one| holds(&after, one))
     }

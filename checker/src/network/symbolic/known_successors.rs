@@ -206,6 +206,11 @@ impl<'a> Symbolic<'a> {
         self.stores_reduced() && self.symmetry().is_none()
     }
 
+    /// Whether the stored form can still be looked up.
+    pub fn is_kept(&self, kept: KeptZone) -> bool {
+        kept.age == self.memo.age
+    }
+
     /// The stored form of a zone that the last move entered: the reduced form and the limits of its
     /// ceilings, or the extrapolated zone without limits.
     pub fn kept(&self, kept: KeptZone) -> (&[Bound], &[Bound]) {

@@ -107,8 +107,40 @@ impl<'p> Delays<'p> {
         })
     }
 
+    /// Why a run may end in a zone that no wait leaves, in all of which the predicate holds, and
+    /// from which of its valuations.
+    pub(super) fn end_in(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &Zone,
+        may_delay: bool,
+    ) -> Result<Option<(RunEnding, Federation)>, Failure> {
+        if self.goes_on(symbolic, words, zone, may_delay)? {
+            return Ok(None);
+        }
+        let dimension = zone.dimension();
+        let (inside, outside) = (
+            Federation::of_zone(dimension, zone.bounds()),
+            Federation::empty(dimension),
+        );
+        let passage = Passage::new(symbolic, self.keep, words, zone.clone(), outside)?;
+        passage.end(symbolic, words, &inside)
+    }
+
+    /// Where in a zone the predicate holds.
+    pub(super) fn extent(
+        &self,
+        symbolic: &mut Symbolic<'_>,
+        words: &mut [i32],
+        zone: &[Bound],
+    ) -> Result<Extent, Failure> {
+        symbolic.extent(self.keep, words, zone)
+    }
+
     /// Whether it is easy to see that no run ends in a state, in all of which the predicate holds:
-    /// time is bounded, and one move is possible everywhere, or after a wait. Most states are so.
+    /// time is bounded, and one move is possible everywhere, or after a wait, or wherever an
+    /// invariant stops time some move is. Most states are so.
     fn goes_on(
         &mut self,
         symbolic: &mut Symbolic<'_>,
@@ -124,20 +156,60 @@ impl<'p> Delays<'p> {
         }
         symbolic.moves_within(words, bounds, &mut self.moves)?;
         self.target.resize(words.len(), 0);
+        let mut ends: Option<Vec<Zone>> = None;
         for one in self.moves.iter() {
-            let effect = symbolic.fire_within(one, words, bounds, &mut self.target)?;
-            let Some(mut part) = effect.and_then(|effect| effect.guarded_part(whole)) else {
+            let Some(effect) = symbolic.fire_within(one, words, bounds, &mut self.target)? else {
                 continue;
             };
-            if may_delay {
-                part.down(&stopped);
-            }
-            if whole.is_subset(&part) {
+            if effect.keeps_all_of(whole) {
                 return Ok(true);
+            }
+            if !may_delay {
+                continue;
+            }
+            if let Some(mut part) = effect.guarded_part(whole) {
+                part.down(&stopped);
+                if whole.is_subset(&part) {
+                    return Ok(true);
+                }
+            }
+            if ends.is_none() {
+                ends = Some(ends_of_time(symbolic, words, whole)?);
+            }
+            if let Some(ends) = &mut ends
+                && !ends.is_empty()
+            {
+                ends.retain(|end| !effect.keeps_all_of(end));
+                if ends.is_empty() {
+                    return Ok(true);
+                }
             }
         }
         Ok(false)
     }
+}
+
+/// The parts of a zone, which no wait leaves but all waits are bounded, in which an invariant lets
+/// no more time pass. All waits lead into them; there are none if invariants do not say so.
+fn ends_of_time(
+    symbolic: &mut Symbolic<'_>,
+    words: &mut [i32],
+    whole: &Zone,
+) -> Result<Vec<Zone>, Failure> {
+    let mut ends = Vec::new();
+    for Constraint { left, right, bound } in symbolic.invariant(words)?.unwrap_or_default() {
+        if left == 0 || right != 0 {
+            continue;
+        }
+        let Some(reached) = Bound::weak(-bound.value()).filter(|_| !bound.is_strict()) else {
+            return Ok(Vec::new());
+        };
+        let mut end = whole.clone();
+        if end.constrain(0, left, reached) {
+            ends.push(end);
+        }
+    }
+    Ok(ends)
 }
 
 /// The valuations of a state inside the predicate from which time can pass without limit, and those

@@ -13,6 +13,10 @@
 //! there are finitely many regions.) A node that was left without success starts no such run, and
 //! neither does any node that it contains.
 //!
+//! Most moves lead to states that are known. So it is first seen whether a node contains the state;
+//! whether a run ends there need not be asked where that node is sure ([`super::nodes`]). A new
+//! state is asked for the whole zone that is stored, so that its node is sure wherever it can be.
+//!
 //! For a run that is found, extrapolation must have kept everything that comparisons can
 //! distinguish (Extra-M+), including those of the predicate. The answer that there is none also
 //! holds with larger zones.
@@ -23,15 +27,13 @@
 //! Abstraction", CAV 2013 (which inclusions are sound). Where we differ: with stopped clocks the
 //! cut is left out and every doubt counts as a run, so that only the absence of one is certain.
 
-use crate::cancellation;
 use crate::ir::Predicate;
-use crate::network::{Failure, Moves, Symbolic};
+use crate::network::{Extent, Failure, KeptZone, KnownZone, Moves, Symbolic};
 use crate::zones::Zone;
-use crate::zones::dbm;
-use crate::zones::zone_table::{ZoneId, ZoneTable};
 
 use super::delay_inside::{Delays, Entry};
 use super::ending::RunEnding;
+use super::nodes::{Known, Nodes};
 use super::stack::{Frame, Stack};
 use crate::search::limits::{Counters, StopReason, Watch, states_between_checks};
 use crate::search::outcome::{Outcome, Trace};
@@ -39,9 +41,6 @@ use crate::search::store::discrete_states::{DiscreteId, StateStore};
 
 /// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
-
-/// No node.
-const NONE: u32 = u32::MAX;
 
 /// A run inside a predicate that never leaves it.
 #[derive(Clone, Debug)]
@@ -52,28 +51,21 @@ pub struct EndlessRun {
     pub ending: RunEnding,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    discrete: DiscreteId,
-    zone: ZoneId,
-    /// The next node with the same words.
-    next: u32,
-    /// Its place on the stack; [`NONE`] after it was left.
-    depth: u32,
-}
-
 /// Searches for runs inside `keep`. Several searches share what is known about nodes that start no
 /// run.
 pub struct Liveness<'p> {
     delays: Delays<'p>,
     store: StateStore,
-    zones: ZoneTable,
-    nodes: Vec<Node>,
-    /// For each discrete state: its first node.
-    heads: Vec<u32>,
+    nodes: Nodes,
     stack: Stack,
-    /// The words of the state that is entered.
+    /// The state that is entered: its words, its zone, and the zone as it is stored.
     words: Vec<i32>,
+    zone: Zone,
+    stored: Zone,
+    /// If a run ends in that state: the zones in which it does.
+    ends: Vec<Zone>,
+    /// Whether no clock is ever stopped.
+    has_exact_delays: bool,
     explored: u64,
     next_look: u64,
     is_coarse: bool,
@@ -82,14 +74,17 @@ pub struct Liveness<'p> {
 impl<'p> Liveness<'p> {
     /// Searches in the network of `symbolic` for runs inside `keep`.
     pub fn new(symbolic: &Symbolic<'_>, keep: &'p Predicate) -> Liveness<'p> {
+        let network = symbolic.stepper.network();
         Liveness {
             delays: Delays::inside(keep),
-            store: StateStore::new(symbolic.stepper.network()),
-            zones: ZoneTable::new(symbolic.dimension()),
-            nodes: Vec::new(),
-            heads: Vec::new(),
+            store: StateStore::new(network),
+            nodes: Nodes::new(symbolic),
             stack: Stack::default(),
-            words: Vec::new(),
+            words: network.initial.clone(),
+            zone: Zone::zero(symbolic.dimension()),
+            stored: Zone::zero(symbolic.dimension()),
+            ends: Vec::new(),
+            has_exact_delays: !network.features.stopwatches,
             explored: 0,
             next_look: states_between_checks(LOOK_EVERY, symbolic.dimension()),
             is_coarse: false,
@@ -103,12 +98,11 @@ impl<'p> Liveness<'p> {
 
     /// What was done until now.
     pub fn counters(&self) -> Counters {
-        let nodes = self.nodes.capacity() * size_of::<Node>() + self.heads.capacity() * 4;
         Counters {
             explored: self.explored,
             stored: self.nodes.len() as u64,
             waiting: self.stack.len() as u64,
-            bytes: (self.store.bytes() + self.zones.bytes() + nodes + self.stack.bytes()) as u64,
+            bytes: (self.store.bytes() + self.nodes.bytes() + self.stack.bytes()) as u64,
         }
     }
 
@@ -134,8 +128,7 @@ impl<'p> Liveness<'p> {
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome<EndlessRun>, (Failure, Trace)> {
-        let mut words = words.to_vec();
-        let outcome = self.run(symbolic, &mut words, entry, before, watch);
+        let outcome = self.run(symbolic, words, entry, before, watch);
         let outcome = outcome.map_err(|failure| (failure, self.stack_trace(symbolic)));
         self.stack.clear();
         outcome
@@ -144,28 +137,18 @@ impl<'p> Liveness<'p> {
     fn run(
         &mut self,
         symbolic: &mut Symbolic<'_>,
-        words: &mut [i32],
+        words: &[i32],
         entry: Entry<'_>,
         before: Counters,
         watch: &mut dyn Watch,
     ) -> Result<Outcome<EndlessRun>, Failure> {
-        let Some(invariant) = symbolic.invariant(words)? else {
-            return Ok(Outcome::Exhausted);
-        };
-        let mut inside = self.delays.from(symbolic, words, entry, &invariant)?;
-        self.is_coarse |= inside.is_coarse;
-        if let Some(ending) = inside.ending {
-            let mut trace = Trace::default();
-            push_state(&mut trace, words, &inside.zones);
-            return Ok(Outcome::Found(EndlessRun { trace, ending }));
+        self.words.copy_from_slice(words);
+        let (ending, zones) = self.begin(symbolic, entry)?;
+        if let Some(ending) = ending {
+            return Ok(Outcome::Found(self.found(symbolic, ending)));
         }
-        symbolic.extrapolate_all(words, &mut inside.zones);
-        for zone in inside.zones {
-            let discrete = self.discrete(words);
-            if self.is_left(discrete, &zone) {
-                continue;
-            }
-            self.push(symbolic, discrete, words, zone)?;
+        let mut zones = zones.into_iter();
+        loop {
             while self.stack.len() > 0 {
                 if let Some(ending) = self.step(symbolic)? {
                     return Ok(Outcome::Found(self.found(symbolic, ending)));
@@ -180,8 +163,46 @@ impl<'p> Liveness<'p> {
                     }
                 }
             }
+            let Some(zone) = zones.next() else {
+                return Ok(Outcome::Exhausted);
+            };
+            self.words.copy_from_slice(words);
+            self.enter_part(symbolic, zone)?;
         }
-        Ok(Outcome::Exhausted)
+    }
+
+    /// Enters the words at hand by a zone; returns the zones that are still to be entered.
+    fn begin(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        entry: Entry<'_>,
+    ) -> Result<(Option<RunEnding>, Vec<Zone>), Failure> {
+        let Some(invariant) = symbolic.invariant(&mut self.words)? else {
+            return Ok((None, Vec::new()));
+        };
+        if self.has_exact_delays && !symbolic.has_barriers() && !symbolic.splits() {
+            let may_delay = symbolic.may_delay(&mut self.words)?;
+            let zone = self.zone.bounds_mut();
+            zone.copy_from_slice(entry.zone.bounds());
+            symbolic.delay(&self.words, may_delay, &invariant, zone)?;
+            match self.delays.extent(symbolic, &mut self.words, zone)? {
+                Extent::Nowhere => return Ok((None, Vec::new())),
+                Extent::Everywhere => {
+                    let ending = self.enter_whole(symbolic, None)?;
+                    return Ok((ending, Vec::new()));
+                }
+                Extent::Part(_) => {}
+            }
+        }
+        let delays = &mut self.delays;
+        let mut inside = delays.from(symbolic, &mut self.words, entry, &invariant)?;
+        self.is_coarse |= inside.is_coarse;
+        if inside.ending.is_some() {
+            self.ends = inside.zones;
+            return Ok((inside.ending, Vec::new()));
+        }
+        symbolic.extrapolate_all(&self.words, &mut inside.zones);
+        Ok((None, inside.zones))
     }
 
     /// Puts on disk what is cold if there is no room for it.
@@ -190,7 +211,7 @@ impl<'p> Liveness<'p> {
             return Ok(());
         };
         let (bytes, growth) = ((self.counters() + before).bytes, self.store.growth());
-        let mut cold: Vec<_> = self.store.cold().collect();
+        let mut cold: Vec<_> = self.store.cold().chain(self.nodes.cold()).collect();
         disk.make_room(bytes, growth, &mut cold)
             .map_err(|_| StopReason::Disk)
     }
@@ -201,14 +222,15 @@ impl<'p> Liveness<'p> {
             return self.come_back(symbolic);
         };
         if let Some(zone) = frame.pending.pop() {
-            return self.visit(symbolic, zone);
+            self.words.copy_from_slice(&frame.target);
+            return self.enter_part(symbolic, zone);
         }
         if frame.next_move < frame.moves.len() {
-            return take_next(symbolic, &mut self.delays, frame, &mut self.is_coarse);
+            return self.take_next(symbolic);
         }
         let node = frame.node;
         self.stack.pop();
-        self.leave(node);
+        self.nodes.leave(node);
         Ok(None)
     }
 
@@ -217,138 +239,169 @@ impl<'p> Liveness<'p> {
         let Some(below) = self.stack.pop_below() else {
             return Ok(None);
         };
-        let (words, zone) = self.state(symbolic, below.node);
-        self.stack.push(symbolic, below.node, &words, zone)?;
+        let discrete = self.nodes.discrete(below.node);
+        self.store.load(discrete, &mut self.words);
+        self.nodes.load(below.node, self.stored.bounds_mut());
+        let zone = self.stored.bounds();
+        self.stack
+            .push(symbolic, below.node, &self.words, zone, None)?;
         let frame = self.stack.top().expect("a state was pushed");
         frame.next_move = below.next_move as usize;
         if below.pending > 0 {
-            frame.next_move -= 1;
-            take_next(symbolic, &mut self.delays, frame, &mut self.is_coarse)?;
+            take_parts(symbolic, &mut self.delays, frame, &mut self.is_coarse)?;
             frame.pending.truncate(below.pending as usize);
         }
         Ok(None)
     }
 
-    /// The state of a node.
-    fn state(&self, symbolic: &Symbolic<'_>, node: u32) -> (Vec<i32>, Zone) {
-        let Node { discrete, zone, .. } = self.nodes[node as usize];
-        let zone = Zone::from_bounds(symbolic.dimension(), self.zones.get(zone));
-        (self.store.words(discrete), zone)
-    }
-
-    /// The number of words; those that are new begin an empty list.
-    fn discrete(&mut self, words: &[i32]) -> DiscreteId {
-        let (discrete, is_new) = self.store.intern(words);
-        if is_new {
-            self.heads.push(NONE);
+    /// Takes the next move of the top. If it leads to one zone, in all of which the predicate
+    /// holds, that is entered; else the parts of it wait.
+    fn take_next(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
+        let top = self.stack.top();
+        let frame = top.expect("the move is taken from a node");
+        let one = frame.moves.get(frame.next_move);
+        frame.next_move += 1;
+        let from = frame.zone.bounds();
+        if self.has_exact_delays && symbolic.stays_whole(one, from) {
+            if !symbolic.may_satisfy(one, from)? {
+                return Ok(None);
+            }
+            let (words, zone) = (&mut self.words, self.zone.bounds_mut());
+            words.copy_from_slice(&frame.words);
+            let kept = if let Some(known) = frame.known.filter(|&known| symbolic.is_known(known)) {
+                let kept = symbolic.enter_known(one, words, known, from, zone)?;
+                if kept.is_none() {
+                    return Ok(None);
+                }
+                kept
+            } else {
+                zone.copy_from_slice(from);
+                if !symbolic.take(one, words, zone)? {
+                    return Ok(None);
+                }
+                symbolic.pass_time(words, zone)?;
+                None
+            };
+            match self.delays.extent(symbolic, words, zone)? {
+                Extent::Nowhere => return Ok(None),
+                Extent::Everywhere => return self.enter_whole(symbolic, kept),
+                Extent::Part(_) => {}
+            }
         }
-        discrete
+        let ending = take_parts(symbolic, &mut self.delays, frame, &mut self.is_coarse)?;
+        if ending.is_some() {
+            self.words.copy_from_slice(&frame.target);
+            self.ends = std::mem::take(&mut frame.pending);
+        }
+        Ok(ending)
     }
 
-    /// Moves to the target of the current move with this zone, unless it is known to start no run;
-    /// checks whether it closes a loop.
-    fn visit(
+    /// Enters the state at hand, in all of whose zone the predicate holds: unless it is known that
+    /// no run ends or starts there, or one is found.
+    fn enter_whole(
+        &mut self,
+        symbolic: &mut Symbolic<'_>,
+        kept: Option<KeptZone>,
+    ) -> Result<Option<RunEnding>, Failure> {
+        let (discrete, is_new) = self.store.intern(&self.words);
+        let mut number = None;
+        let stored = self.stored.bounds_mut();
+        if let Some(kept) = kept.filter(|_| !symbolic.keeps_reduced()) {
+            stored.copy_from_slice(symbolic.kept(kept).0);
+            number = symbolic.known_kept(kept);
+        } else {
+            stored.copy_from_slice(self.zone.bounds());
+            // Mostly the state is known, and this tells.
+            let known = self.nodes.propose(discrete, is_new, stored);
+            if known.is_left && known.is_sure {
+                return Ok(None);
+            }
+            symbolic.extrapolate(&self.words, stored);
+        }
+        let mut known = self.nodes.propose(discrete, is_new, stored);
+        if !known.is_sure {
+            let may_delay = symbolic.may_delay(&mut self.words)?;
+            known.is_sure = !known.is_left && self.is_sure(symbolic, may_delay);
+            if !known.is_sure {
+                let (words, zone) = (&mut self.words, &self.zone);
+                let end = self.delays.end_in(symbolic, words, zone, may_delay)?;
+                if let Some((ending, part)) = end {
+                    self.ends = part.to_zones().collect();
+                    return Ok(Some(ending));
+                }
+            }
+        }
+        self.enter(symbolic, discrete, known, number)
+    }
+
+    /// Whether it is certain that no run ends in any valuation of the stored zone at hand that the
+    /// invariants allow.
+    fn is_sure(&mut self, symbolic: &mut Symbolic<'_>, may_delay: bool) -> bool {
+        let words = &mut self.words;
+        let mut all = self.zone.clone();
+        if self.zone != self.stored {
+            // What fails only here does not concern the state.
+            let Ok(Some(invariant)) = symbolic.invariant(words) else {
+                return false;
+            };
+            all.bounds_mut().copy_from_slice(self.stored.bounds());
+            all.constrain_all(&invariant);
+            let delayed = symbolic.delay(words, may_delay, &invariant, all.bounds_mut());
+            if delayed.is_err() {
+                return false;
+            }
+        }
+        if all != self.zone {
+            let extent = self.delays.extent(symbolic, words, all.bounds());
+            if !matches!(extent, Ok(Extent::Everywhere)) {
+                return false;
+            }
+        }
+        let end = self.delays.end_in(symbolic, words, &all, may_delay);
+        matches!(end, Ok(None))
+    }
+
+    /// Enters the words at hand with a stored zone, from which no run ends.
+    fn enter_part(
         &mut self,
         symbolic: &mut Symbolic<'_>,
         zone: Zone,
     ) -> Result<Option<RunEnding>, Failure> {
-        let top = self.stack.top().expect("the move was taken from a node");
-        let mut words = std::mem::take(&mut self.words);
-        words.clone_from(&top.target);
-        let ending = self.enter(symbolic, &words, zone);
-        self.words = words;
-        ending
+        self.stored = zone;
+        let (discrete, is_new) = self.store.intern(&self.words);
+        let known = self.nodes.propose(discrete, is_new, self.stored.bounds());
+        self.enter(symbolic, discrete, known, None)
     }
 
+    /// Enters the stored state at hand, from which no run ends, unless it is known to start none;
+    /// checks whether it closes a loop.
     fn enter(
         &mut self,
         symbolic: &mut Symbolic<'_>,
-        words: &[i32],
-        zone: Zone,
+        discrete: DiscreteId,
+        known: Known,
+        number: Option<KnownZone>,
     ) -> Result<Option<RunEnding>, Failure> {
-        let discrete = self.discrete(words);
-        let closes = |one: &&Node| {
-            one.depth != NONE && dbm::is_subset(self.zones.get(one.zone), zone.bounds())
-        };
-        let closing = self.list(discrete).find(closes).map(|one| one.depth);
-        if let Some(depth) = closing {
-            let top = self.stack.top();
-            top.expect("the move was taken from a node").pending = vec![zone];
-            return Ok(Some(RunEnding::Loop(depth as usize)));
+        if let Some(node) = known.closes {
+            self.ends = vec![self.stored.clone()];
+            return Ok(Some(RunEnding::Loop(self.stack.depth(node))));
         }
-        if !self.is_left(discrete, &zone) {
-            self.push(symbolic, discrete, words, zone)?;
+        if !known.is_left {
+            self.explored += 1;
+            let node = self.nodes.add(discrete, known.is_sure);
+            let zone = self.stored.bounds();
+            self.stack.push(symbolic, node, &self.words, zone, number)?;
         }
         Ok(None)
     }
 
-    /// The nodes with these words.
-    fn list(&self, discrete: DiscreteId) -> impl Iterator<Item = &Node> {
-        // There is none beyond the end.
-        let node = |index: u32| self.nodes.get(index as usize);
-        let first = node(self.heads[discrete.0 as usize]);
-        std::iter::successors(first, move |one| node(one.next))
-    }
-
-    /// Whether it is known that no run starts in the zone.
-    fn is_left(&self, discrete: DiscreteId, zone: &Zone) -> bool {
-        self.list(discrete)
-            .any(|one| one.depth == NONE && dbm::is_subset(zone.bounds(), self.zones.get(one.zone)))
-    }
-
-    fn push(
-        &mut self,
-        symbolic: &mut Symbolic<'_>,
-        discrete: DiscreteId,
-        words: &[i32],
-        zone: Zone,
-    ) -> Result<(), Failure> {
-        self.explored += 1;
-        let node = cancellation::number(self.nodes.len());
-        self.nodes.push(Node {
-            discrete,
-            zone: self.zones.intern(zone.bounds()),
-            next: std::mem::replace(&mut self.heads[discrete.0 as usize], node),
-            depth: self.stack.len() as u32,
-        });
-        self.stack.push(symbolic, node, words, zone)
-    }
-
-    /// Notes that no run starts in a node, and drops the nodes whose zones it contains from the
-    /// list of its words.
-    fn leave(&mut self, node: u32) {
-        self.nodes[node as usize].depth = NONE;
-        let Node { discrete, zone, .. } = self.nodes[node as usize];
-        let mut previous = NONE;
-        let mut other = self.heads[discrete.0 as usize];
-        while other != NONE {
-            let Node {
-                zone: inner,
-                next,
-                depth,
-                ..
-            } = self.nodes[other as usize];
-            let is_covered = other != node
-                && depth == NONE
-                && dbm::is_subset(self.zones.get(inner), self.zones.get(zone));
-            if !is_covered {
-                previous = other;
-            } else if previous == NONE {
-                self.heads[discrete.0 as usize] = next;
-            } else {
-                self.nodes[previous as usize].next = next;
-            }
-            other = next;
-        }
-    }
-
-    /// The run on the stack, with the state in which it ends.
+    /// The run on the stack, with the state at hand, in which it ends.
     fn found(&self, symbolic: &mut Symbolic<'_>, ending: RunEnding) -> EndlessRun {
         let mut trace = self.stack_trace(symbolic);
         if let (_, [.., top]) = self.stack.all() {
             trace.moves.push(top.parts().to_vec());
-            push_state(&mut trace, &top.target, &top.pending);
         }
+        push_state(&mut trace, &self.words, &self.ends);
         EndlessRun { trace, ending }
     }
 
@@ -357,7 +410,9 @@ impl<'p> Liveness<'p> {
         let mut trace = Trace::default();
         let mut moves = Moves::default();
         for one in below {
-            let (mut words, zone) = self.state(symbolic, one.node);
+            let mut words = self.store.words(self.nodes.discrete(one.node));
+            let mut zone = Zone::zero(symbolic.dimension());
+            self.nodes.load(one.node, zone.bounds_mut());
             let found = symbolic.moves_within(&mut words, zone.bounds(), &mut moves);
             found.expect("the moves were found before");
             let current = moves.get(one.next_move as usize - 1);
@@ -374,15 +429,14 @@ impl<'p> Liveness<'p> {
     }
 }
 
-/// Takes the next move of a state: fills its pending zones.
-fn take_next(
+/// Takes the current move of a state once more: fills its pending zones.
+fn take_parts(
     symbolic: &mut Symbolic<'_>,
     delays: &mut Delays<'_>,
     frame: &mut Frame,
     is_coarse: &mut bool,
 ) -> Result<Option<RunEnding>, Failure> {
-    let one = frame.moves.get(frame.next_move);
-    frame.next_move += 1;
+    let one = frame.moves.get(frame.next_move - 1);
     let (words, zone) = (&frame.words, frame.zone.bounds());
     let Some(effect) = symbolic.fire_within(one, words, zone, &mut frame.target)? else {
         return Ok(None);

@@ -6,7 +6,7 @@
 //! what they learn.
 
 use crate::ir::Predicate;
-use crate::network::{Failure, Symbolic};
+use crate::network::{Extent, Failure, Symbolic};
 use crate::zones::Zone;
 
 use super::delay_inside::Entry;
@@ -59,12 +59,17 @@ impl Goal for Unanswered<'_> {
             counters,
             watch,
         } = visited;
-        for zone_on_entry in symbolic.part(self.open, words, zone)?.to_zones() {
+        let zones = match symbolic.extent(self.open, words, zone.bounds())? {
+            Extent::Nowhere => return Ok(Look::Continue),
+            Extent::Everywhere => vec![zone.clone()],
+            Extent::Part(part) => part.to_zones().collect(),
+        };
+        for zone_on_entry in zones {
             // For a valuation in an open part, the zone does not say whether time runs in it.
-            let is_open = !symbolic
-                .barriers(words, zone_on_entry.bounds())?
-                .open
-                .is_empty();
+            let is_open = symbolic.has_barriers() && {
+                let barriers = symbolic.barriers(words, zone_on_entry.bounds())?;
+                !barriers.open.is_empty()
+            };
             for is_running in [false, true].into_iter().take(1 + usize::from(is_open)) {
                 let entry = Entry {
                     zone: &zone_on_entry,

@@ -4,5 +4,6 @@ pub(super) mod delay_inside;
 pub mod emptiness;
 pub mod ending;
 pub mod leads_to;
+mod nodes;
 pub mod shortest_lasso;
 mod stack;

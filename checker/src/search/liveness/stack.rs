@@ -6,8 +6,8 @@
 //!
 //! Cost: twelve bytes for each state that is not near the top, and finding its moves once more.
 
-use crate::network::{Failure, Moves, Part, Symbolic};
-use crate::zones::Zone;
+use crate::network::{Failure, KnownZone, Moves, Part, Symbolic};
+use crate::zones::{Bound, Zone};
 
 /// So many states are held. When there are more, the lower half of them is let go.
 const HELD: usize = 512;
@@ -18,6 +18,8 @@ pub(super) struct Frame {
     pub(super) node: u32,
     pub(super) words: Vec<i32>,
     pub(super) zone: Zone,
+    /// The number by which moves from the zone can be looked up.
+    pub(super) known: Option<KnownZone>,
     pub(super) moves: Moves,
     pub(super) next_move: usize,
     /// The target of the current move, and its zones that are still to be visited.
@@ -79,7 +81,8 @@ impl Stack {
         symbolic: &mut Symbolic<'_>,
         node: u32,
         words: &[i32],
-        zone: Zone,
+        zone: &[Bound],
+        known: Option<KnownZone>,
     ) -> Result<(), Failure> {
         if self.held == HELD {
             self.let_go();
@@ -88,7 +91,8 @@ impl Stack {
             self.frames.push(Frame {
                 node,
                 words: words.to_vec(),
-                zone: zone.clone(),
+                zone: Zone::from_bounds(symbolic.dimension(), zone),
+                known,
                 moves: Moves::default(),
                 next_move: 0,
                 target: words.to_vec(),
@@ -99,10 +103,21 @@ impl Stack {
         self.held += 1;
         frame.node = node;
         frame.words.copy_from_slice(words);
-        frame.zone = zone;
+        frame.zone.bounds_mut().copy_from_slice(zone);
+        frame.known = known.or_else(|| symbolic.know(zone));
         frame.next_move = 0;
         frame.pending.clear();
-        symbolic.moves_within(&mut frame.words, frame.zone.bounds(), &mut frame.moves)
+        symbolic.moves_within(&mut frame.words, zone, &mut frame.moves)
+    }
+
+    /// How many states are below that of a node on the stack.
+    pub(super) fn depth(&self, node: u32) -> usize {
+        let below = self.below.iter().map(|one| one.node);
+        let held = self.frames[..self.held].iter().map(|one| one.node);
+        let mut nodes = below.chain(held);
+        nodes
+            .position(|one| one == node)
+            .expect("the node is on the stack")
     }
 
     /// Lets the lower half of the states go.

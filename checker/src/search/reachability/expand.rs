@@ -355,7 +355,8 @@ impl Explorer {
                 let symbolic = &mut *scene.symbolic;
                 let is_reduced = symbolic.keeps_reduced();
                 *known = None;
-                match kept {
+                // The goal may have looked up so many zones that the cache was cleared.
+                match kept.filter(|&one| symbolic.is_kept(one)) {
                     Some(kept) if !descends && symbolic.symmetry().is_none() => {
                         let (matrix, limits) = symbolic.kept(kept);
                         let zone = Kept {

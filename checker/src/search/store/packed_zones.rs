@@ -206,7 +206,7 @@ impl Known {
 
 /// Stored zones of one dimension.
 #[derive(Debug)]
-pub(super) struct PackedZones {
+pub(in crate::search) struct PackedZones {
     dimension: usize,
     tuning: Tuning,
     signatures: Signatures,
@@ -230,7 +230,7 @@ pub(super) struct PackedZones {
 impl PackedZones {
     /// An empty table of zones of this dimension, most of whose constants are at most `greatest`;
     /// signatures are best then.
-    pub(super) fn new(dimension: usize, greatest: i32) -> PackedZones {
+    pub(in crate::search) fn new(dimension: usize, greatest: i32) -> PackedZones {
         PackedZones {
             dimension,
             tuning: Tuning::default(),
@@ -249,7 +249,7 @@ impl PackedZones {
     }
 
     /// The same, with these heuristics only; before the first zone.
-    pub(super) fn tuned(mut self, tuning: Tuning) -> PackedZones {
+    pub(in crate::search) fn tuned(mut self, tuning: Tuning) -> PackedZones {
         self.tuning = tuning;
         if !tuning.narrow_zones {
             self.widen();
@@ -259,7 +259,7 @@ impl PackedZones {
     }
 
     /// What may be put on disk.
-    pub(super) fn cold(&mut self) -> &mut dyn Cold {
+    pub(in crate::search) fn cold(&mut self) -> &mut dyn Cold {
         &mut self.matrices
     }
 
@@ -275,9 +275,7 @@ impl PackedZones {
         {
             return signature;
         }
-        while !self.pack(zone.matrix) {
-            self.widen();
-        }
+        self.propose_alone(zone.matrix);
         let candidate = std::mem::take(&mut self.candidate);
         let signature = self.signature_of(&candidate, zone.matrix, zone.limits);
         self.candidate = candidate;
@@ -287,6 +285,13 @@ impl PackedZones {
             self.known.add(known, &self.candidate, signature);
         }
         signature
+    }
+
+    /// The same, without the signature.
+    pub(in crate::search) fn propose_alone(&mut self, matrix: &[Bound]) {
+        while !self.pack(matrix) {
+            self.widen();
+        }
     }
 
     /// The signature of a stored zone that has these limits.
@@ -325,7 +330,7 @@ impl PackedZones {
     }
 
     /// Whether a stored zone contains the candidate, which has these limits.
-    pub(super) fn contains_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+    pub(in crate::search) fn contains_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
         match self.compare(&self.candidate, self.get(id.0)) {
             Comparison::Within => true,
             Comparison::Above => false,
@@ -336,7 +341,7 @@ impl PackedZones {
     }
 
     /// Whether the candidate, which has these limits, contains a stored zone.
-    pub(super) fn is_in_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
+    pub(in crate::search) fn is_in_candidate(&mut self, id: ZoneId, limits: &[Bound]) -> bool {
         match self.compare(self.get(id.0), &self.candidate) {
             Comparison::Within => true,
             Comparison::Above => false,
@@ -344,6 +349,11 @@ impl PackedZones {
                 self.is_within(|zones| [zones.get(id.0), &zones.candidate], limits)
             }
         }
+    }
+
+    /// Whether a stored zone contains another, if zones have no limits.
+    pub(in crate::search) fn is_subset(&self, inner: ZoneId, outer: ZoneId) -> bool {
+        self.compare(self.get(inner.0), self.get(outer.0)) == Comparison::Within
     }
 
     fn compare(&self, zone: &[u8], other: &[u8]) -> Comparison {
@@ -374,7 +384,7 @@ impl PackedZones {
     }
 
     /// Keeps the candidate, or counts one more use of it if it is stored.
-    pub(super) fn keep(&mut self) -> ZoneId {
+    pub(in crate::search) fn keep(&mut self) -> ZoneId {
         let new_hash = hash(&self.candidate);
         let is_candidate = |&id: &u32| self.get(id) == self.candidate;
         if let Some(&id) = self.table.find(new_hash, is_candidate) {
@@ -396,7 +406,7 @@ impl PackedZones {
     }
 
     /// Gives up one use of a zone; without any it is forgotten. The candidate stays.
-    pub(super) fn release(&mut self, id: ZoneId) {
+    pub(in crate::search) fn release(&mut self, id: ZoneId) {
         let uses = &mut self.uses[id.0 as usize];
         *uses -= 1;
         if *uses > 0 {
@@ -409,12 +419,12 @@ impl PackedZones {
     }
 
     /// Writes a stored zone.
-    pub(super) fn load(&self, id: ZoneId, zone: &mut [Bound]) {
+    pub(in crate::search) fn load(&self, id: ZoneId, zone: &mut [Bound]) {
         unpack_as(self.width, self.get(id.0), zone);
     }
 
     /// The bytes that the zones and their table take.
-    pub(super) fn bytes(&self) -> usize {
+    pub(in crate::search) fn bytes(&self) -> usize {
         let ids = (self.uses.len() + self.free.capacity()) * size_of::<u32>();
         let buffers = self.candidate.len()
             + size_of_val(&*self.narrow)

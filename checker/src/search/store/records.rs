@@ -78,7 +78,7 @@ impl<T: Pod> Records<T> {
         &self.blocks[block].parts()[first..first + self.size]
     }
 
-    pub(super) fn get_mut(&mut self, id: u32) -> &mut [T] {
+    pub(in crate::search) fn get_mut(&mut self, id: u32) -> &mut [T] {
         let (block, first) = self.place(id);
         let range = first..first + self.size;
         &mut self.in_memory(block)[range]
