@@ -236,7 +236,7 @@ impl<'p> Liveness<'p> {
 
     /// Holds the top of the stack again.
     fn come_back(&mut self, symbolic: &mut Symbolic<'_>) -> Result<Option<RunEnding>, Failure> {
-        let Some(below) = self.stack.pop_below() else {
+        let Some((below, pending)) = self.stack.pop_below() else {
             return Ok(None);
         };
         let discrete = self.nodes.discrete(below.node);
@@ -247,9 +247,9 @@ impl<'p> Liveness<'p> {
             .push(symbolic, below.node, &self.words, zone, None)?;
         let frame = self.stack.top().expect("a state was pushed");
         frame.next_move = below.next_move as usize;
-        if below.pending > 0 {
+        if pending > 0 {
             take_parts(symbolic, &mut self.delays, frame, &mut self.is_coarse)?;
-            frame.pending.truncate(below.pending as usize);
+            frame.pending.truncate(pending);
         }
         Ok(None)
     }

@@ -4,7 +4,7 @@
 //! and moves. Of those below, only the node and the number of the next move are kept: when the
 //! search comes back to one, its state is loaded and its moves are found again.
 //!
-//! Cost: twelve bytes for each state that is not near the top, and finding its moves once more.
+//! Cost: eight bytes for each state that is not near the top, and finding its moves once more.
 
 use crate::network::{Failure, KnownZone, Moves, Part, Symbolic};
 use crate::zones::{Bound, Zone};
@@ -45,14 +45,15 @@ impl Frame {
 pub(super) struct Below {
     pub(super) node: u32,
     pub(super) next_move: u32,
-    /// How many zones of the target of the current move are still to be visited.
-    pub(super) pending: u32,
 }
 
 /// The stack.
 #[derive(Debug, Default)]
 pub(super) struct Stack {
     below: Vec<Below>,
+    /// For the states that are not held and have some: how many states are below, and how many
+    /// zones of the target of the current move are still to be visited.
+    pending: Vec<(u32, u32)>,
     /// The states that are held, the top last, and then those that can be used again.
     frames: Vec<Frame>,
     held: usize,
@@ -67,7 +68,9 @@ impl Stack {
     /// The bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
         let frames = self.frames.iter().map(Frame::bytes);
-        self.below.capacity() * size_of::<Below>() + frames.sum::<usize>()
+        self.below.capacity() * size_of::<Below>()
+            + self.pending.capacity() * size_of::<(u32, u32)>()
+            + frames.sum::<usize>()
     }
 
     /// The top, if it is held.
@@ -123,12 +126,16 @@ impl Stack {
     /// Lets the lower half of the states go.
     fn let_go(&mut self) {
         let count = HELD / 2;
-        self.below
-            .extend(self.frames[..count].iter().map(|frame| Below {
+        for frame in &self.frames[..count] {
+            if !frame.pending.is_empty() {
+                let below = self.below.len() as u32;
+                self.pending.push((below, frame.pending.len() as u32));
+            }
+            self.below.push(Below {
                 node: frame.node,
                 next_move: frame.next_move as u32,
-                pending: frame.pending.len() as u32,
-            }));
+            });
+        }
         self.frames[..self.held].rotate_left(count);
         self.held -= count;
     }
@@ -138,14 +145,19 @@ impl Stack {
         self.held -= 1;
     }
 
-    /// Takes the top out, which is not held.
-    pub(super) fn pop_below(&mut self) -> Option<Below> {
-        self.below.pop()
+    /// Takes the top out, which is not held, with the number of zones of the target of its current
+    /// move that are still to be visited.
+    pub(super) fn pop_below(&mut self) -> Option<(Below, usize)> {
+        let top = self.below.pop()?;
+        let is_of_top = |&mut (below, _): &mut (u32, u32)| below as usize == self.below.len();
+        let pending = self.pending.pop_if(is_of_top);
+        Some((top, pending.map_or(0, |(_, pending)| pending as usize)))
     }
 
     /// Removes all states.
     pub(super) fn clear(&mut self) {
         self.below.clear();
+        self.pending.clear();
         self.held = 0;
     }
 
