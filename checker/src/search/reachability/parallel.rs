@@ -137,9 +137,10 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         count: usize,
     ) -> Worker<'s, 'a, G> {
         let tree = Tree::new(symbolic);
+        let may_wait = symbolic.order().is_none();
         Worker {
             explorer: Explorer::new(symbolic, goal),
-            shard: Shard::new(tree, index, count),
+            shard: Shard::new(tree, may_wait, index, count),
             incoming: (0..count).map(|_| Mail::default()).collect(),
             symbolic,
             goal,
@@ -177,6 +178,7 @@ impl<'s, 'a, G: Goal> Worker<'s, 'a, G> {
         self.ending = self
             .explore(task.most_moves, is_cut)
             .unwrap_or_else(|failure| Some(Ending::Failed(failure)));
+        self.shard.end_round();
     }
 
     fn explore(

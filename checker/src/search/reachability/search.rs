@@ -32,8 +32,6 @@ use crate::search::store::queue::Queue;
 
 /// The greatest number of states between two checks of the limits.
 const LOOK_EVERY: u64 = 256;
-/// So many states are stored at once: see [`Tree::wait`].
-const AT_ONCE: usize = 32;
 /// The greatest number of moves between two checks of the limits.
 const LOOK_EVERY_MOVES: u64 = 1 << 12;
 
@@ -92,12 +90,7 @@ struct Store {
 
 impl Sink for Store {
     fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
-        if self.may_wait
-            && let Some(count) = self.tree.wait(words, self.current, way)
-        {
-            if count == AT_ONCE {
-                self.tree.add_waiting(&mut self.waiting);
-            }
+        if self.may_wait && self.tree.wait(words, self.current, way, &mut self.waiting) {
             return false;
         }
         let stored = self.tree.add(words, zone, self.current, way);

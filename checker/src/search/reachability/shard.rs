@@ -77,6 +77,8 @@ pub(super) struct Shard {
     /// The state that is being explored, one of this shard.
     pub(super) current: Origin,
     index: usize,
+    /// Whether states may wait to be stored: nobody must know at once whether they are new.
+    may_wait: bool,
     /// The states that wait in the current level.
     now: Queue,
     /// Those of the next level.
@@ -89,13 +91,14 @@ pub(super) struct Shard {
 
 impl Shard {
     /// The shard with this index, of `count` shards, with an empty tree.
-    pub(super) fn new(tree: Tree, index: usize, count: usize) -> Shard {
+    pub(super) fn new(tree: Tree, may_wait: bool, index: usize, count: usize) -> Shard {
         Shard {
             now: Queue::new(tree.passed.has_zones()),
             next: Queue::new(tree.passed.has_zones()),
             tree,
             current: Origin::NOWHERE,
             index,
+            may_wait,
             outgoing: (0..count).map(|_| Mail::default()).collect(),
             sent_bytes: 0,
         }
@@ -151,14 +154,17 @@ impl Shard {
                 shard: sender as u32,
                 node: head.origin,
             };
-            let stored = self.tree.add_record(record, zone, origin, way);
-            let queue = if head.steps & IS_CHOICE == 0 {
-                &mut self.next
-            } else {
-                &mut self.now
-            };
+            let is_choice = head.steps & IS_CHOICE != 0;
+            let Shard { tree, next, .. } = self;
+            if self.may_wait && !is_choice && tree.wait_record(record, origin, way, next) {
+                continue;
+            }
+            tree.add_waiting(next);
+            let stored = tree.add_record(record, zone, origin, way);
+            let queue = if is_choice { &mut self.now } else { next };
             queue.extend(stored);
         }
+        self.tree.add_waiting(&mut self.next);
         mail.clear();
     }
 
@@ -174,20 +180,20 @@ impl Shard {
         self.tree.bytes() + waiting + self.outgoing.iter().map(Mail::bytes).sum::<usize>()
     }
 
-    /// Stores a state that belongs here, unless a stored one contains it, and returns it; collects
-    /// any other state.
-    fn store_or_send(
-        &mut self,
-        words: &[i32],
-        zone: Kept<'_>,
-        way: &[Step],
-        is_choice: bool,
-    ) -> Option<Stored> {
-        let hash = self.tree.passed.identity_hash(words);
-        let owner = owner(hash, self.outgoing.len());
-        if owner == self.index {
-            return self.tree.add(words, zone, self.current, way);
-        }
+    /// Stores the states that wait to be stored.
+    pub(super) fn end_round(&mut self) {
+        self.tree.add_waiting(&mut self.next);
+    }
+
+    /// The shard to which a state belongs.
+    fn owner(&self, words: &[i32]) -> usize {
+        // The upper bits decide.
+        let hash = u64::from(self.tree.passed.identity_hash(words));
+        ((hash * self.outgoing.len() as u64) >> 32) as usize
+    }
+
+    /// Collects a state for another shard.
+    fn send(&mut self, owner: usize, words: &[i32], zone: Kept<'_>, way: &[Step], is_choice: bool) {
         let mail = &mut self.outgoing[owner];
         mail.heads.push(Head {
             origin: self.current.node,
@@ -201,27 +207,36 @@ impl Shard {
         mail.has_choices |= is_choice;
         let zone_bytes = size_of_val(zone.matrix) + size_of_val(zone.limits);
         self.sent_bytes += size_of::<Head>() + record.len() + zone_bytes + size_of_val(way);
-        None
     }
 }
 
 impl Sink for Shard {
     fn add_waiting(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
-        let stored = self.store_or_send(words, zone, way, false);
-        self.next.extend(stored);
+        let owner = self.owner(words);
+        if owner != self.index {
+            self.send(owner, words, zone, way, false);
+            return false;
+        }
+        let Shard { tree, next, .. } = self;
+        if self.may_wait && tree.wait(words, self.current, way, next) {
+            return false;
+        }
+        let stored = tree.add(words, zone, self.current, way);
+        next.extend(stored);
         stored.is_some()
     }
 
     fn add_choice(&mut self, words: &[i32], zone: Kept<'_>, way: &[Step]) -> bool {
-        self.store_or_send(words, zone, way, true).is_some()
+        let owner = self.owner(words);
+        if owner != self.index {
+            self.send(owner, words, zone, way, true);
+            return false;
+        }
+        self.tree.add_waiting(&mut self.next);
+        self.tree.add(words, zone, self.current, way).is_some()
     }
 
     fn passed(&mut self) -> &mut PassedList {
         &mut self.tree.passed
     }
-}
-
-/// The shard of states with this hash.
-fn owner(hash: u32, shards: usize) -> usize {
-    ((u64::from(hash) * shards as u64) >> 32) as usize
 }

@@ -19,6 +19,9 @@ use crate::search::store::records::Records;
 /// The greatest number of trees that form one.
 pub(super) const MOST_SHARDS: usize = 1 << (31 - SHARD_SHIFT);
 
+/// So many states are stored at once: see [`Tree::wait`].
+const AT_ONCE: usize = 32;
+
 /// Where the shard of the parent begins in a word, above a single move or the length of a way.
 const SHARD_SHIFT: u32 = 20;
 
@@ -107,22 +110,54 @@ impl Tree {
         Some(stored)
     }
 
-    /// Lets a state without a zone wait until [`Tree::add_waiting`]; returns how many wait, or
-    /// `None` if it cannot.
-    pub(super) fn wait(&mut self, words: &[i32], origin: Origin, path: &[Step]) -> Option<usize> {
-        if !self.passed.may_wait() {
-            return None;
+    /// Lets a state without a zone wait to be stored, with others at once; those that are new are
+    /// added to `out`. Returns whether it may wait.
+    pub(super) fn wait(
+        &mut self,
+        words: &[i32],
+        origin: Origin,
+        path: &[Step],
+        out: &mut impl Extend<Stored>,
+    ) -> bool {
+        let may_wait = self.passed.may_wait();
+        if may_wait {
+            self.passed.wait(words);
+            self.wait_at(origin, path, out);
         }
-        self.passed.wait(words);
+        may_wait
+    }
+
+    /// The same, for words that another tree has packed.
+    pub(super) fn wait_record(
+        &mut self,
+        record: &[u8],
+        origin: Origin,
+        path: &[Step],
+        out: &mut impl Extend<Stored>,
+    ) -> bool {
+        let may_wait = self.passed.may_wait();
+        if may_wait {
+            self.passed.wait_record(record);
+            self.wait_at(origin, path, out);
+        }
+        may_wait
+    }
+
+    fn wait_at(&mut self, origin: Origin, path: &[Step], out: &mut impl Extend<Stored>) {
         let Waiting { ways, moves, .. } = &mut self.waiting;
         moves.extend_from_slice(path);
         ways.push((origin, moves.len()));
-        Some(ways.len())
+        if ways.len() == AT_ONCE {
+            self.add_waiting(out);
+        }
     }
 
     /// Stores the states that wait, unless they were stored before; those that are new are added to
     /// `out`.
     pub(super) fn add_waiting(&mut self, out: &mut impl Extend<Stored>) {
+        if self.waiting.ways.is_empty() {
+            return;
+        }
         let mut waiting = std::mem::take(&mut self.waiting);
         let Waiting { ways, moves, found } = &mut waiting;
         self.passed.add_waiting(|stored| found.push(stored));

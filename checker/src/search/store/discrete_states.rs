@@ -322,13 +322,26 @@ impl StateStore {
     pub(super) fn wait(&mut self, words: &[i32]) {
         if self.basis.is_empty() || self.rows.is_flat() {
             self.pack(words);
-            let identity = &self.scratch[..self.format.identity_bytes];
-            self.rows.wait(row_of(identity));
+            self.wait_packed();
         } else {
             self.change(words);
             self.rows.wait_set();
         }
         self.stored(words);
+    }
+
+    /// Lets a state that another store of the same network has packed wait.
+    pub(super) fn wait_record(&mut self, record: &[u8]) {
+        self.scratch.copy_from_slice(record);
+        self.wait_packed();
+        if !self.rows.is_visited() {
+            self.basis.clear();
+        }
+    }
+
+    fn wait_packed(&mut self) {
+        let identity = &self.scratch[..self.format.identity_bytes];
+        self.rows.wait(row_of(identity));
     }
 
     /// Stores the states that wait, in their order, with what [`StateStore::intern`] returns of

@@ -152,6 +152,11 @@ impl PassedList {
         self.store.wait(words);
     }
 
+    /// The same, for words that another list has packed.
+    pub(in crate::search) fn wait_record(&mut self, record: &[u8]) {
+        self.store.wait_record(record);
+    }
+
     /// Stores the states that wait, in their order, with what [`PassedList::add`] returns of each.
     pub(in crate::search) fn add_waiting(&mut self, mut each: impl FnMut(Option<Stored>)) {
         let PassedList { store, nodes, .. } = self;
