@@ -10,6 +10,7 @@ multiple of the file's size, nor to more than a limit beyond it (`_Budget`).
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
@@ -73,6 +74,8 @@ class RunLog:
         attachments: The attached files by name.
         torn_at_byte: The byte at which a file that is cut off becomes unreadable; None if whole.
         path: The file, for messages.
+        file_bytes: The length of the file when it was read.
+        sha256: The digest of these bytes.
     """
 
     records: tuple[Record, ...]
@@ -80,6 +83,8 @@ class RunLog:
     attachments: dict[str, bytes]
     torn_at_byte: int | None
     path: Path = field(compare=False)
+    file_bytes: int = field(default=0, compare=False)
+    sha256: str = field(default="", compare=False)
 
     @property
     def scene(self) -> Scene:
@@ -217,6 +222,7 @@ def read_log(path: str | Path) -> RunLog:
         if METADATA not in collected.metadata:
             count = len(collected.records)
             raise no_log(path, file, collected.contents, count, torn_at_byte)
+        sha256 = _digest_of(file, file_bytes)
     metadata = collected.metadata[METADATA]
     if metadata.get("format_version") != str(FORMAT_VERSION):
         raise InputError(
@@ -224,7 +230,17 @@ def read_log(path: str | Path) -> RunLog:
             f"reads only version {FORMAT_VERSION}"
         )
     records = tuple(record for _, record in sorted(collected.records, key=lambda item: item[0]))
-    return RunLog(records, metadata, collected.attachments, torn_at_byte, path)
+    return RunLog(records, metadata, collected.attachments, torn_at_byte, path, file_bytes, sha256)
+
+
+def _digest_of(file: IO[bytes], file_bytes: int) -> str:
+    """The SHA-256 of the first bytes of a file: a run that goes on may have added more."""
+    file.seek(0)
+    digest, left = hashlib.sha256(), file_bytes
+    while left and (piece := file.read(min(left, _PIECE_BYTES))):
+        digest.update(piece)
+        left -= len(piece)
+    return digest.hexdigest()
 
 
 class _Collected:

@@ -29,11 +29,12 @@ _NO_ROLL_RAD = 1e-9
 
 def tell(record: Record) -> str | None:
     """The line for a record; None if the record is routine."""
-    text = _text(record)
+    text = text_of(record)
     return None if text is None else f"{record.time_s:7.2f} s  {text}"
 
 
-def _text(record: Record) -> str | None:
+def text_of(record: Record) -> str | None:
+    """What a record says, without its time; None if the record is routine."""
     match record:
         case Transition():
             return _transition(record)

@@ -76,7 +76,7 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
     """
     actual, told = log.actual, log.scene
     names = {region.name for region in actual.regions}
-    learned = tuple(region for region in _last_scene(log).regions if region.name not in names)
+    learned = tuple(region for region in last_scene(log).regions if region.name not in names)
     plans, needle = _last_plans(log, shown)
     best = curve(plans[0], needle) if plans else ()
     bent, spun = parts_of(plans[0], needle) if plans else ((), ())
@@ -102,7 +102,7 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
         caption=_outcome(ends[-1], log.records) if ends else "the log is torn",
         moments=moments_of(log.records),
         appears_s=_learned_at(log.records),
-        clock_s=_clock_s(log),
+        clock_s=clock_at_start_s(log),
         **_tubes(log),
     )
 
@@ -130,8 +130,8 @@ def _learned_at(records: Sequence[Record]) -> dict[str, float]:
     return {record.name: record.time_s for record in reversed(learned)}
 
 
-def _clock_s(log: RunLog) -> float:
-    """The time on the clock of the breath at the time 0 of the run."""
+def clock_at_start_s(log: RunLog) -> float:
+    """The time on the clock of the breath at the time 0 of the run, in s; 0 without a breath."""
     if log.actual.breath is None:
         return 0.0
     heard = (one for one in log.records if isinstance(one, Breathed))
@@ -185,7 +185,7 @@ def _followed(log: RunLog, shown: int) -> tuple[Curve, list[Curve]] | None:
     return curve_of(way), branches_of(course.tree, log.scene) if shown else []
 
 
-def _last_scene(log: RunLog) -> Scene:
+def last_scene(log: RunLog) -> Scene:
     """The scene that the driver knew at the last synthesis."""
     found = map(_SCENE_OF.fullmatch, log.attachments)
     numbers = [int(one[1]) for one in found if one]

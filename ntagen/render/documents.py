@@ -63,12 +63,15 @@ def _automata(features: Features) -> Markup:
 FOLDER: Final = Path(__file__).parents[1] / "templates"
 """Where the templates are."""
 
+_ESCAPED: Final = (".xml.jinja", ".html.jinja")
+
 
 def filled(template: str, **values: object) -> str:
     """The text that a template gives with these values.
 
     Args:
-        template: Its path in `FOLDER`; the text is XML if it ends with ``.xml.jinja``.
+        template: Its path in `FOLDER`; the text is XML if it ends with ``.xml.jinja``, and HTML if
+            it ends with ``.html.jinja``.
         values: What it is given, by name.
 
     Raises:
@@ -83,7 +86,7 @@ def _environment() -> Environment:
     return Environment(
         loader=FileSystemLoader(FOLDER),
         undefined=StrictUndefined,
-        autoescape=lambda name: name is not None and name.endswith(".xml.jinja"),
+        autoescape=lambda name: name is not None and name.endswith(_ESCAPED),
         keep_trailing_newline=True,
         # The templates of an installed program do not change while it runs.
         auto_reload=False,
