@@ -120,6 +120,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"} | {"checker.picture"},
+    "report": BASE | {"checker", "drive", "files", "plan", "plot", "render", "version"},
     "cluster": {"checker", "checker.queries", "errors", "version"},
     "experiment": BASE
     | {
@@ -149,7 +150,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "explanations",
     }
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
-    | {"checker.picture", "system"}
+    | {"checker.picture", "report", "system"}
     | {"editor", "serve", "verifyta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents"},
@@ -170,6 +171,7 @@ NEEDLE = {
     "plan",
     "drive",
     "plot",
+    "report",
     "tracking",
     "traces",
     "lab",

@@ -6,10 +6,10 @@ command called ``command``. It is imported only when the command runs, so that `
 does not wait for libraries. A command returns its exit code (nothing means 0). If it raises an
 error, this module prints one message.
 
-Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`: the
-evidence does not hold), 2 the input or the command line is wrong, 3 stopped by a limit, 4 run-time
-error in the model, 5 device fault, 70 internal error, 130 interrupted, 141 nobody reads the output
-any more, 143 ended by SIGTERM.
+Exit codes: 0 done (`check`: every query satisfied), 1 a query is not satisfied (`verify`, `report`:
+the evidence does not hold), 2 the input or the command line is wrong, 3 stopped by a limit, 4
+run-time error in the model, 5 device fault, 70 internal error, 130 interrupted, 141 nobody reads
+the output any more, 143 ended by SIGTERM.
 """
 
 from __future__ import annotations
@@ -52,6 +52,7 @@ COMMANDS: Final = {
     "device": ("needle.device", "Try a device before it drives a needle."),
     "match": ("needle.match", "Find the actions that explain measured traces of the tip."),
     "replay": ("needle.replay", "Repeat the decisions of a logged run and compare them."),
+    "report": ("needle.run_report", "Make a page of a logged run, for a lab notebook."),
     "verifyta": ("models.verifyta", "Stand in for UPPAAL's verifyta: its options, output, files."),
     "fmt": ("needle.fmt", "Format environment files."),
     "lsp": ("needle.lsp", "Answer an editor about environment files."),

@@ -49,3 +49,10 @@ def save(figure: Figure, path: Path) -> None:
         InputError: The file cannot be written, or its ending is unknown.
     """
     write_files({path: saved(figure, kind_of(path))})
+
+
+def svg_of(picture: Picture) -> str:
+    """The text of a picture as an SVG document."""
+    from ntagen.plot.picture import draw
+
+    return saved(draw(picture), "svg").decode()

@@ -1,0 +1,1 @@
+"""The report of a run, as evidence for a lab notebook: its facts, its checks, and its page."""
