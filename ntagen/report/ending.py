@@ -42,7 +42,8 @@ def errors_of(log: RunLog) -> list[dict[str, Any]]:
     """How far the tip is from the last target: the true, the measured and the estimated one.
 
     ``to_middle_mm`` is the distance to the middle of the target, ``outside_mm`` that to its
-    surface, which is negative inside.
+    surface, which is negative inside. ``time_s`` says when the tip was there: if a log is cut off,
+    the last estimate may be much older than the last measurement.
     """
     target, start_s = log.actual.targets[-1], clock_at_start_s(log)
     measured = places_of(log, Measured)
@@ -53,6 +54,7 @@ def errors_of(log: RunLog) -> list[dict[str, Any]]:
         {
             "tip": name,
             "target": target.name,
+            "time_s": places[-1][0],
             "to_middle_mm": math.dist(places[-1][1], at_rest.center_mm),
             "outside_mm": at_rest.distance_mm(places[-1][1]),
         }

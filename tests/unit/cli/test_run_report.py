@@ -82,6 +82,7 @@ def test_a_torn_log_is_reported(
     assert "The log is cut off" in path.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_many_regions_have_a_row_each(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     names = [f"V{number}" for number in range(38)]
     rows = [

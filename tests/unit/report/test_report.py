@@ -58,6 +58,11 @@ def facts(hidden: RunLog) -> dict[str, Any]:
     return facts_of(hidden)
 
 
+@pytest.fixture(scope="module")
+def page(hidden: RunLog, facts: dict[str, Any]) -> str:
+    return page_of(hidden, facts)
+
+
 class Page(HTMLParser):
     """The addresses that a page names, its open elements, and its text without styles."""
 
@@ -172,26 +177,25 @@ def test_the_digests_are_those_of_the_files(hidden: RunLog, facts: dict[str, Any
     assert {"scene.nsl", "scene.json", "rebuild-0001/plans.json"} <= found.keys()
 
 
-def test_the_page_loads_nothing_and_shows_all(hidden: RunLog, facts: dict[str, Any]) -> None:
-    text = page_of(hidden, facts)
-    page = Page(text)
-    assert [one for one in page.addresses if not one.startswith("#")] == []
-    assert not {"script", "link", "img", "iframe", "object"} & set(page.tags)
-    assert "default-src 'none'" in text
-    assert re.search(r"url\((?!#)|@import", text) is None
-    assert page.tags.count("svg") == 4
+def test_the_page_loads_nothing_and_shows_all(page: str, facts: dict[str, Any]) -> None:
+    read = Page(page)
+    assert [one for one in read.addresses if not one.startswith("#")] == []
+    assert not {"script", "link", "img", "iframe", "object"} & set(read.tags)
+    assert "default-src 'none'" in page
+    assert re.search(r"url\((?!#)|@import", page) is None
+    assert read.tags.count("svg") == 4
     for said in ("depth [mm]", "force [N]", "deviation [mm]", "time [s]", "learned 1", "--verify"):
-        assert said in page.text
-    assert all(one["sha256"] in page.text for one in facts["inputs"])
-    assert all(one["text"] in page.text for one in facts["events"])
-    assert "cut off" not in page.text
-    assert page_of(hidden, facts) == text
+        assert said in read.text
+    assert all(one["sha256"] in read.text for one in facts["inputs"])
+    assert all(one["text"] in read.text for one in facts["events"])
+    assert "cut off" not in read.text
 
 
 def test_names_from_a_log_are_text_on_the_page(plain: RunLog) -> None:
     metadata = plain.metadata | {"environment": "<script>alert(1)</script>.nsl"}
     log = replace(plain, metadata=metadata)
     page = page_of(log, facts_of(log))
+    assert page_of(log, facts_of(log)) == page
     assert "<script" not in page
     assert "&lt;script&gt;" in page
 
@@ -205,6 +209,8 @@ def test_a_torn_log_is_reported_as_torn(hidden: RunLog, tmp_path: Path) -> None:
     assert not facts["log"]["is_whole"]
     assert facts["end"] is None
     assert facts["holds"]
+    times_s = {one["tip"]: one["time_s"] for one in facts["errors"]}
+    assert times_s["estimated"] < times_s["measured"] == facts["log"]["last_s"]
     assert "all logged" in facts["checks"][0]["about"]
     page = Page(page_of(log, facts))
     assert page.text.index("The log is cut off") < page.text.index("The run in short")
