@@ -12,6 +12,8 @@ from ntagen.files import read_file
 from ntagen.needle.vectors import cross, dot
 from ntagen.scene import Vector
 from ntagen.tracking.frames import Transform
+from ntagen.tracking.hand_eye import HandEye
+from ntagen.tracking.pivot import rms
 from ntagen.tracking.registration import Fit
 
 FORMAT: Final = "ntagen-registration"
@@ -23,14 +25,8 @@ _TOLERANCE: Final = 1e-6
 
 def to_json(fit: Fit) -> dict[str, Any]:
     """The document of a registration, with its errors."""
-    transform = fit.transform
     return {
-        "format": FORMAT,
-        "version": VERSION,
-        "from": transform.source,
-        "to": transform.target,
-        "rotation": [list(row) for row in transform.rotation],
-        "translation_mm": list(transform.translation_mm),
+        **_head(fit.transform),
         "fre_mm": fit.fre_mm,
         "fle_mm": fit.fle_mm,
         "points": [
@@ -39,6 +35,56 @@ def to_json(fit: Fit) -> dict[str, Any]:
                 fit.names, fit.residuals_mm, fit.left_out_mm, strict=True
             )
         ],
+    }
+
+
+def stage_to_json(found: HandEye) -> dict[str, Any]:
+    """The document of a registration from poses of a stage and a tracker, with its errors."""
+    return {
+        **_head(found.transform),
+        "rms_mm": rms(found.residuals_mm),
+        "rms_deg": rms(found.residuals_deg),
+        "left_out_rms_mm": known(rms(found.left_out_mm)),
+        "left_out_rms_deg": known(rms(found.left_out_deg)),
+        "turns_deg": list(found.turns_deg),
+        "sensor": {
+            "rotation": [list(row) for row in found.sensor.rotation],
+            "translation_mm": list(found.sensor.translation_mm),
+        },
+        "poses": [
+            {
+                "name": name,
+                "residual_mm": residual_mm,
+                "residual_deg": residual_deg,
+                "left_out_mm": known(left_out_mm),
+                "left_out_deg": known(left_out_deg),
+            }
+            for name, residual_mm, residual_deg, left_out_mm, left_out_deg in zip(
+                found.names,
+                found.residuals_mm,
+                found.residuals_deg,
+                found.left_out_mm,
+                found.left_out_deg,
+                strict=True,
+            )
+        ],
+    }
+
+
+def known(number: float) -> float | None:
+    """A number for JSON, which has no nan: `None` if it is not known."""
+    return number if math.isfinite(number) else None
+
+
+def _head(transform: Transform) -> dict[str, Any]:
+    """What `read_transform` reads."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "from": transform.source,
+        "to": transform.target,
+        "rotation": [list(row) for row in transform.rotation],
+        "translation_mm": list(transform.translation_mm),
     }
 
 
