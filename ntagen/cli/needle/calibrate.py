@@ -1,15 +1,19 @@
-"""`ntagen calibrate`: the registration of a tracker with the scene, from pairs of points."""
+"""`ntagen calibrate`: the registration of a tracker with the scene, from pairs of points.
+
+The words `pivot` and `hand-eye` are commands of their own (`ntagen.cli.needle.calibrate_poses`).
+"""
 
 from __future__ import annotations
 
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.needle.calibrate_poses import hand_eye, pivot
 from ntagen.cli.options import output_option, path_argument
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError
@@ -39,9 +43,50 @@ def _places(
     return tuple(found)
 
 
+_WIDTH: Final = 100
+_COMMANDS: Final = {"pivot": pivot, "hand-eye": hand_eye}
+
+
+class _ByPoints(Renamed):
+    """The registration by points; its help lists the other calibrations, too."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options, then the commands."""
+        super().format_options(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, one.get_short_help_str(_WIDTH)) for name, one in _COMMANDS.items()]
+            )
+
+
+class _Calibrations(click.Group):
+    """Calibrations by name. Any other first word belongs to the one by points."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,  # noqa: ANN401  click's settings
+    ) -> click.Context:
+        """The context of the group, or of the registration by points."""
+        if args and args[0] in self.commands:
+            return super().make_context(info_name, args, parent, **extra)
+        return _by_points.make_context(info_name, args, parent, **extra)
+
+    def get_help(self, ctx: click.Context) -> str:
+        """The help of the registration by points."""
+        with click.Context(_by_points, ctx.parent, ctx.info_name) as points:
+            points.max_content_width, points.terminal_width = (
+                ctx.max_content_width,
+                ctx.terminal_width,
+            )
+            return _by_points.get_help(points)
+
+
 @click.command(
     "calibrate",
-    cls=Renamed,
+    cls=_ByPoints,
     former={"--scene": "write --at {}"},
     epilog="Exit codes: 0 done, 2 the points are rejected, 70 internal error.",
 )
@@ -84,7 +129,7 @@ def _places(
     "The file to write the registration to, for `ntagen drive --registration`.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
-def command(
+def _by_points(
     tracker_points: Path,
     scene_points: Path | None,
     frames: tuple[str, ...],
@@ -113,6 +158,9 @@ def command(
     Examples:
       ntagen calibrate examples/calibration.csv --at examples/paper.nsl -o registration.json
       ntagen calibrate measured.csv image.fcsv --frame tracker --to LPS -o registration.json
+
+    \b
+    A file that is called as one of the commands below is ./pivot or ./hand-eye.
     """  # noqa: D301  click wants the control character
     from ntagen.tracking.registration import register
     from ntagen.tracking.transform_file import to_json
@@ -135,6 +183,9 @@ def command(
     else:
         _report(fit, errors, output)
     return 0
+
+
+command = _Calibrations("calibrate", _COMMANDS)
 
 
 def _pairs(
