@@ -309,7 +309,8 @@ def _outliers(poses: Poses, rest: Rest) -> tuple[list[int], list[int]]:
     """The indices of the poses that do not fit the others, and of the others.
 
     A bad pose spoils the fit and so hides others. So the worst ones are left out first, whatever
-    their size. Then all poses that fit the rest come back, until nothing changes.
+    their size. Then all poses that fit the rest come back, until nothing changes. Poses without
+    which the others do not determine the tip are not left out: nothing could judge them.
     """
     count = len(poses)
     kept = np.arange(count)
@@ -319,6 +320,8 @@ def _outliers(poses: Poses, rest: Rest) -> tuple[list[int], list[int]]:
         order = np.argsort(core.lengths_mm)
         kept = np.sort(kept[order[: len(kept) - min(step, left)]])
         core = find_rest(poses.rotations[kept], poses.positions_mm[kept])
+    if not _determine(poses.rotations[kept]):
+        kept, core = np.arange(count), rest
     is_good = np.zeros(count, dtype=bool)
     for _ in range(_MOST_ROUNDS):
         lengths_mm = _lengths_mm(poses, kept, core)
@@ -328,8 +331,15 @@ def _outliers(poses: Poses, rest: Rest) -> tuple[list[int], list[int]]:
         if (before == is_good).all():
             break
         kept = np.flatnonzero(is_good)
+        if not _determine(poses.rotations[kept]):
+            return [], list(range(count))
         core = find_rest(poses.rotations[kept], poses.positions_mm[kept])
     return list(np.flatnonzero(~is_good)), list(np.flatnonzero(is_good))
+
+
+def _determine(rotations: _Array) -> bool:
+    """Whether rotations determine the tip well enough to judge other poses."""
+    return len(rotations) > 2 and turns_of(rotations)[0][0] >= LEAST_TURN_DEG / 2.0
 
 
 def _lengths_mm(poses: Poses, kept: npt.NDArray[np.intp], core: Rest) -> _Array:

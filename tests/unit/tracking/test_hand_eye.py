@@ -212,6 +212,14 @@ def test_a_sensor_that_is_not_fixed_is_refused() -> None:
     assert "is the sensor fixed to the carriage?" in said
 
 
+def test_a_tracker_that_hangs_is_refused() -> None:
+    stage, tracker = both()
+    hung = tracker.chosen([0] * 12)
+    refused(stage, hung, "do not fit")
+    with pytest.raises(InputError, match=r"t\.csv: the rotations are too small"):
+        find_stage(hung, stage)
+
+
 def test_inverse_rotations_are_named() -> None:
     stage, tracker = both(seed=1)
     inverse = replace(tracker, rotations=tracker.rotations.transpose(0, 2, 1))

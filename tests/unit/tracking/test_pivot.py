@@ -175,6 +175,22 @@ def test_several_bad_poses_are_named() -> None:
     assert said.count(" mm)") == 5
 
 
+@pytest.mark.parametrize("noise_mm", [0.0, 0.3])
+def test_the_few_poses_that_determine_the_tip_are_not_bad(noise_mm: float) -> None:
+    # Most poses only spin the tool: without the others, the tip could be anywhere on its axis.
+    spun, tilted = (
+        poses(48, tilt_deg=0.0, noise_mm=noise_mm),
+        poses(12, tilt_deg=60.0, noise_mm=noise_mm, seed=3),
+    )
+    found = find_tip(
+        made(
+            np.concatenate([tilted.rotations, spun.rotations]),
+            np.concatenate([tilted.positions_mm, spun.positions_mm]),
+        )
+    )
+    assert math.dist(found.tip_mm, TIP) < 4.0 * noise_mm + 1e-9
+
+
 def test_small_misfits_are_no_outliers() -> None:
     found = find_tip(shifted(poses(20), {4: (0.8, 0.0, 0.0)}))
     assert max(found.residuals_mm) == found.residuals_mm[4] > 0.5
