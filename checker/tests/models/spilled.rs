@@ -12,29 +12,29 @@ use crate::checks::{ask, interpreted, load};
 
 /// Counters that walk up and down; one has a clock.
 const COUNTERS: &str = "
-int[0,39] a, b, c; meta int seen; clock x;
+int[0,31] a, b, c; meta int seen; clock x;
 void step(int[-1,1] da, int[-1,1] db, int[-1,1] dc) { a += da; b += db; c += dc; seen = a; }
 process P() {
   state S; init S;
-  trans S -> S { guard a < 39; assign step(1, 0, 0); },
+  trans S -> S { guard a < 31; assign step(1, 0, 0); },
         S -> S { guard a > 0; assign step(-1, 0, 0); },
-        S -> S { guard b < 39; assign step(0, 1, 0); },
-        S -> S { guard c < 39; assign step(0, 0, 1); };
+        S -> S { guard b < 31; assign step(0, 1, 0); },
+        S -> S { guard c < 31; assign step(0, 0, 1); };
 }
 process Q() {
   state Off { x <= 3 }, On; init Off;
-  trans Off -> On { guard x >= 2; }, On -> Off { guard a > 37; assign x = 0; };
+  trans Off -> On { guard x >= 2; }, On -> Off { guard a > 29; assign x = 0; };
 }
 ";
 
 /// A long way from number to number.
 const WAY: &str = "
-int[0,150000] n; clock x;
+int[0,80000] n; clock x;
 process P() {
   state S { x <= 2 }, T { x <= 2 }, Done; init S;
-  trans S -> T { guard n < 150000; assign n = n + 1, x = 0; },
+  trans S -> T { guard n < 80000; assign n = n + 1, x = 0; },
         T -> S { guard x >= 1; assign x = 0; },
-        S -> Done { guard n >= 150000; };
+        S -> Done { guard n >= 80000; };
 }
 system P;
 ";
@@ -66,15 +66,15 @@ fn answers_and_counts_are_those_in_memory() {
     let untimed = format!("{COUNTERS} system P;");
     let timed = format!("{COUNTERS} system P, Q;");
     for (text, query) in [
-        (untimed.as_str(), "E<> a == 39 && b == 39 && c == 39"),
-        (&untimed, "A[] a + b + c < 118 || seen >= 0"),
+        (untimed.as_str(), "E<> a == 31 && b == 31 && c == 31"),
+        (&untimed, "A[] a + b + c < 94 || seen >= 0"),
         (&untimed, "A[] not deadlock"),
         (&untimed, "sup: a + b"),
-        (&timed, "E<> a == 39 && b == 38 && c == 39 && Q.On"),
+        (&timed, "E<> a == 31 && b == 30 && c == 31 && Q.On"),
         (&timed, "E<> deadlock"),
-        (WAY, "E<> n == 149000"),
+        (WAY, "E<> n == 79000"),
         (WAY, "A<> P.Done"),
-        (WAY, "n == 70 --> n == 140000"),
+        (WAY, "n == 70 --> n == 75000"),
     ] {
         let (in_memory, on_disk) = both(text, query, |options| options.runs = true);
         assert_eq!(on_disk.verdict, in_memory.verdict, "{query}");
@@ -98,7 +98,7 @@ fn answers_are_those_in_memory_whatever_the_order_and_the_threads() {
         (Order::DepthFirst, 1),
         (Order::Random(3), 1),
     ] {
-        for query in ["E<> a + b + c == 117 && Q.On && x > 1", "A[] a != b + 40"] {
+        for query in ["E<> a + b + c == 93 && Q.On && x > 1", "A[] a != b + 32"] {
             let (in_memory, on_disk) = both(&timed, query, |options| {
                 options.order = order;
                 options.threads = threads;
