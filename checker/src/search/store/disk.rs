@@ -133,12 +133,19 @@ impl Disk {
         cold: &mut [&mut dyn Cold],
     ) -> io::Result<()> {
         let room = (FULL * self.memory_bytes as f64) as u64;
-        let mapped = mapped_bytes().saturating_sub(self.mapped_before);
-        if bytes + mapped > room {
-            self.written().maps.iter().for_each(|map| let_go(map));
+        let written = self.written();
+        if !written.maps.is_empty() {
+            let mapped = mapped_bytes().saturating_sub(self.mapped_before);
+            if bytes + mapped > room {
+                written.maps.iter().for_each(|map| let_go(map));
+            }
+        }
+        drop(written);
+        if bytes + growth as u64 <= room {
+            return Ok(());
         }
         let cold_bytes: usize = cold.iter().map(|one| one.cold_bytes()).sum();
-        if bytes + growth as u64 > room && cold_bytes as f64 >= LEAST * self.memory_bytes as f64 {
+        if cold_bytes as f64 >= LEAST * self.memory_bytes as f64 {
             for one in cold {
                 one.spill(self)?;
             }
