@@ -119,12 +119,7 @@ impl Tree {
         path: &[Step],
         out: &mut impl Extend<Stored>,
     ) -> bool {
-        let may_wait = self.passed.may_wait();
-        if may_wait {
-            self.passed.wait(words);
-            self.wait_at(origin, path, out);
-        }
-        may_wait
+        self.wait_as(|passed| passed.wait(words), origin, path, out)
     }
 
     /// The same, for words that another tree has packed.
@@ -135,21 +130,27 @@ impl Tree {
         path: &[Step],
         out: &mut impl Extend<Stored>,
     ) -> bool {
-        let may_wait = self.passed.may_wait();
-        if may_wait {
-            self.passed.wait_record(record);
-            self.wait_at(origin, path, out);
-        }
-        may_wait
+        self.wait_as(|passed| passed.wait_record(record), origin, path, out)
     }
 
-    fn wait_at(&mut self, origin: Origin, path: &[Step], out: &mut impl Extend<Stored>) {
+    fn wait_as(
+        &mut self,
+        wait: impl FnOnce(&mut PassedList),
+        origin: Origin,
+        path: &[Step],
+        out: &mut impl Extend<Stored>,
+    ) -> bool {
+        if !self.passed.may_wait() {
+            return false;
+        }
+        wait(&mut self.passed);
         let Waiting { ways, moves, .. } = &mut self.waiting;
         moves.extend_from_slice(path);
         ways.push((origin, moves.len()));
         if ways.len() == AT_ONCE {
             self.add_waiting(out);
         }
+        true
     }
 
     /// Stores the states that wait, unless they were stored before; those that are new are added to
