@@ -178,7 +178,12 @@ def test_files_that_a_page_names_are_there(page: Path) -> None:
 def places(name: str) -> list[Path]:
     """The files, or the files below the folders, that a page means by a name."""
     found = [source / name for source in SOURCES if (source / name).exists()]
-    return [file for one in found for file in (one.rglob("*.rs") if one.is_dir() else [one])]
+    return [file for one in found for file in (files_below(one) if one.is_dir() else [one])]
+
+
+def files_below(folder: Path) -> list[Path]:
+    """The sources of both languages in a folder and in those below it."""
+    return [file for file in folder.rglob("*") if file.suffix in {".rs", ".py"}]
 
 
 def test_types_of_the_glossary_are_where_it_says() -> None:
