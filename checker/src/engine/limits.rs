@@ -304,7 +304,7 @@ impl Watch for LimitWatch {
         self.shared.look_beside(0)
     }
 
-    fn disk(&self) -> Option<Arc<Disk>> {
-        self.limits.disk.clone()
+    fn disk(&self) -> Option<&Disk> {
+        self.limits.disk.as_deref()
     }
 }

@@ -2,9 +2,7 @@
 //!
 //! The search itself reads no clock and knows no limit; its caller does.
 
-use std::sync::Arc;
-
-use super::store::disk::Disk;
+use super::store::disk::{Cold, Disk};
 
 /// What a search has done until now.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,8 +53,28 @@ pub trait Watch {
     fn look(&mut self, counters: &Counters) -> Option<StopReason>;
 
     /// Where states go that have no room in memory.
-    fn disk(&self) -> Option<Arc<Disk>> {
+    fn disk(&self) -> Option<&Disk> {
         None
+    }
+}
+
+impl dyn Watch + '_ {
+    /// Puts what is cold on disk, if there is one and memory has no room for `bytes`, and for
+    /// `growth` more before the next look.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn make_room(
+        &self,
+        bytes: u64,
+        growth: usize,
+        cold: &mut [&mut dyn Cold],
+    ) -> Result<(), StopReason> {
+        let Some(disk) = self.disk() else {
+            return Ok(());
+        };
+        let made = disk.make_room(bytes, growth, cold);
+        made.map_err(|_| StopReason::Disk)
     }
 }
 

@@ -206,14 +206,10 @@ impl<'p> Liveness<'p> {
     }
 
     /// Puts on disk what is cold if there is no room for it.
-    fn make_room(&mut self, before: Counters, watch: &mut dyn Watch) -> Result<(), StopReason> {
-        let Some(disk) = watch.disk() else {
-            return Ok(());
-        };
+    fn make_room(&mut self, before: Counters, watch: &dyn Watch) -> Result<(), StopReason> {
         let (bytes, growth) = ((self.counters() + before).bytes, self.store.growth());
         let mut cold: Vec<_> = self.store.cold().chain(self.nodes.cold()).collect();
-        disk.make_room(bytes, growth, &mut cold)
-            .map_err(|_| StopReason::Disk)
+        watch.make_room(bytes, growth, &mut cold)
     }
 
     /// Moves one node down, to the next move, or one node up.

@@ -331,16 +331,12 @@ impl<'s, 'a, G: SharedGoal> ParallelSearch<'s, 'a, '_, G> {
 
     /// Puts on disk what is cold if there is no room for it.
     fn make_room(&mut self) -> Result<(), StopReason> {
-        let Some(disk) = self.watch.disk() else {
-            return Ok(());
-        };
         let bytes = self.counters().bytes;
         let workers = self.workers.iter_mut().flatten();
         let shards: Vec<_> = workers.map(|worker| &mut worker.shard).collect();
         let growth = shards.iter().map(|shard| shard.tree.growth()).sum();
         let mut cold: Vec<_> = shards.into_iter().flat_map(Shard::cold).collect();
-        disk.make_room(bytes, growth, &mut cold)
-            .map_err(|_| StopReason::Disk)
+        self.watch.make_room(bytes, growth, &mut cold)
     }
 
     /// Delivers all mail.

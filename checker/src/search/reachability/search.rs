@@ -10,8 +10,6 @@
 //!
 //! Source: Bengtsson and Yi, "Timed Automata: Semantics, Algorithms and Tools", 2004, section 3.
 
-use std::sync::Arc;
-
 use crate::network::{Failure, Symbolic};
 use crate::zones::Bound;
 
@@ -25,7 +23,6 @@ use crate::search::limits::{
     Counters, StopReason, Watch, moves_between_checks, states_between_checks,
 };
 use crate::search::outcome::{Outcome, Step, Trace};
-use crate::search::store::disk::Disk;
 use crate::search::store::packed_zones::Kept;
 use crate::search::store::passed_list::{PassedList, Stored};
 use crate::search::store::queue::Queue;
@@ -74,7 +71,6 @@ struct Search<'s, 'a> {
     order: Order,
     explorer: Explorer,
     store: Store,
-    disk: Option<Arc<Disk>>,
     random: u64,
 }
 
@@ -130,7 +126,6 @@ impl<'s, 'a> Search<'s, 'a> {
             } else {
                 1
             },
-            disk: watch.disk(),
             symbolic,
             goal,
             watch,
@@ -191,17 +186,13 @@ impl<'s, 'a> Search<'s, 'a> {
 
     /// Looks at the limits, and makes room in memory.
     fn look(&mut self) -> Option<StopReason> {
-        if let Some(disk) = &self.disk {
-            let bytes = self.counters().bytes;
-            let Store { tree, waiting, .. } = &mut self.store;
-            let growth = tree.growth();
-            let mut cold: Vec<_> = tree.cold().chain([waiting.cold()]).collect();
-            if disk.make_room(bytes, growth, &mut cold).is_err() {
-                return Some(StopReason::Disk);
-            }
-        }
+        let bytes = self.counters().bytes;
+        let Store { tree, waiting, .. } = &mut self.store;
+        let growth = tree.growth();
+        let mut cold: Vec<_> = tree.cold().chain([waiting.cold()]).collect();
+        let stopped = self.watch.make_room(bytes, growth, &mut cold).err();
         let counters = self.counters();
-        self.watch.look(&counters)
+        stopped.or_else(|| self.watch.look(&counters))
     }
 
     fn next_waiting(&mut self) -> Option<Stored> {

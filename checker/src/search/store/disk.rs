@@ -281,15 +281,18 @@ fn mapped_bytes() -> u64 {
     pages.unwrap_or(0) * PAGE_BYTES
 }
 
+/// A folder for a test, which does not exist.
+#[cfg(test)]
+pub(super) fn test_place(name: &str) -> PathBuf {
+    let place = std::env::temp_dir().join(format!("ntagen-test-{name}-{}", process::id()));
+    let _ = fs::remove_dir_all(&place);
+    place
+}
+
 #[cfg(test)]
 mod tests {
+    use super::test_place as place;
     use super::*;
-
-    fn place(name: &str) -> PathBuf {
-        let place = std::env::temp_dir().join(format!("ntagen-test-{name}-{}", process::id()));
-        let _ = fs::remove_dir_all(&place);
-        place
-    }
 
     #[test]
     fn what_is_written_comes_back_and_the_folder_goes() {

@@ -89,14 +89,14 @@ impl Extend<Stored> for Queue {
 #[cfg(test)]
 mod tests {
     use std::collections::VecDeque;
-    use std::{env, fs, process};
+    use std::fs;
 
-    use super::super::disk::Disk;
+    use super::super::disk::{Disk, test_place};
     use super::*;
 
     #[test]
     fn states_leave_in_order_also_from_disk() {
-        let place = env::temp_dir().join(format!("ntagen-test-queue-{}", process::id()));
+        let place = test_place("queue");
         let disk = Disk::new(&place, Some(1 << 20)).expect("there is room");
         for has_zones in [false, true] {
             let (mut queue, mut known) = (Queue::new(has_zones), VecDeque::new());

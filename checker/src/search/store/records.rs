@@ -228,13 +228,14 @@ impl Records<u8> {
 
 #[cfg(test)]
 mod tests {
-    use std::{env, fs, process};
+    use std::fs;
 
+    use super::super::disk::test_place;
     use super::*;
 
     #[test]
     fn records_on_disk_are_as_they_were_and_come_back_to_be_changed() {
-        let place = env::temp_dir().join(format!("ntagen-test-records-{}", process::id()));
+        let place = test_place("records");
         let disk = Disk::new(&place, Some(1 << 20)).expect("there is room");
         let mut records = Records::<u32>::new(3);
         let record = |id: u32| [id, id / 7, !id];
