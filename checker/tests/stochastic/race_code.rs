@@ -17,7 +17,7 @@ use crate::random::Random;
 use crate::{StatisticalQuery, load};
 
 /// The runs that are compared of a model.
-const RUNS: u64 = 60;
+const RUNS: u64 = 24;
 
 /// The result of a run, its time and its moves, doubles as bits.
 type Shown = [u64; 3];
@@ -278,6 +278,8 @@ fn the_same_is_learned_from_code() {
                 code,
                 learning: Learning {
                     iterations: 2,
+                    learning_runs: Some(40),
+                    judging_runs: Some(20),
                     ..Learning::default()
                 },
                 ..Options::default()

@@ -59,7 +59,7 @@ fn a_ruin_that_one_run_in_a_billion_avoids_is_estimated() {
     let asked = ["Pr[<=100000](n > 0 U n >= 25)", "E[<=1; 1](max: n)"];
     let (network, kinds) = together(RUIN, &asked);
     let mut held = 0;
-    for seed in 0..12 {
+    for seed in 0..8 {
         let precision = Precision {
             seed,
             threads: 1 + seed as usize % 2,
@@ -82,7 +82,7 @@ fn a_ruin_that_one_run_in_a_billion_avoids_is_estimated() {
         assert!(estimate.runs < 200_000, "{}", estimate.runs);
         assert!(estimate.upper < 4.0 * estimate.lower, "{estimate:?}");
     }
-    assert!(held >= 9, "{held} of 12");
+    assert!(held >= 6, "{held} of 8");
 }
 
 #[test]
