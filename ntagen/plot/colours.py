@@ -9,6 +9,16 @@ OTHER: Final = "#8a94a6"
 TRUE: Final = "#0b2545"
 EXPECTED: Final = "#ffc93c"
 MEASURED: Final = "#7a3e9d"
+SHAFT: Final = "#56657a"
+
+DARK: Final = {
+    NEEDLE: "#7fb0ff",
+    TRUE: "#e3ebf7",
+    EXPECTED: "#b58900",
+    MEASURED: "#cf9df0",
+    SHAFT: "#aab6c6",
+}
+"""What is drawn in the dark instead of colours that are hard to see there."""
 
 REGIONS: Final = {
     "target": "#2a9d4a",

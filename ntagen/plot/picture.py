@@ -51,13 +51,41 @@ class Moment:
         time_s: The time on the clock of the run.
         true_mm: Where the tip truly is (simulation only).
         measured_mm: Where it was measured.
+        tip_mm: Where the driver takes it to be.
+        depth_mm: The insertion depth at the measurement.
+        force_n: The force that was measured.
+        off_mm: How far the measured tip was from the plan.
+        state: The state of the driver from here on.
         said: What happened, in words.
     """
 
     time_s: float
     true_mm: Vector | None = None
     measured_mm: Vector | None = None
+    tip_mm: Vector | None = None
+    depth_mm: float | None = None
+    force_n: float | None = None
+    off_mm: float | None = None
+    state: str = ""
     said: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """A plan from a moment of a run on, or how far the tip was expected around it.
+
+    Attributes:
+        time_s: The time on the clock of the run.
+        bent: The parts of its path in which the needle does not spin; without any parts there was
+            no plan any more.
+        spun: The parts in which it spins.
+        tube: How far the tip may be from the path.
+    """
+
+    time_s: float
+    bent: Sequence[Curve] = ()
+    spun: Sequence[Curve] = ()
+    tube: Tube = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +97,7 @@ class Picture:
         best: The path of the best plan.
         bent: The parts of it in which the needle does not spin; none if it never does.
         spun: The parts of it in which the needle spins, which are dashed.
-        tubes: How far the tip was expected around the plans that were followed.
+        tubes: How far the tip was expected around the plans that were followed, in order.
         tube_label: What they are in the legend.
         others: The paths of other plans.
         true_path: The true path of the tip (simulation only).
@@ -82,6 +110,8 @@ class Picture:
         caption: The lines below the picture.
         moments: The moments of a run, in order; pages and animations go through them.
         appears_s: When a region was learned, by its name.
+        plans: The plans of a run, in the order in which they were made.
+        limits: The limits of the force, in N, and of the deviation, in mm, by their key (`Moment`).
         clock_s: The time on the clock of the breath at the time 0 of the run; where plans begin
             without a run.
     """
@@ -102,8 +132,10 @@ class Picture:
     clock_s: float = 0.0
     bent: Sequence[Curve] = ()
     spun: Sequence[Curve] = ()
-    tubes: Sequence[Tube] = ()
+    tubes: Sequence[Planned] = ()
     tube_label: str = "tube"
+    plans: Sequence[Planned] = ()
+    limits: Mapping[str, float] = field(default_factory=dict)
 
 
 def draw(picture: Picture) -> Figure:
@@ -390,7 +422,7 @@ def _band(picture: Picture, shown: tuple[int, int]) -> Any:  # noqa: ANN401
     angles = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     circle = np.column_stack([np.cos(angles), np.sin(angles)])
     rims = []
-    for tube in picture.tubes:
+    for tube in (one.tube for one in picture.tubes):
         discs = [np.array([place[axis] for axis in shown]) + by * circle for place, by in tube]
         # From each place to the next, the band is the hull of two discs.
         for pair in pairwise(discs):

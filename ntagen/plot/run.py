@@ -13,15 +13,19 @@ from ntagen.drive.reading import RunLog
 from ntagen.drive.records import (
     Breathed,
     Ended,
+    Estimated,
     Followed,
     Foreseen,
     Guaranteed,
     Learned,
     Measured,
+    Predicted,
     Record,
     Synthesised,
+    Transition,
     Truth,
 )
+from ntagen.drive.settings import Settings
 from ntagen.drive.story import guaranteed, tell
 from ntagen.errors import InputError
 from ntagen.files import json_of
@@ -31,7 +35,7 @@ from ntagen.plan.branches import path_of
 from ntagen.plan.document import plan_from_json
 from ntagen.plan.synthesise import Synthesis
 from ntagen.plan.wording import clearance_of, counted, ranked_by
-from ntagen.plot.picture import GAP_MM, Curve, Moment, Picture
+from ntagen.plot.picture import GAP_MM, Curve, Moment, Picture, Planned
 from ntagen.plot.strategy import FOLLOWED_LABEL, OTHER_LABEL, branches_of, curve_of
 from ntagen.scene import Needle, Scene, Vector
 
@@ -103,25 +107,50 @@ def picture_of_run(log: RunLog, shown: int) -> Picture:
         moments=moments_of(log.records),
         appears_s=_learned_at(log.records),
         clock_s=clock_at_start_s(log),
+        plans=[] if followed is not None else _plans_of(log),
+        limits=limits_of(log.settings),
         **_tubes(log),
     )
 
 
 def moments_of(records: Sequence[Record]) -> list[Moment]:
-    """The moments of a run: one for each time at which something was measured or is told."""
+    """The moments of a run: one for each time at which something was measured, done or told."""
     at: dict[float, Moment] = {}
     for record in records:
         moment = at.get(record.time_s, Moment(record.time_s))
-        if isinstance(record, Truth):
-            moment = replace(moment, true_mm=record.position_mm)
-        elif isinstance(record, Measured):
-            moment = replace(moment, measured_mm=record.position_mm)
-        elif (text := tell(record)) is not None:
-            moment = replace(moment, said=(*moment.said, text))
-        else:
-            continue
-        at[record.time_s] = moment
+        seen = _seen(record)
+        if (text := tell(record)) is not None:
+            seen["said"] = (*moment.said, text)
+        if seen:
+            at[record.time_s] = replace(moment, **seen)
     return [at[time_s] for time_s in sorted(at)]
+
+
+def _seen(record: Record) -> dict[str, Any]:
+    """What a record tells of its moment, besides words."""
+    match record:
+        case Truth():
+            return {"true_mm": record.position_mm}
+        case Measured():
+            return {
+                "measured_mm": record.position_mm,
+                "depth_mm": record.depth_mm,
+                "force_n": record.force_n,
+            }
+        case Predicted():
+            return {"tip_mm": record.position_mm, "off_mm": record.deviation_mm}
+        case Estimated():
+            return {"tip_mm": record.position_mm}
+        case Transition():
+            return {"state": record.following}
+        case Ended():
+            return {"state": record.outcome}
+    return {}
+
+
+def limits_of(settings: Settings) -> dict[str, float]:
+    """The limits that a run keeps to and that a chart can show, by the fields of `Moment`."""
+    return {"off_mm": settings.deviation_mm}
 
 
 def _learned_at(records: Sequence[Record]) -> dict[str, float]:
@@ -155,6 +184,27 @@ def parts_of(plan: Plan, needle: Needle) -> tuple[Sequence[Curve], Sequence[Curv
         poses = sample_poses((arc,), _SPACING_MM)
         parts[push.spin > 0.0].append([pose.position_mm for pose in poses])
     return parts[False], parts[True]
+
+
+def planned(time_s: float, plan: Plan | None, needle: Needle) -> Planned:
+    """A plan that is followed from a moment on."""
+    if plan is None:
+        return Planned(time_s)
+    bent, spun = parts_of(plan, needle)
+    return Planned(time_s, bent if spun else (curve(plan, needle),), spun)
+
+
+def tube_of(foreseen: Foreseen, accept: float) -> Planned:
+    """How far the tip is expected from its plan, at a confidence."""
+    sigmas = max(0.0, NormalDist().inv_cdf(accept))
+    places = zip(foreseen.x_mm, foreseen.y_mm, foreseen.z_mm, foreseen.std_mm, strict=False)
+    tube = tuple(((x, y, z), sigmas * std_mm) for x, y, z, std_mm in places)
+    return Planned(foreseen.time_s, tube=tube)
+
+
+def tube_label(accept: float) -> str:
+    """What tubes are called."""
+    return f"tube ({100.0 * accept:g} %)"
 
 
 def _shortened(plan: str) -> str:
@@ -204,6 +254,22 @@ def _last_plans(log: RunLog, shown: int) -> tuple[list[Plan], Needle]:
     return [], log.scene.needle
 
 
+def _plans_of(log: RunLog) -> list[Planned]:
+    """The best plan of each synthesis from then on."""
+    found = []
+    for record in log.records:
+        if not isinstance(record, Synthesised):
+            continue
+        name = f"rebuild-{record.number:04d}/plans.json"
+        plan, needle = None, log.scene.needle
+        if record.plan and name in log.attachments:
+            needle = log.scene_of(record.number).needle
+            with log.naming():
+                plan = next(iter(_plans_in(log.attachments[name], 1)), None)
+        found.append(planned(record.time_s, plan, needle))
+    return found
+
+
 def _plans_in(data: bytes, shown: int) -> list[Plan]:
     """The first plans of an attachment.
 
@@ -223,15 +289,8 @@ def _tubes(log: RunLog) -> dict[str, Any]:
     if not foreseen:
         return {}
     accept = log.settings.accept
-    sigmas = max(0.0, NormalDist().inv_cdf(accept))
-    tubes = [
-        [
-            ((x, y, z), sigmas * std_mm)
-            for x, y, z, std_mm in zip(one.x_mm, one.y_mm, one.z_mm, one.std_mm, strict=False)
-        ]
-        for one in foreseen
-    ]
-    return {"tubes": tubes, "tube_label": f"tube ({100.0 * accept:g} %)"}
+    tubes = [tube_of(one, accept) for one in foreseen]
+    return {"tubes": tubes, "tube_label": tube_label(accept)}
 
 
 def _split(points: list[Vector]) -> list[Curve]:

@@ -1,6 +1,7 @@
 """A scene, its plans and a run as one HTML page: to turn, to step through, with regions on and off.
 
 The page is `viewer.html` with the data of a picture in it. It needs no network: it loads nothing.
+While a run goes on, the same page asks `ntagen.watch` for what is new.
 Positions are in mm with two decimals, times in s.
 """
 
@@ -8,6 +9,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,13 +19,35 @@ from typing import Any, Final
 
 from ntagen.files import write_files
 from ntagen.needle.vectors import cross
-from ntagen.plot.colours import MEASURED, NEEDLE, OTHER, OUTLINES, REGIONS, TRUE
-from ntagen.plot.picture import GAP_MM, Curve, Picture, bounds_mm, depth_axis
+from ntagen.plot.colours import (
+    DARK,
+    EXPECTED,
+    MEASURED,
+    NEEDLE,
+    OTHER,
+    OUTLINES,
+    REGIONS,
+    SHAFT,
+    TRUE,
+)
+from ntagen.plot.picture import (
+    GAP_MM,
+    Curve,
+    Moment,
+    Picture,
+    Planned,
+    bounds_mm,
+    depth_axis,
+)
 from ntagen.scene import Region, Vector
 from ntagen.shapes import triangles, vector_of
 
 _DATA: Final = "/*DATA*/"
+_LOADS_NOTHING: Final = "default-src 'none'"
 _HEIGHT_PX: Final = 620
+_CHARTS: Final = {"force_n": ("force", "N", "f"), "off_mm": ("distance from the plan", "mm", "off")}
+"""What a page shows over time, by the fields of `Moment`: its name, unit and key."""
+
 _STEPS: Final = 64
 """A period of the breath is shown in so many steps; between them, regions go straight."""
 
@@ -57,11 +81,19 @@ class Page:
         write_files({Path(path): self.text})
 
 
-def page_of(picture: Picture) -> Page:
-    """The page of a picture."""
+def page_of(picture: Picture, *, is_live: bool = False) -> Page:
+    """The page of a picture.
+
+    Args:
+        picture: The picture.
+        is_live: The page asks the server that it comes from for the moments of the run.
+    """
     template = resources.files("ntagen.plot").joinpath("viewer.html").read_text("utf-8")
+    if is_live:
+        template = template.replace(_LOADS_NOTHING, f"{_LOADS_NOTHING}; connect-src 'self'", 1)
     # A text in the data could end the element that the data stands in.
-    data = json.dumps(data_of(picture), separators=(",", ":"), allow_nan=False)
+    document = data_of(picture) | {"live": is_live}
+    data = json.dumps(document, separators=(",", ":"), allow_nan=False)
     return Page(template.replace(_DATA, data.replace("<", "\\u003c"), 1))
 
 
@@ -69,12 +101,7 @@ def data_of(picture: Picture) -> dict[str, Any]:
     """What the page shows, as plain data."""
     bounds = bounds_mm(picture)
     down, right, away = _axes(picture)
-    moments = [
-        {"t": round(one.time_s, 3)}
-        | ({"true": _point(one.true_mm)} if one.true_mm else {})
-        | ({"measured": _point(one.measured_mm)} if one.measured_mm else {})
-        for one in picture.moments
-    ] or _breath(picture)
+    run = run_data(picture.moments, picture.plans, picture.tubes)
     return {
         "title": picture.title or picture.scene.name,
         "caption": picture.caption,
@@ -85,16 +112,56 @@ def data_of(picture: Picture) -> dict[str, Any]:
         "away": away,
         "gap": GAP_MM,
         "clock": round(picture.clock_s, 3),
-        "regions": [_region(region, picture) for region in picture.scene.regions],
+        "regions": [
+            region_data(region, _note(region, picture), picture.appears_s.get(region.name))
+            for region in picture.scene.regions
+        ],
         "paths": list(_paths(picture)),
-        "tracks": _tracks(picture),
-        "moments": moments,
-        "log": [
-            {"t": round(one.time_s, 3), "text": text}
-            for one in picture.moments
-            for text in one.said
+        "tracks": _TRACKS,
+        "tube": {"name": picture.tube_label} | _ink(EXPECTED),
+        "plan": {"name": "plan"} | _ink(NEEDLE),
+        "charts": [
+            {"name": name, "unit": unit, "key": key, "limit": picture.limits.get(field)}
+            for field, (name, unit, key) in _CHARTS.items()
+        ],
+    } | (run if run["moments"] else run | {"moments": _breath(picture)})
+
+
+def run_data(
+    moments: Sequence[Moment], plans: Sequence[Planned], tubes: Sequence[Planned]
+) -> dict[str, Any]:
+    """What the page shows of a run, or of a part of it, as plain data."""
+    return {
+        "moments": [_moment(one) for one in moments],
+        "log": [{"t": round(one.time_s, 3), "text": text} for one in moments for text in one.said],
+        "plans": [
+            {"t": round(one.time_s, 3), "bent": _lines(one.bent), "spun": _lines(one.spun)}
+            for one in plans
+        ],
+        "tubes": [
+            {
+                "t": round(one.time_s, 3),
+                "points": [_point(place) for place, _ in one.tube],
+                "radii": [round(radius_mm, 3) for _, radius_mm in one.tube],
+            }
+            for one in tubes
         ],
     }
+
+
+def _moment(moment: Moment) -> dict[str, Any]:
+    shown: dict[str, Any] = {"t": round(moment.time_s, 3)}
+    for key, place in (
+        ("true", moment.true_mm),
+        ("measured", moment.measured_mm),
+        ("tip", moment.tip_mm),
+    ):
+        if place is not None:
+            shown[key] = _point(place)
+    for key, number in (("d", moment.depth_mm), ("f", moment.force_n), ("off", moment.off_mm)):
+        if number is not None and math.isfinite(number):
+            shown[key] = round(number, 4)
+    return shown | ({"state": moment.state} if moment.state else {})
 
 
 def _axes(picture: Picture) -> tuple[list[float], list[float], list[float]]:
@@ -108,21 +175,28 @@ def _axes(picture: Picture) -> tuple[list[float], list[float], list[float]]:
     return down, right, list(cross(vector_of(right), vector_of(down)))
 
 
-def _region(region: Region, picture: Picture) -> dict[str, Any]:
-    points, faces = triangles(region.shape)
-    note: str = region.kind
+def _note(region: Region, picture: Picture) -> str:
     if region.name in picture.learned:
-        note += ", learned"
-    elif region.name in picture.unknown:
-        note += ", not known"
-    if region.motion is not None:
-        note += ", moves with the breath"
+        return "learned"
+    return "not known" if region.name in picture.unknown else ""
+
+
+def region_data(region: Region, note: str, from_s: float | None) -> dict[str, Any]:
+    """A region as plain data.
+
+    Args:
+        region: The region.
+        note: What to say of it besides its kind; may be empty.
+        from_s: The time of the run from which on it is shown; None for always.
+    """
+    points, faces = triangles(region.shape)
+    moves = "moves with the breath" if region.motion is not None else ""
     return {
         "name": region.name,
-        "note": note,
+        "note": ", ".join(filter(None, (region.kind, note, moves))),
         "colour": REGIONS[region.kind],
         "alpha": 0.07 if region.kind in OUTLINES else 0.2,
-        "from": picture.appears_s.get(region.name),
+        "from": from_s,
         "points": [_point(vector_of(point)) for point in points],
         "faces": faces,
         "motion": _motion(region),
@@ -155,10 +229,10 @@ def _breath(picture: Picture) -> list[dict[str, Any]]:
 def _paths(picture: Picture) -> Iterable[dict[str, Any]]:
     if picture.others:
         yield _path(picture.other_label, picture.others, OTHER, 1.0, 0.5)
-    if picture.best:
+    if picture.best and not picture.plans:
         best = picture.bent if picture.spun else [picture.best]
         yield _path(picture.best_label, best, NEEDLE, 3.0, 0.9)
-    if picture.spun:
+    if picture.spun and not picture.plans:
         yield _path(f"{picture.best_label}, spinning", picture.spun, NEEDLE, 1.5, 0.9)
     if not picture.moments and picture.true_path:
         yield _path("true path", picture.true_path, TRUE, 1.5, 1.0)
@@ -167,19 +241,25 @@ def _paths(picture: Picture) -> Iterable[dict[str, Any]]:
 def _path(
     name: str, curves: Sequence[Curve], colour: str, width: float, alpha: float
 ) -> dict[str, Any]:
-    lines = [[_point(point) for point in curve] for curve in curves]
-    return {"name": name, "colour": colour, "width": width, "alpha": alpha, "lines": lines}
+    return {"name": name, "width": width, "alpha": alpha, "lines": _lines(curves)} | _ink(colour)
 
 
-def _tracks(picture: Picture) -> list[dict[str, Any]]:
-    """The paths that grow with time."""
-    tracks = []
-    if any(one.measured_mm for one in picture.moments):
-        tracks.append({"name": "measured", "key": "measured", "colour": MEASURED, "dots": True})
-    if any(one.true_mm for one in picture.moments):
-        tracks.append({"name": "true path", "key": "true", "colour": TRUE, "dots": False})
-    return [track | {"width": 1.8, "alpha": 1.0} for track in tracks]
+def _lines(curves: Sequence[Curve]) -> list[list[list[float]]]:
+    return [[_point(point) for point in curve] for curve in curves]
+
+
+def _ink(colour: str) -> dict[str, str]:
+    return {"colour": colour, "dark": DARK.get(colour, colour)}
 
 
 def _point(point: Vector) -> list[float]:
     return [round(value, 2) for value in point]
+
+
+_TRACKS: Final = [
+    {"name": "needle", "key": "tip", "kind": "needle", "width": 3.5, "alpha": 1.0} | _ink(SHAFT),
+    {"name": "measured", "key": "measured", "kind": "dots", "width": 1.6, "alpha": 1.0}
+    | _ink(MEASURED),
+    {"name": "true path", "key": "true", "kind": "line", "width": 1.8, "alpha": 1.0} | _ink(TRUE),
+]
+"""What grows with time: the needle as it lies in the tissue, and the places where its tip was."""

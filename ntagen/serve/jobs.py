@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from ntagen.serve.loopback import Refusal
 from ntagen.values import dataclass
 
 MODELS: Final = (".xml", ".xta", ".ta")
@@ -72,20 +73,6 @@ class Limits:
     upload_bytes: int = 32 << 20
     jobs: int = 2
     files: int = 20
-
-
-class Refusal(Exception):  # noqa: N818  it is an answer, not an error of the server
-    """A request that is refused.
-
-    Attributes:
-        status: The status of HTTP.
-        message: What is wrong, and the way out.
-    """
-
-    def __init__(self, status: int, message: str) -> None:
-        super().__init__(message)
-        self.status = status
-        self.message = message
 
 
 class File:

@@ -180,5 +180,5 @@ def test_a_check_is_cancelled(page: Any, server: Server) -> None:  # noqa: ANN40
 def test_the_address_without_its_token_shows_what_to_do(server: Server, browser: Any) -> None:  # noqa: ANN401
     page = browser.new_page()
     page.goto(f"http://127.0.0.1:{server.port}/")
-    assert "open the address that ntagen serve has printed" in page.inner_text("body")
+    assert "open the address that was printed" in page.inner_text("body")
     page.close()

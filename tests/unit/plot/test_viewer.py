@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import types
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +19,10 @@ import ntagen
 from ntagen.cli import main
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.reading import RunLog, read_log
-from ntagen.drive.records import Learned, Truth
+from ntagen.drive.records import Learned, Synthesised, Truth
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
+from ntagen.drive.states import State
 from ntagen.errors import InputError
 from ntagen.plot.picture import Picture
 from ntagen.plot.run import moments_of, picture_of_plans, picture_of_run
@@ -86,7 +88,29 @@ def test_a_run_has_each_moment_once_and_in_order(run: RunLog) -> None:
     last = [moment["true"] for moment in data["moments"] if "true" in moment][-1]
     assert last == pytest.approx(truths[-1].position_mm, abs=0.01)
     assert {line["t"] for line in data["log"]} <= set(times)
-    assert [track["name"] for track in data["tracks"]] == ["measured", "true path"]
+    shown = set[str]().union(*data["moments"])
+    assert {track["key"] for track in data["tracks"]} | {"f", "off", "d", "state"} <= shown
+
+
+def test_a_run_has_its_plans_when_they_were_made(run: RunLog) -> None:
+    made = [record for record in run.records if isinstance(record, Synthesised)]
+    picture = picture_of_run(run, 0)
+    assert [one.time_s for one in picture.plans] == [record.time_s for record in made]
+    assert [bool(one.bent) for one in picture.plans] == [bool(record.plan) for record in made]
+    for one in data_of(picture)["plans"]:
+        for before, after in pairwise(one["bent"] + one["spun"]):
+            assert before[-1] == after[0]
+    # The last plan that was followed leads into the target.
+    last = [one for one in picture.plans if one.bent][-1].bent[-1][-1]
+    target = next(region for region in run.actual.regions if region.kind == "target")
+    assert math.dist(last, target.center_mm) < target.radius_mm
+
+
+def test_the_state_of_the_driver_is_that_of_the_log(run: RunLog) -> None:
+    states = [one.state for one in moments_of(run.records) if one.state]
+    assert states[0] == State.INITIAL_PUSH.value
+    assert states[-1] == State.TARGET_REACHED.value
+    assert {State.PULL_BACK.value, State.STOP.value} <= set(states)
 
 
 def test_a_learned_region_appears_when_it_was_learned(run: RunLog) -> None:
@@ -101,7 +125,8 @@ def test_a_learned_region_appears_when_it_was_learned(run: RunLog) -> None:
 
 
 def test_moments_without_anything_to_see_are_left_out(run: RunLog) -> None:
-    assert all(one.said or one.true_mm or one.measured_mm for one in moments_of(run.records))
+    for one in moments_of(run.records):
+        assert one.said or one.state or one.true_mm or one.measured_mm or one.tip_mm
 
 
 def test_texts_cannot_end_the_data() -> None:
