@@ -94,6 +94,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "verifyta": {"errors", "files", "checker"},
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "serve": {"errors"},
+    "watch": {"drive", "plan", "plot", "scene", "serve", "shapes"},
     "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
@@ -151,7 +152,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     }
     | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
     | {"checker.picture", "report", "system"}
-    | {"editor", "serve", "verifyta"}
+    | {"editor", "serve", "verifyta", "watch"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
@@ -175,6 +176,7 @@ NEEDLE = {
     "tracking",
     "traces",
     "lab",
+    "watch",
 }
 """The rooms that are about needles; the face of the engine serves any model."""
 
@@ -212,7 +214,7 @@ ONLY_IN: dict[str, set[str]] = {
     "termios": set(),
     "resource": {"serve"},
     "threading": {"cluster", "drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
-    | {"plugins", "serve", "testing"},
+    | {"plugins", "serve", "testing", "watch"},
     "time": {
         "cluster",
         "drive",
@@ -224,6 +226,7 @@ ONLY_IN: dict[str, set[str]] = {
         "plot",
         "serve",
         "testing",
+        "watch",
     },
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed, and are drawn by the simulation

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -59,6 +60,9 @@ if TYPE_CHECKING:
     from ntagen.plan.policy import Policy
     from ntagen.plan.synthesise import Synthesiser
     from ntagen.scene import Scene
+
+_LOOK_S: Final = 0.05
+"""A simulation that waits looks this often whether it must end."""
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
@@ -119,6 +123,14 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     metavar="RUN.mcap",
     help="The file to write the log of the run to; an existing file is replaced.",
 )
+@click.option(
+    "--view",
+    "is_watched",
+    is_flag=True,
+    help="Show the run while it goes on on a page in the browser, which can stop it; prints the "
+    "address. There are needle, plan, tube, regions, force and deviation. A simulation then takes "
+    "the time that a real needle would.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 @click.option("--quiet", is_flag=True, help="Print only how the run ended.")
 @click.option(
@@ -139,6 +151,7 @@ def command(
     known: str,
     breath_phase_deg: float | None,
     log_path: Path | None,
+    is_watched: bool,
     as_json: bool,
     quiet: bool,
     only_settings: bool,
@@ -170,6 +183,7 @@ def command(
         --tracker openigtlink:localhost:18944:Needle --registration registration.json
       ntagen drive examples/answering/answering.nsl --tissue between --seed 1 --only-guaranteed
       ntagen drive examples/chance/chance.nsl --policy t.policy.json --log run.mcap
+      ntagen drive examples/paper.nsl --needle phantom --view
       ntagen drive examples/paper.nsl --settings
 
     \b
@@ -195,7 +209,7 @@ def command(
         show_settings(configuration)
         return 0
     tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
-    terminal = _Terminal(speaks=not (as_json or quiet), confirms=confirm)
+    terminal = _Terminal(not (as_json or quiet), confirm, is_watched)
     with signalled_operator() as operator:
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
         policy = None
@@ -260,10 +274,11 @@ class _Run:
 
 @dataclass(frozen=True, slots=True)
 class _Terminal:
-    """What the terminal is used for: to tell the run, and to ask the operator."""
+    """How the operator sees the run: told by the terminal, asked there, in the browser."""
 
     speaks: bool
     confirms: bool
+    is_watched: bool
 
 
 @contextlib.contextmanager
@@ -355,12 +370,41 @@ def _around(
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
     agree = operator.agree if terminal.confirms else lambda _: None
     told = lines(settings.ranking, moves=not terminal.confirms)
-    with told if terminal.speaks else contextlib.nullcontext() as shown:
+    with contextlib.ExitStack() as stack:
+        journals = [*log]
+        if terminal.is_watched:
+            journals.append(stack.enter_context(_watched(run, operator)))
+        if terminal.speaks:
+            journals.append(stack.enter_context(told))
         try:
-            yield synthesise, Journals(*log, *([shown] if shown else [])), agree
+            yield synthesise, Journals(*journals), agree
         except ModelError as error:
             # The model is ours: its exit code would say that no strategy holds.
             raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
+
+
+def _pace(operator: SignalledOperator) -> Callable[[float], None]:
+    """Waits for the times of a run, unless the run must end."""
+    start_s = time.monotonic()
+
+    def wait(time_s: float) -> None:
+        while not operator.wants_end and (left_s := start_s + time_s - time.monotonic()) > 0.0:
+            time.sleep(min(left_s, _LOOK_S))
+
+    return wait
+
+
+@contextlib.contextmanager
+def _watched(run: _Run, operator: SignalledOperator) -> Iterator[Journal]:
+    """The journal of a run that is shown in the browser."""
+    from ntagen.watch.feed import Feed
+    from ntagen.watch.server import watched
+
+    pace = None if run.configuration.needle.is_real else _pace(operator)
+    feed = Feed(run.scene, run.configuration.settings, pace)
+    with watched(feed, lambda: operator.end("stopped on the page of the run")) as address:
+        say([f"the run is shown at {address}"])
+        yield feed
 
 
 @contextlib.contextmanager
