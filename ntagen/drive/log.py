@@ -43,15 +43,8 @@ from ntagen.drive.records import (
 )
 from ntagen.drive.scene_json import samples_in, scene_from_json, scene_to_json
 from ntagen.drive.states import ABORTS, Event
-from ntagen.drive.viewing import (
-    TOPICS,
-    Shaft,
-    Shown,
-    show_hidden,
-    show_plan,
-    show_record,
-    show_scene,
-)
+from ntagen.drive.viewers import Viewers
+from ntagen.drive.viewing import TOPICS, Shown
 from ntagen.errors import InputError
 from ntagen.files import GrowingFile
 from ntagen.plan.document import document
@@ -121,8 +114,8 @@ class Log:
             kind: self._channel(topic_of(kind), message_class(kind)) for kind in KINDS
         }
         self._samples: dict[str, str] = {}
-        self._actual = scene_from_json(attachments[ACTUAL]) if ACTUAL in attachments else None
-        self._shaft: Shaft | None = None
+        actual = scene_from_json(attachments[ACTUAL]) if ACTUAL in attachments else None
+        self._viewers = Viewers(actual)
         # When viewers saw the needle last, by the kind of record.
         self._seen_s: dict[type[Record], float] = {}
         self._views = {topic: self._channel(topic, kind) for topic, kind in TOPICS.items()}
@@ -142,10 +135,7 @@ class Log:
         text = scene_to_json(scene)
         self._samples = samples_in(text)
         self._attach(SCENE, text.encode())
-        self._show(show_scene(scene))
-        if self._actual is not None:
-            self._show(show_hidden(self._actual, scene))
-        self._shaft = Shaft(scene.needle.tip.position_mm)
+        self._show(self._viewers.started(scene))
         self._acknowledge(to_disk=True)
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
@@ -173,7 +163,7 @@ class Log:
             # The strategy of the paper's task is 0.6 MB of JSON, and 40 KB packed.
             packed = gzip.compress(synthesis.strategy_json.encode(), compresslevel=1, mtime=0)
             self._attach(f"{folder}/{STRATEGY}", packed, "application/gzip")
-        self._show(show_plan(synthesis, self._time_ns / 1e9))
+        self._show(self._viewers.synthesised(synthesis, self._time_ns / 1e9))
         self._keep(to_disk=False)
 
     def record(self, record: Record) -> None:
@@ -187,11 +177,7 @@ class Log:
         self._time_ns = round(record.time_s * 1e9)
         self._add(self._channels[type(record)], encode(record, self._sequence))
         self._sequence += 1
-        is_due = self._is_due(record)
-        if is_due:
-            self._show(show_record(record))
-        if self._shaft is not None:
-            self._show(self._shaft.show(record, is_due=is_due))
+        self._show(self._viewers.recorded(record, is_due=self._is_due(record)))
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
         self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))
 

@@ -8,7 +8,6 @@ again asks from the first one on, and misses nothing.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -30,9 +29,6 @@ from ntagen.plot.viewer import region_data, run_data
 from ntagen.scene import Needle, Region, RegionKind, Scene
 from ntagen.shapes import Sphere
 
-Pace = Callable[[float], None]
-"""Waits until this time of the run has come, in s."""
-
 
 @dataclass(frozen=True, slots=True)
 class _Found:
@@ -46,17 +42,15 @@ class _Found:
 class Feed:
     """A journal of a run, which pages ask for what is new."""
 
-    def __init__(self, scene: Scene, settings: Settings, pace: Pace | None = None) -> None:
+    def __init__(self, scene: Scene, settings: Settings) -> None:
         """Begins without events.
 
         Args:
             scene: The true scene.
             settings: The settings of the run.
-            pace: What a simulation waits for, so that its run can be watched.
         """
         self._scene = scene
         self._settings = settings
-        self._pace = pace
         self._lock = threading.Lock()
         self._records: list[Record] = []
         self._found: dict[int, _Found] = {}
@@ -64,8 +58,6 @@ class Feed:
 
     def record(self, record: Record) -> None:
         """Takes an event."""
-        if self._pace is not None:
-            self._pace(record.time_s)
         with self._lock:
             self._records.append(record)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -60,9 +59,6 @@ if TYPE_CHECKING:
     from ntagen.plan.policy import Policy
     from ntagen.plan.synthesise import Synthesiser
     from ntagen.scene import Scene
-
-_LOOK_S: Final = 0.05
-"""A simulation that waits looks this often whether it must end."""
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
@@ -131,6 +127,16 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "address. There are needle, plan, tube, regions, force and deviation. A simulation then takes "
     "the time that a real needle would.",
 )
+@click.option(
+    "--foxglove",
+    "foxglove_port",
+    metavar="[PORT]",
+    type=click.IntRange(0, 65535),
+    is_flag=False,
+    flag_value=8765,
+    help="Show the run in Foxglove while it goes on: open a connection to ws://localhost:8765, or "
+    "to another port. It needs ntagen[foxglove], and lets a simulation take its time as --view.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, nothing else.")
 @click.option("--quiet", is_flag=True, help="Print only how the run ended.")
 @click.option(
@@ -152,6 +158,7 @@ def command(
     breath_phase_deg: float | None,
     log_path: Path | None,
     is_watched: bool,
+    foxglove_port: int | None,
     as_json: bool,
     quiet: bool,
     only_settings: bool,
@@ -209,7 +216,7 @@ def command(
         show_settings(configuration)
         return 0
     tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
-    terminal = _Terminal(not (as_json or quiet), confirm, is_watched)
+    terminal = _Terminal(not (as_json or quiet), confirm, is_watched, foxglove_port)
     with signalled_operator() as operator:
         course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
         policy = None
@@ -279,6 +286,7 @@ class _Terminal:
     speaks: bool
     confirms: bool
     is_watched: bool
+    foxglove_port: int | None
 
 
 @contextlib.contextmanager
@@ -371,9 +379,7 @@ def _around(
     agree = operator.agree if terminal.confirms else lambda _: None
     told = lines(settings.ranking, moves=not terminal.confirms)
     with contextlib.ExitStack() as stack:
-        journals = [*log]
-        if terminal.is_watched:
-            journals.append(stack.enter_context(_watched(run, operator)))
+        journals = [*log, *stack.enter_context(_watched(run, operator, terminal))]
         if terminal.speaks:
             journals.append(stack.enter_context(told))
         try:
@@ -383,28 +389,35 @@ def _around(
             raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
 
 
-def _pace(operator: SignalledOperator) -> Callable[[float], None]:
-    """Waits for the times of a run, unless the run must end."""
-    start_s = time.monotonic()
-
-    def wait(time_s: float) -> None:
-        while not operator.wants_end and (left_s := start_s + time_s - time.monotonic()) > 0.0:
-            time.sleep(min(left_s, _LOOK_S))
-
-    return wait
-
-
 @contextlib.contextmanager
-def _watched(run: _Run, operator: SignalledOperator) -> Iterator[Journal]:
-    """The journal of a run that is shown in the browser."""
+def _watched(
+    run: _Run, operator: SignalledOperator, terminal: _Terminal
+) -> Iterator[list[Journal]]:
+    """The journals of a run that is watched in the browser or in Foxglove."""
+    if not terminal.is_watched and terminal.foxglove_port is None:
+        yield []
+        return
     from ntagen.watch.feed import Feed
+    from ntagen.watch.foxglove import shown_in_foxglove
+    from ntagen.watch.pace import Pace
     from ntagen.watch.server import watched
 
-    pace = None if run.configuration.needle.is_real else _pace(operator)
-    feed = Feed(run.scene, run.configuration.settings, pace)
-    with watched(feed, lambda: operator.end("stopped on the page of the run")) as address:
-        say([f"the run is shown at {address}"])
-        yield feed
+    journals: list[Journal] = []
+    with contextlib.ExitStack() as stack:
+        if terminal.is_watched:
+            feed = Feed(run.scene, run.configuration.settings)
+            stop = functools.partial(operator.end, "stopped on the page of the run")
+            address = stack.enter_context(watched(feed, stop))
+            say([f"the run is shown at {address}"])
+            journals.append(feed)
+        if terminal.foxglove_port is not None:
+            showing = shown_in_foxglove(run.scene, terminal.foxglove_port)
+            view, address = stack.enter_context(showing)
+            say([f"Foxglove can open a connection to {address}"])
+            journals.append(view)
+        if not run.configuration.needle.is_real:
+            journals.insert(0, Pace(lambda: operator.wants_end))
+        yield journals
 
 
 @contextlib.contextmanager

@@ -12,8 +12,6 @@ from typing import Any
 import pytest
 
 from ntagen.cli import main
-from ntagen.cli.needle.drive import _pace
-from ntagen.cli.needle.operator import SignalledOperator
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import (
@@ -33,6 +31,7 @@ from ntagen.plot.run import picture_of_run
 from ntagen.plot.viewer import data_of
 from ntagen.scene import Scene
 from ntagen.watch.feed import Feed
+from ntagen.watch.pace import Pace
 from ntagen.watch.server import watched
 from tests.oracles.synthesiser import oracle_synthesis
 from tests.steering import HIDDEN, PAPER
@@ -100,17 +99,6 @@ def test_parts_of_a_run_are_the_whole() -> None:
     assert feed.since(whole["next"])["moments"] == []
 
 
-def test_a_wait_ends_when_its_time_has_come_or_the_run_must_end() -> None:
-    operator = SignalledOperator()
-    wait = _pace(operator)
-    start_s = time.monotonic()
-    wait(0.2)
-    assert time.monotonic() - start_s >= 0.2
-    threading.Timer(0.1, operator.end, ["stop"]).start()
-    wait(3600.0)
-    assert operator.wants_end
-
-
 def test_a_learned_region_is_a_ball_until_its_shape_is_known_and_may_go() -> None:
     feed = Feed(PAPER, SETTINGS)
     feed.record(Learned(1.0, "learned 1", "critical", (1.0, 2.0, 3.0), 2.0))
@@ -134,11 +122,14 @@ def test_what_is_no_number_is_left_out() -> None:
 
 
 def test_a_simulation_keeps_the_time_of_the_run() -> None:
-    times: list[float] = []
-    feed = Feed(PAPER, SETTINGS, times.append)
-    feed.record(Transition(1.5, "arm", "armed", "estimate"))
-    feed.record(END)
-    assert times == [1.5, 2.0]
+    must_end = threading.Event()
+    pace = Pace(must_end.is_set)
+    start_s = time.monotonic()
+    pace.record(Transition(0.2, "arm", "armed", "estimate"))
+    assert time.monotonic() - start_s >= 0.2
+    threading.Timer(0.1, must_end.set).start()
+    pace.record(Transition(3600.0, "arm", "armed", "estimate"))
+    assert must_end.is_set()
 
 
 class Page:
@@ -242,7 +233,7 @@ def test_a_run_that_is_shown_ends_as_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A run takes more than a minute.
-    monkeypatch.setattr("ntagen.cli.needle.drive._pace", lambda _: None)
+    monkeypatch.setattr(Pace, "record", lambda *_: None)
     task, log = Path(__file__).parents[3] / "examples" / "paper.nsl", tmp_path / "run.mcap"
     assert main(["drive", str(task), "--view", "--json", "--log", str(log)]) == 0
     said = capsys.readouterr()
