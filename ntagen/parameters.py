@@ -385,6 +385,11 @@ PARAMETERS: Final = (
         "Length that seems straight at the beginning of a channel that leaves another one.",
     ),
     _setting(
+        "priors.shape_spacing_mm",
+        "Places of a measured shape that are nearer to each other share their error.",
+        0.1,
+    ),
+    _setting(
         "compensated_lag_rad",
         "The tip's lag at a depth of 100 mm, by which rolls go too far and come back; 0 for none.",
         words="lag compensation",
@@ -479,6 +484,11 @@ PARAMETERS: Final = (
         "needle.latency_s",
         "Phantom needle: a measurement shows position and force as they were this long ago.",
         words="delay",
+    ),
+    _setting(
+        "needle.whole_shape",
+        "Phantom needle: whether places all along it are measured, and not its tip only.",
+        kind="switch",
     ),
     _setting(
         "needle.seed",

@@ -121,7 +121,7 @@ def configure(
         settings = with_values(usual, steering)
         settings = _fitting(settings, its_needle, scene, known, origins)
         settings = _with_margins(settings, origins)
-        require_knowable(settings, scene)
+        require_knowable(settings, scene, whole_shape=its_needle.whole_shape)
     except InputError as error:
         said = [f"`{one.parameter.words}`: {one.origin}" for one in chosen.values()]
         raise InputError("\n".join([str(error), *(f"note: {line}" for line in said)])) from error
@@ -173,7 +173,7 @@ def _with_margins(settings: Settings, origins: dict[str, str]) -> Settings:
     return safe
 
 
-def require_knowable(settings: Settings, scene: Scene) -> None:
+def require_knowable(settings: Settings, scene: Scene, *, whole_shape: bool = False) -> None:
     """Refuses a last target in which no tip is with the confidence that is asked for.
 
     Only needles that do not bend exactly as planned need the confidence, and only where the target
@@ -182,13 +182,18 @@ def require_knowable(settings: Settings, scene: Scene) -> None:
     exceeded in a run: in random tasks with the phantom needle, runs end with the same standard
     deviation, or up to 7 % more.
 
+    Args:
+        settings: How to drive.
+        scene: The actual scene.
+        whole_shape: Whether places all along the needle are measured.
+
     Raises:
         InputError: The target is too small.
     """
     target = scene.targets[-1]
     if not settings.counts_reserve or target.motion is not None:
         return
-    depth_mm, std_mm = target.shape.depth_mm, _best_std_mm(settings, scene)
+    depth_mm, std_mm = target.shape.depth_mm, _best_std_mm(settings, scene, whole_shape)
     normal = NormalDist()
     needed_mm, confidence = normal.inv_cdf(settings.accept) * std_mm, normal.cdf(depth_mm / std_mm)
     if depth_mm >= needed_mm:
@@ -203,12 +208,12 @@ def require_knowable(settings: Settings, scene: Scene) -> None:
     )
 
 
-def _best_std_mm(settings: Settings, scene: Scene) -> float:
+def _best_std_mm(settings: Settings, scene: Scene, whole_shape: bool) -> float:
     """The standard deviation of the tip at the last target, in the direction known worst."""
     # They take NumPy, which a first plan does without.
     from ntagen.needle.estimate import Estimator
     from ntagen.needle.measurement import Measurement
-    from ntagen.needle.path import Path
+    from ntagen.needle.path import Path, sample_poses
 
     tip, radius_mm = scene.needle.tip, scene.needle.radius_mm
     away_mm = math.dist(tip.position_mm, scene.targets[-1].center_mm)
@@ -218,5 +223,7 @@ def _best_std_mm(settings: Settings, scene: Scene) -> float:
     for number in range(count):
         path = path.push(radius_mm, length_mm / count)
         estimator.push(length_mm / count)
-        estimator.measure(Measurement(float(number), path.tip.position_mm, 0.0))
+        places = sample_poses(path.arcs, settings.priors.shape_spacing_mm) if whole_shape else []
+        shape = tuple(pose.position_mm for pose in places)
+        estimator.measure(Measurement(float(number), path.tip.position_mm, 0.0, shape=shape))
     return estimator.estimate().position_std_mm(0.0)

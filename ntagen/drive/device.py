@@ -266,3 +266,9 @@ def require_finite(measurement: Measurement) -> None:
     numbers = (*measurement.position_mm, measurement.force_n, measurement.time_s)
     if not all(math.isfinite(number) for number in numbers):
         raise DeviceError(f"the sensor reported {measurement}: not a number")
+    for number, place in enumerate(measurement.shape, start=1):
+        if not all(map(math.isfinite, place)):
+            raise DeviceError(
+                f"place {number} of the {len(measurement.shape)} of the shape is {place}, which is "
+                "not a number\nhint: is a part of the needle out of view, or a fibre broken?"
+            )

@@ -105,6 +105,7 @@ def settings_for_phantom(
         lag_rad=math.hypot(spread_rad, torsion.lag_rad - settings.compensated_lag_rad),
         first_ratio=shape.first_ratio,
         bite_mm=(1.0 - reinsertion.bite_ratio) * reinsertion.bite_mm,
+        shape_spacing_mm=sensing.shape_apart_mm,
     )
     calibrated = replace(settings, priors=priors, force_noise_n=sensing.noise_n)
     return settings_for(calibrated, Errors(), scene, known)

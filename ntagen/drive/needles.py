@@ -33,7 +33,7 @@ REAL: Final = "grbl"
 _REAL_ROLL_RAD_PER_S: Final = 0.5 * math.pi
 """A real needle is rolled at half the speed of simulated ones; ours."""
 
-_NOT_VIRTUAL: Final = frozenset({"lag_rad", "latency_s"})
+_NOT_VIRTUAL: Final = frozenset({"lag_rad", "latency_s", "whole_shape"})
 """The virtual needle turns as its base does, and is measured as it is now."""
 
 _NOT_PHANTOM: Final = frozenset({"roll_rad"})
@@ -73,6 +73,11 @@ class Chosen:
         return self.name not in (*NAMES, LAB)
 
     @property
+    def whole_shape(self) -> bool:
+        """Whether it is known before a run that its whole shape is measured."""
+        return self.parameters is not None and self.parameters.sensing.whole_shape
+
+    @property
     def kind(self) -> str:
         """What it is, in words."""
         if self.is_real:
@@ -88,16 +93,18 @@ class Chosen:
             return True
         return error in (_NOT_VIRTUAL if self.parameters is None else _NOT_PHANTOM)
 
-    def error(self, name: str) -> float | None:
+    def error(self, name: str) -> float | bool | None:
         """An error of the needle by its field of `Errors`; None if it is as in the scene."""
         if self.parameters is not None:
             sensing, torsion = self.parameters.sensing, self.parameters.torsion
-            own = {"noise_mm": sensing.noise_mm, "latency_s": sensing.latency_s}
+            own: dict[str, float | bool] = {"noise_mm": sensing.noise_mm}
+            own["latency_s"] = sensing.latency_s
             own["lag_rad"] = torsion.lag_rad
+            own["whole_shape"] = sensing.whole_shape
         else:
             own = dict.fromkeys(("noise_mm", "latency_s", "lag_rad"), 0.0)
             own["noise_mm"] = self.errors.noise_mm or 0.0
-        value: float | None = own[name] if name in own else getattr(self.errors, name)
+        value: float | bool | None = own[name] if name in own else getattr(self.errors, name)
         return value
 
     @property

@@ -57,7 +57,7 @@ also as rows."""
 _PIECE_BYTES: Final = 2**16
 
 
-_LISTS: Final = frozenset({"way", "length_mm", "std_mm", "x_mm", "y_mm", "z_mm"})
+_LISTS: Final = frozenset({"way", "length_mm", "std_mm", "shape_mm", "x_mm", "y_mm", "z_mm"})
 """The fields of records that are lists; other tuples are vectors."""
 
 _LARGEST_WINDOW_BYTES: Final = 8 * 2**20

@@ -62,7 +62,12 @@ class Command(Record):
 
 @dataclass(frozen=True, slots=True)
 class Measured(Record):
-    """A measurement; an empty heading or bevel was not measured."""
+    """A measurement; an empty heading, bevel or shape was not measured.
+
+    Attributes:
+        shape_mm: Places along the needle from its base to its tip: x, y and z of each, one place
+            after the other.
+    """
 
     decided: ClassVar[bool] = False
 
@@ -71,6 +76,22 @@ class Measured(Record):
     force_n: float
     heading: tuple[float, ...]
     bevel: tuple[float, ...]
+    shape_mm: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuses a shape that is cut off.
+
+        Raises:
+            ValueError: It is.
+        """
+        if len(self.shape_mm) % 3:
+            raise ValueError(f"shape_mm has {len(self.shape_mm)} numbers, not three for each place")
+
+    @property
+    def shape(self) -> tuple[Vector, ...]:
+        """The places of the shape."""
+        numbers = iter(self.shape_mm)
+        return tuple(zip(numbers, numbers, numbers, strict=True))
 
 
 @dataclass(frozen=True, slots=True)

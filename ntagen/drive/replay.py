@@ -162,6 +162,7 @@ class _Stage:
             force_n=logged.force_n,
             heading=_vector_or_none(logged.heading),
             bevel=_vector_or_none(logged.bevel),
+            shape=logged.shape,
         )
 
     # The operator.

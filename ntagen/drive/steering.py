@@ -10,6 +10,7 @@ commands after it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import deque
 from collections.abc import Callable
@@ -26,6 +27,7 @@ from ntagen.needle.estimate import Estimate, Estimator
 from ntagen.needle.kinematics import Arc
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path, sample_poses
+from ntagen.needle.shape import Bounds
 from ntagen.needle.vectors import distance
 from ntagen.plan.actions import Push
 from ntagen.scene import SHAFT_SPACING_MM, Needle, Vector
@@ -154,6 +156,8 @@ class Steering:
         self._listen = listen
         self._estimator = Estimator(needle.tip, needle.radius_mm, settings.priors)
         self._reach = Reach(settings)
+        noise_mm = settings.priors.noise_mm + settings.priors.distortion_mm
+        self._bounds = Bounds.of(needle, noise_mm)
         self._lateness = Lateness()
         self._speed_mm_per_s = needle.speed_mm_per_s
         self._pull_speed_mm_per_s = settings.pull_speed_ratio * needle.speed_mm_per_s
@@ -303,6 +307,7 @@ class Steering:
         """
         measurement = self._device.measure()
         require_finite(measurement)
+        self._bounds.require(measurement)
         self._reach.require(measurement)
         self._estimator.measure(measurement, self._lateness.depth_mm(measurement.time_s))
         self.seen_s = measurement.time_s
@@ -314,6 +319,7 @@ class Steering:
                 force_n=measurement.force_n,
                 heading=measurement.heading or (),
                 bevel=measurement.bevel or (),
+                shape_mm=tuple(itertools.chain.from_iterable(measurement.shape)),
             )
         )
         return measurement

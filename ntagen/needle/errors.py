@@ -26,6 +26,7 @@ class Errors:
         bevel_rad: The angle about the heading from the bevel of the scene to the true one.
         lag_rad: The lag of the phantom's tip at a depth of 100 mm (`Torsion.lag_rad`).
         latency_s: The age of the phantom's measurements (`Sensing.latency_s`).
+        whole_shape: Whether the phantom's whole shape is measured (`Sensing.whole_shape`).
     """
 
     noise_mm: float | None = None
@@ -35,6 +36,7 @@ class Errors:
     bevel_rad: float = 0.0
     lag_rad: float | None = None
     latency_s: float | None = None
+    whole_shape: bool = False
 
     def true_needle(self, needle: Needle) -> Needle:
         """The true needle, if this is the one that the scene describes."""
@@ -44,7 +46,8 @@ class Errors:
 
     def true_phantom(self, usual: PhantomParameters) -> PhantomParameters:
         """What the phantom is like, if it is usually like this."""
-        sensing, torsion = usual.sensing, usual.torsion
+        torsion = usual.torsion
+        sensing = replace(usual.sensing, whole_shape=self.whole_shape)
         if self.noise_mm is not None:
             sensing = replace(sensing, noise_mm=self.noise_mm)
         if self.latency_s is not None:

@@ -23,7 +23,7 @@ Cost and errors on phantom needles: `tests/benchmarks/predictions.py` measures t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -48,6 +48,8 @@ from ntagen.needle.path import Path
 from ntagen.needle.path import Stretch as PathStretch
 from ntagen.needle.priors import Priors as Priors
 from ntagen.needle.residuals import Problem, Reading, differences_mm
+from ntagen.needle.shaft import Shaft
+from ntagen.needle.shape import thinned
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
@@ -61,6 +63,12 @@ pieces of 0.25 mm."""
 
 _FIRST_MM = 10.0
 """For so far from the entry, `Priors.first_ratio` holds."""
+
+_AT_ENTRY_MM = 1.0
+"""Noise makes a shape longer: what seems to be less outside of the tissue lies at the entry; ours.
+"""
+
+_NOTHING_MM = 1e-9
 
 _BITE_RATIO = 0.5
 """The standard deviation of `Priors.bite_mm`, relative to it; ours."""
@@ -279,6 +287,7 @@ class Estimator:
         self._pending_rad = 0.0
         self._pending_rolls: tuple[int, ...] = ()
         self._readings: list[Reading] = []
+        self._shaft = Shaft()
         self._solution = np.zeros(_POSE_UNKNOWNS)
         self._stds = [priors.position_mm] * 3
         self._stds += [priors.bevel_rad, priors.heading_rad, priors.heading_rad]
@@ -342,17 +351,25 @@ class Estimator:
             depth_mm: The depth at which the tip was at its time, if it was another one than now: a
                 tracker is late. A greater depth than now is one from before the last pull.
         """
-        way = self._inserted
-        left_mm = self.depth_mm if depth_mm is None else depth_mm
-        if left_mm > self.depth_mm + 1e-9:
-            way = self._pulled_from
-        place = (ENTRY, 0.0)
-        for channel, inserted_mm in way:
-            if left_mm <= 0.0:
-                break
-            place = (channel, min(inserted_mm, left_mm))
-            left_mm -= inserted_mm
-        self._readings.append(Reading.at(self._channels, *place, measurement))
+        tip_mm = self.depth_mm if depth_mm is None else depth_mm
+        way = self._inserted if tip_mm <= self.depth_mm + 1e-9 else self._pulled_from
+        self._readings.append(Reading.at(self._channels, *_place_on(way, tip_mm), measurement))
+        self._measure_shaft(way, tip_mm, measurement)
+
+    def _measure_shaft(
+        self, way: Sequence[tuple[int, float]], tip_mm: float, measurement: Measurement
+    ) -> None:
+        """Notes where the shaft lay when the tip was at a depth of a way."""
+        if not measurement.shape:
+            return
+        for behind_mm, place_mm in thinned(measurement.shape, self._priors.shape_spacing_mm):
+            depth_mm = tip_mm - behind_mm
+            if -_AT_ENTRY_MM < depth_mm <= 0.0:
+                depth_mm = _NOTHING_MM
+            channel, offset_mm = _place_on(way, depth_mm)
+            # What is outside of the tissue lies in no channel.
+            if channel != ENTRY:
+                self._shaft.add(self._channels, channel, offset_mm, place_mm)
 
     def estimate(self) -> Estimate:
         """The best estimate from everything noted so far; deterministic.
@@ -363,7 +380,8 @@ class Estimator:
         stds = np.array(self._stds)
         start = np.zeros(len(stds))
         start[: len(self._solution)] = self._solution
-        problem = Problem(self._readings, self._channels, self._priors, stds)
+        readings = self._readings + self._shaft.readings(self._channels)
+        problem = Problem(readings, self._channels, self._priors, stds)
         expected = (self._entry, 1.0 / self._radius_mm)
 
         try:
@@ -497,6 +515,22 @@ class Estimator:
         if self._pending_rolls:
             tip = tip.rolled(pending_rad, self._pending_rolls)
         return Path(entry.start, tuple(stretches), pending_rad), tip
+
+
+def _place_on(way: Sequence[tuple[int, float]], depth_mm: float) -> tuple[int, float]:
+    """The channel at a depth of a way, and the length from its beginning; `ENTRY` at 0 or less.
+
+    Args:
+        way: Channels, and how far the needle is inserted in each.
+        depth_mm: The depth; beyond the way it is the end.
+    """
+    place = (ENTRY, 0.0)
+    for channel, inserted_mm in way:
+        if depth_mm <= 0.0:
+            break
+        place = (channel, min(inserted_mm, depth_mm))
+        depth_mm -= inserted_mm
+    return place
 
 
 def _weights(length_mm: float = _AHEAD_MM) -> _Array:

@@ -19,6 +19,8 @@ class Measurement:
             cutting, and what is near the tip. The virtual needle has the last part only.
         heading: The measured direction of travel, if the sensor reports it.
         bevel: The measured bevel direction, if the sensor reports it.
+        shape: Measured places along the needle from its base to its tip, the tip included, if the
+            sensor reports them (`ntagen.needle.shape`).
     """
 
     time_s: float
@@ -26,6 +28,7 @@ class Measurement:
     force_n: float
     heading: Vector | None = None
     bevel: Vector | None = None
+    shape: tuple[Vector, ...] = ()
 
 
 def squared_length_bound(probability: float, freedom: float = 3.0) -> float:

@@ -17,6 +17,7 @@ on the depth only, so a push of 10 mm and a thousand pushes of 0.01 mm cut the s
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -448,7 +449,27 @@ class PhantomNeedle:
         """Notes the present state for measurements, which show an earlier one."""
         tip = roll(self._frame(), self._tip_rad)
         force_n = self._force_n(tip.position_mm)
-        self._sensor.note(Seen(self._clock.now_s(), tip, self._depth_mm, force_n))
+        seen = Seen(self._clock.now_s(), tip, self._depth_mm, force_n)
+        if self._parameters.sensing.whole_shape:
+            # Few states are measured, and the shaft of no other needs to be known.
+            seen = replace(seen, shaft=functools.partial(self._shaft_mm, tuple(self._pieces)))
+        self._sensor.note(seen)
+
+    def _shaft_mm(self, pieces: tuple[_Piece, ...]) -> tuple[Vector, ...]:
+        """Places of a shaft behind the tip, one after the other, the free part included."""
+        sensing, entry = self._parameters.sensing, self._needle.tip
+        places: list[Vector] = []
+        begin_mm = sum(piece.length_mm for piece in pieces)
+        at_mm = begin_mm - sensing.shape_apart_mm
+        for piece in reversed(pieces):
+            begin_mm -= piece.length_mm
+            while at_mm >= max(0.0, begin_mm):
+                places.append(piece.arc().position_at(at_mm - begin_mm))
+                at_mm -= sensing.shape_apart_mm
+        while at_mm >= -sensing.shape_free_mm:
+            places.append(combine(1.0, entry.position_mm, at_mm, entry.heading))
+            at_mm -= sensing.shape_apart_mm
+        return tuple(places)
 
     def _force_n(self, position_mm: Vector) -> float:
         """The total axial force, without noise; a pull has friction the other way."""

@@ -172,6 +172,10 @@ class Sensing:
         patience_s: If all readings of this time are lost, the sensor reports a failure; ours.
         direction_rad: White noise of a measured direction, about each axis, if the tracker sees
             directions; ours.
+        whole_shape: Whether places all along the needle are measured, and not its tip only. Each
+            has the noise and the distortion of the tip.
+        shape_apart_mm: The distance of these places; ours.
+        shape_free_mm: The shape begins so far outside of the tissue; ours.
     """
 
     noise_mm: float = 0.08
@@ -185,6 +189,9 @@ class Sensing:
     found_ratio: float = 0.5
     patience_s: float = 1.0
     direction_rad: float = math.radians(0.3)
+    whole_shape: bool = False
+    shape_apart_mm: float = 1.0
+    shape_free_mm: float = 20.0
 
 
 @dataclass(frozen=True, slots=True)

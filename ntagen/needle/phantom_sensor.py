@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ntagen.errors import DeviceError
 from ntagen.needle.kinematics import orthonormal
@@ -16,9 +19,15 @@ from ntagen.needle.vectors import combine, norm, rotate, scale
 from ntagen.needle.virtual import SimulatedClock
 from ntagen.scene import Pose, Vector
 
+_Array = NDArray[np.float64]
+
 _LEAST_NORM = 0.1
 _KEPT = 2
 """States from before the latency that are kept: an interpolation needs one."""
+
+
+def _nothing() -> tuple[Vector, ...]:
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,12 +39,14 @@ class Seen:
         tip: The true position and directions of the tip.
         depth_mm: The true depth.
         force_n: The total axial force, without noise.
+        shaft: Gives places behind the tip, one after the other, if the whole shape is measured.
     """
 
     time_s: float
     tip: Pose
     depth_mm: float
     force_n: float
+    shaft: Callable[[], tuple[Vector, ...]] = _nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +86,11 @@ class PhantomSensor:
         self._sensing = sensing
         self._tissue = tissue
         self._clock = clock
-        noise, losses, directions = seed.spawn(3)
+        noise, losses, directions, shaft = seed.spawn(4)
         self._noise = np.random.default_rng(noise)
         self._direction_noise = np.random.default_rng(directions)
         self._losses = np.random.default_rng(losses)
+        self._shaft_noise = np.random.default_rng(shaft)
         self._is_lost = False
         self._states: deque[Seen] = deque()
 
@@ -119,19 +131,32 @@ class PhantomSensor:
         state = self._state_at(self._clock.now_s() - sensing.latency_s)
         drawn = self._noise.normal(size=4)
         error = self._tissue.distortion_mm(state.depth_mm) + sensing.noise_mm * drawn[:3]
-        x, y, z = np.array(state.tip.position_mm) + error
+        tip_mm = self._seen_mm(state.tip.position_mm, error)
         seen = self._turned(state.tip) if self._reports_pose else None
+        shaft = tuple(reversed(self._shaft_mm(state)))
         return Measurement(
             time_s=state.time_s,
-            position_mm=(
-                _rounded(x, sensing.step_mm),
-                _rounded(y, sensing.step_mm),
-                _rounded(z, sensing.step_mm),
-            ),
+            position_mm=tip_mm,
             force_n=_rounded(state.force_n + sensing.noise_n * drawn[3], sensing.step_n),
             heading=None if seen is None else seen.heading,
             bevel=None if seen is None else seen.bevel,
+            shape=(*shaft, tip_mm) if shaft else (),
         )
+
+    def _seen_mm(self, place_mm: Vector, error_mm: _Array) -> Vector:
+        """A place with an error, rounded."""
+        x, y, z = (_rounded(one, self._sensing.step_mm) for one in np.add(place_mm, error_mm))
+        return x, y, z
+
+    def _shaft_mm(self, state: Seen) -> list[Vector]:
+        """The measured places behind the tip, one after the other."""
+        sensing, found = self._sensing, []
+        for number, place_mm in enumerate(state.shaft(), start=1):
+            depth_mm = state.depth_mm - number * sensing.shape_apart_mm
+            noise_mm = sensing.noise_mm * self._shaft_noise.normal(size=3)
+            error_mm = self._tissue.distortion_mm(max(0.0, depth_mm)) + noise_mm
+            found.append(self._seen_mm(place_mm, error_mm))
+        return found
 
     def _turned(self, tip: Pose) -> Pose:
         """The directions with noise."""
@@ -170,9 +195,10 @@ class PhantomSensor:
                     _between(before.tip, after.tip, share),
                     (1.0 - share) * before.depth_mm + share * after.depth_mm,
                     (1.0 - share) * before.force_n + share * after.force_n,
+                    functools.partial(_shaft_between, before, after, share),
                 )
             before = after
-        return Seen(time_s, before.tip, before.depth_mm, before.force_n)
+        return replace(before, time_s=time_s)
 
 
 def _between(one: Pose, other: Pose, share: float) -> Pose:
@@ -189,6 +215,12 @@ def _between(one: Pose, other: Pose, share: float) -> Pose:
     # Opposite directions have no mean; such a turn in one step is seen at its end.
     is_turned = min(norm(between.heading), norm(between.bevel)) < _LEAST_NORM
     return orthonormal(other if is_turned else between)
+
+
+def _shaft_between(one: Seen, other: Seen, share: float) -> tuple[Vector, ...]:
+    """The places behind the tip between two states that are near to each other."""
+    pairs = zip(one.shaft(), other.shaft(), strict=False)
+    return tuple(combine(1.0 - share, a, share, b) for a, b in pairs)
 
 
 def _rounded(value: float, step: float) -> float:

@@ -33,6 +33,9 @@ class Priors:
         first_ratio: By how much more the needle bends on the first 10 mm than deeper, as a ratio.
         bite_mm: A channel that leaves another one bends less at its beginning, as if so much of
             its length were straight.
+        shape_spacing_mm: Places of one shape that are nearer to each other share their error
+            (`ntagen.needle.shape`). About the length of a grating, and the distance of the slices
+            of an image; ours.
     """
 
     position_mm: float = 0.2
@@ -48,6 +51,7 @@ class Priors:
     distortion_mm: float = 0.0
     first_ratio: float = 0.0
     bite_mm: float = 0.0
+    shape_spacing_mm: float = 5.0
 
     def roll_std_rad(self, depth_mm: float) -> float:
         """The standard deviation of the error of a roll at a depth."""

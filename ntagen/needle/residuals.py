@@ -9,21 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ntagen.needle.channels import ENTRY, Channel, Placed, padded, place, points, positions
-from ntagen.needle.fluctuations import oscillation
 from ntagen.needle.kinematics import roll
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.priors import Priors
+from ntagen.needle.whitening import Whitening, unit_across
 from ntagen.scene import Pose
 
 _Array = NDArray[np.float64]
 _Indices = NDArray[np.intp]
 
-_DISTORTION_WAVELENGTH_MM = 20.0
-_DISTORTION_DAMPING = 0.7
-"""The distortion of a tracker along the depth is a damped oscillator, calibrated on measured
-insertions (`ntagen.needle.phantom_parameters`)."""
-
-_BIN_MM = 1.0
+BIN_MM = 1.0
 """Measurements on this length have about the same distortion, so that their mean says as much."""
 
 
@@ -37,6 +32,8 @@ class Reading:
         along_mm: The length from the beginning of the stretch.
         depth_mm: The depth.
         measurement: The measurement.
+        count: Of so many measured places it is the mean.
+        is_across: Whether it tells only how far the channel is aside, not how deep a place is.
     """
 
     channel: int
@@ -44,6 +41,8 @@ class Reading:
     along_mm: float
     depth_mm: float
     measurement: Measurement
+    count: int = 1
+    is_across: bool = False
 
     @staticmethod
     def at(
@@ -82,16 +81,19 @@ class Problem:
         self._stds = stds
         self._directed = [one for one in readings if one.measurement.heading is not None]
         # Rows are in the order of the stretches.
-        ordered = sorted(readings, key=lambda one: one.part)
+        ordered = sorted(readings, key=lambda one: (one.part, one.is_across))
         self._parts, part_of = _by_part(ordered)
         lengths_mm = np.array([(one.depth_mm, one.along_mm) for one in ordered]).reshape(-1, 2)
-        begins = _begins(part_of, lengths_mm[:, 0], priors)
-        counts = np.diff([*begins, len(ordered)])
-        self._part_of = part_of[begins]
-        depths_mm, self._along_mm = (_sums(lengths_mm, begins) / counts[:, None]).T
+        is_across = np.array([one.is_across for one in ordered], dtype=bool)
+        begins = _begins(part_of, lengths_mm[:, 0], is_across, priors)
+        numbers = np.array([one.count for one in ordered], dtype=np.float64)[:, None]
+        counts = _sums(numbers, begins)
+        self._part_of, self._is_across = part_of[begins], is_across[begins]
+        self._depths_mm, self._along_mm = (_sums(numbers * lengths_mm, begins) / counts).T
         places = np.array([one.measurement.position_mm for one in ordered]).reshape(-1, 3)
-        self._measured = _sums(places, begins) / counts[:, None]
-        self._whitening = _whitening(depths_mm, counts, priors)
+        self._measured = _sums(numbers * places, begins) / counts
+        self._counts = counts[:, 0]
+        self._whitening: Whitening | None = None
 
     def at(self, unknowns: _Array, entry: Pose, curvature_per_mm: float) -> tuple[_Array, _Array]:
         """Residuals and derivatives."""
@@ -105,9 +107,11 @@ class Problem:
         if self._parts:
             parts = [_placed_at(one, begin, placed) for one in self._parts]
             expected, moved = positions(parts, self._part_of, self._along_mm)
-            moved = self._whitened(moved.reshape(len(expected), -1))
-            residuals.append(self._whitened(self._measured - expected).ravel())
-            slopes.append(-moved.reshape(-1, len(unknowns)))
+            if self._whitening is None:
+                # The directions of the channels change too little to matter in one search.
+                self._whitening = self._weighed(parts)
+            residuals.append(self._whitening.of((self._measured - expected)[:, :, None]).ravel())
+            slopes.append(-self._whitening.of(moved))
         for reading in self._directed:
             measurement = reading.measurement
             here = _placed_at(reading.part, begin, placed)
@@ -132,11 +136,14 @@ class Problem:
         slopes.append(np.diag(1.0 / self._stds))
         return np.concatenate(residuals), np.vstack(slopes)
 
-    def _whitened(self, rows: _Array) -> _Array:
-        """Rows of positions, so that their errors are independent and of size 1."""
-        if self._whitening is None:
-            return rows / self._priors.noise_mm
-        return np.asarray(self._whitening @ rows)
+    def _weighed(self, parts: list[Placed]) -> Whitening:
+        """What weighs the errors of the positions on channels that are placed so."""
+        places = np.flatnonzero(self._is_across)
+        headings = [
+            parts[self._part_of[at]].directions(self._along_mm[at])[0].heading for at in places
+        ]
+        across = dict(zip(places.tolist(), map(unit_across, headings), strict=True))
+        return Whitening(self._depths_mm, self._counts, self._priors, across)
 
     def _turn(self, reading: Reading, width: int) -> _Array:
         """The coefficients of the turn of the bend plane at a reading."""
@@ -177,32 +184,18 @@ def _placed_at(part: tuple[int, int], begin: Placed, placed: Sequence[Sequence[P
     return begin if channel == ENTRY else placed[channel][number]
 
 
-def _begins(part_of: _Indices, depths_mm: _Array, priors: Priors) -> _Indices:
+def _begins(
+    part_of: _Indices, depths_mm: _Array, is_across: NDArray[np.bool_], priors: Priors
+) -> _Indices:
     """Where the groups of measurements begin that count as one."""
     if priors.distortion_mm <= 0.0:
         return np.arange(len(depths_mm), dtype=np.intp)
-    cells = np.floor(depths_mm / _BIN_MM)
+    cells = np.floor(depths_mm / BIN_MM)
     is_new = np.ones(len(cells), dtype=bool)
-    is_new[1:] = (np.diff(part_of) != 0) | (np.diff(cells) != 0)
+    is_new[1:] = (np.diff(part_of) != 0) | (np.diff(cells) != 0) | np.diff(is_across)
     return np.flatnonzero(is_new)
 
 
 def _sums(rows: _Array, begins: _Indices) -> _Array:
     """The sums of groups of rows."""
     return np.add.reduceat(rows, begins) if len(begins) else rows
-
-
-def _whitening(depths_mm: _Array, counts: _Indices, priors: Priors) -> _Array | None:
-    """What positions are multiplied by, so that their errors are independent and of size 1.
-
-    None without distortion: each position then has the noise alone.
-
-    The error of a mean has independent noise and the tracker's distortion, which the means at near
-    depths share. The matrix is the inverse Cholesky factor of their covariance.
-    """
-    if priors.distortion_mm <= 0.0:
-        return None
-    apart_mm = depths_mm[:, None] - depths_mm[None, :]
-    shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
-    covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))

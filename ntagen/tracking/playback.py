@@ -113,6 +113,7 @@ def samples_of_log(path: Path) -> list[Measurement]:
             record.force_n,
             _optional(record.heading),
             _optional(record.bevel),
+            record.shape,
         )
         for record in log.records
         if isinstance(record, Measured)

@@ -155,7 +155,7 @@ def test_a_radius_error_is_relative_to_the_scene_and_excludes_a_true_radius() ->
 @pytest.mark.parametrize(
     ("name", "ignored"),
     [
-        ("virtual", {"roll lag", "delay"}),
+        ("virtual", {"roll lag", "delay", "whole shape"}),
         ("phantom", {"roll error"}),
         ("grbl+sim", {"roll error"}),
         (
