@@ -17,7 +17,7 @@ from ntagen.needle.priors import Priors
 from ntagen.scene import Scene, Tissue
 
 if TYPE_CHECKING:
-    from ntagen.needle.phantom_parameters import PhantomParameters
+    from ntagen.needle.phantom_parameters import PhantomParameters, Shape
 
 _REACTION_S: Final = 0.07
 """From a sample to the stop byte at most 20 ms; and GRBL has computed 50 ms of motion ahead."""
@@ -87,12 +87,8 @@ def settings_for_phantom(
     Raises:
         InputError: No push is short enough to feel a hidden region before it is pierced.
     """
-    # It takes NumPy, which a plan does without.
-    from ntagen.needle.fluctuations import DRIFT_LENGTH_MM, DRIFT_RATIO
-
     sensing, torsion, shape = parameters.sensing, parameters.torsion, parameters.shape
-    wobble_rad = DRIFT_RATIO * shape.turn_rad.std
-    steady_rad = DRIFT_LENGTH_MM * shape.turn_rad_per_mm
+    curvature_drift, turn_drift_rad = drifts_of(shape)
     spread_rad = torsion.lag_rad * torsion.spread_ratio
     reinsertion = parameters.reinsertion
     priors = replace(
@@ -100,8 +96,8 @@ def settings_for_phantom(
         curvature_ratio=shape.curvature_ratio,
         noise_mm=math.hypot(sensing.noise_mm, sensing.step_mm),
         distortion_mm=sensing.distortion_mm.std,
-        curvature_drift=DRIFT_RATIO * shape.curvature.std,
-        turn_drift_rad=math.hypot(wobble_rad, steady_rad),
+        curvature_drift=curvature_drift,
+        turn_drift_rad=turn_drift_rad,
         lag_rad=math.hypot(spread_rad, torsion.lag_rad - settings.compensated_lag_rad),
         first_ratio=shape.first_ratio,
         bite_mm=(1.0 - reinsertion.bite_ratio) * reinsertion.bite_mm,
@@ -109,3 +105,13 @@ def settings_for_phantom(
     )
     calibrated = replace(settings, priors=priors, force_noise_n=sensing.noise_n)
     return settings_for(calibrated, Errors(), scene, known)
+
+
+def drifts_of(shape: Shape) -> tuple[float, float]:
+    """`Priors.curvature_drift` and `Priors.turn_drift_rad` of needles that bend like this."""
+    # It takes NumPy, which a plan does without.
+    from ntagen.needle.fluctuations import DRIFT_LENGTH_MM, DRIFT_RATIO
+
+    wobble_rad = DRIFT_RATIO * shape.turn_rad.std
+    steady_rad = DRIFT_LENGTH_MM * shape.turn_rad_per_mm
+    return DRIFT_RATIO * shape.curvature.std, math.hypot(wobble_rad, steady_rad)

@@ -57,6 +57,8 @@ _Array = NDArray[np.float64]
 _POSE_UNKNOWNS = 7
 """Position (3), rotations (3) and curvature (1) come before all other unknowns."""
 
+_BEVEL, _GROWTH = 3, 6
+
 RECENT = 8
 """So many of the last measurements count for `Estimate.misfit_mm`; ours: those of a push of 2 mm in
 pieces of 0.25 mm."""
@@ -289,6 +291,8 @@ class Estimator:
         self._readings: list[Reading] = []
         self._shaft = Shaft()
         self._solution = np.zeros(_POSE_UNKNOWNS)
+        self._covariance = np.zeros((_POSE_UNKNOWNS, _POSE_UNKNOWNS))
+        self._rolls: list[int] = []
         self._stds = [priors.position_mm] * 3
         self._stds += [priors.bevel_rad, priors.heading_rad, priors.heading_rad]
         self._stds += [priors.curvature_ratio]
@@ -327,7 +331,8 @@ class Estimator:
     def roll(self, angle_rad: float) -> None:
         """Notes a roll."""
         self._pending_rad += angle_rad
-        self._pending_rolls += (self._unknown(self._priors.roll_std_rad(self.depth_mm)),)
+        self._rolls.append(self._unknown(self._priors.roll_std_rad(self.depth_mm)))
+        self._pending_rolls += (self._rolls[-1],)
 
     def pull(self, length_mm: float) -> None:
         """Notes a pull along the channel; the shaft keeps its rolls (see `ntagen.needle.path`)."""
@@ -393,6 +398,7 @@ class Estimator:
                 f"no needle can be estimated from the measurements: {error}\n"
                 "hint: are they in mm, and the priors and the noise of the tracker sensible?"
             ) from error
+        self._covariance = unknowns_covariance
         begin, placed = place(self._channels, *expected, self._solution)
         path, present = self._path(self._solution, begin, placed)
         tip, to_expected, ahead = self._ahead(present, begin, unknowns_covariance)
@@ -410,6 +416,17 @@ class Estimator:
             ahead=ahead,
             misfit_mm=misfit_mm,
         )
+
+    def learned(self) -> tuple[_Array, _Array]:
+        """What the last `estimate` says of the needle itself, and not of where it is.
+
+        Returns:
+            The angle of the bevel from the expected one in rad, the logarithm of the curvature
+            relative to the expected one, and the error of each roll in rad, in the order of the
+            rolls; and their covariance.
+        """
+        kept = [_BEVEL, _GROWTH, *self._rolls]
+        return self._solution[kept], self._covariance[np.ix_(kept, kept)]
 
     def _ahead(
         self, tip: Placed, entry: Placed, unknowns_covariance: _Array

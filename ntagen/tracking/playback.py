@@ -159,7 +159,7 @@ class _Measurements:
             raise InputError(f"{path}:1: there is no column time_s")
         expected = transform.source if transform != IDENTITY else ""
         if frame.lower() != expected.lower():
-            raise InputError(_other_frame(path, frame, expected))
+            raise InputError(other_frame(path, frame, expected))
 
     def of(self, row: Row) -> Measurement:
         """The measurement in a row."""
@@ -198,7 +198,7 @@ class _Measurements:
         return number
 
 
-def _other_frame(path: Path, frame: str, expected: str) -> str:
+def other_frame(path: Path, frame: str, expected: str) -> str:
     """The message about positions in a frame that is not that of the registration."""
     if not frame:
         return (

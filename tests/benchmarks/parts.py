@@ -34,7 +34,7 @@ from unittest.mock import patch
 import numpy as np
 
 from ntagen import nsl
-from ntagen.drive.configure import configure
+from ntagen.drive.configure import COMMAND_LINE, configure
 from ntagen.drive.records import Ended, Journals
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Simulated, simulate, synthesiser_for
@@ -43,6 +43,7 @@ from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.path import Path
 from ntagen.needle.phantom import PhantomNeedle
 from ntagen.needle.virtual import Obstacle
+from ntagen.nsl.driving import read_settings
 from ntagen.scene import Needle, Pose, Vector
 from tests.benchmarks.drives import percentile
 from tests.benchmarks.rounding import drawn_task, text_of
@@ -67,6 +68,7 @@ class Job:
         without: The part; empty for none.
         timeout_s: The time limit; None for the usual one.
         is_told: Whether the driver is told the true pose and curvature.
+        given: Settings, in the words of `drive { … }`.
     """
 
     task: int
@@ -76,6 +78,7 @@ class Job:
     without: str
     timeout_s: float | None
     is_told: bool
+    given: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -172,7 +175,8 @@ def driven(job: Job) -> End:
     """Makes a drive."""
     task = drawn_task(job.task, job.radii)
     scene = nsl.loads(text_of(task))
-    configuration = configure((), scene, job.known, "phantom")
+    given = read_settings(job.given, COMMAND_LINE)
+    configuration = configure(given, scene, job.known, "phantom")
     settings = CHANGES.get(job.without, lambda one: one)(configuration.settings)
     if job.timeout_s is not None:
         settings = replace(settings, timeout_s=job.timeout_s)

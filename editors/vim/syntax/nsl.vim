@@ -58,6 +58,8 @@ syntax match nslSetting /\<prior\s\+bevel\>/ contained
 syntax match nslSetting /\<prior\s\+bite\>/ contained
 syntax match nslSetting /\<max\s\+plans\>/ contained
 syntax match nslSetting /\<prior\s\+first\s\+curvature\>/ contained
+syntax match nslSetting /\<prior\s\+shape\s\+spacing\>/ contained
+syntax match nslSetting /\<whole\s\+shape\>/ contained
 syntax match nslSetting /\<learned\s\+radius\>/ contained
 syntax match nslSetting /\<lag\s\+compensation\>/ contained
 syntax match nslSetting /\<initial\s\+push\>/ contained

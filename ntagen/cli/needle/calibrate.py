@@ -1,6 +1,7 @@
 """`ntagen calibrate`: the registration of a tracker with the scene, from pairs of points.
 
-The words `pivot` and `hand-eye` are commands of their own (`ntagen.cli.needle.calibrate_poses`).
+The words `pivot`, `hand-eye` and `needle` are commands of their own
+(`ntagen.cli.needle.calibrate_poses`, `ntagen.cli.needle.calibrate_needle`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from ntagen.cli.former_options import Renamed
+from ntagen.cli.needle.calibrate_needle import needle
 from ntagen.cli.needle.calibrate_poses import hand_eye, pivot
 from ntagen.cli.options import output_option, path_argument
 from ntagen.cli.terminal import Styled, echo
@@ -20,6 +22,8 @@ from ntagen.errors import InputError
 from ntagen.files import require_apart, write_files
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from ntagen.scene import Vector
     from ntagen.tracking.registration import Fit, Pairs
 
@@ -44,7 +48,24 @@ def _places(
 
 
 _WIDTH: Final = 100
-_COMMANDS: Final = {"pivot": pivot, "hand-eye": hand_eye}
+_COMMANDS: Final = {"pivot": pivot, "hand-eye": hand_eye, "needle": needle}
+
+
+def _first_words(
+    _ctx: click.Context, _argument: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """What a shell offers for the first word: files, and the other calibrations.
+
+    The shells show files where no word fits; bash forgets what comes before them.
+    """
+    from click.shell_completion import CompletionItem
+
+    words = [
+        CompletionItem(name, help=one.get_short_help_str(_WIDTH))
+        for name, one in _COMMANDS.items()
+        if name.startswith(incomplete)
+    ]
+    return [CompletionItem(incomplete, type="file"), *words]
 
 
 class _ByPoints(Renamed):
@@ -90,7 +111,7 @@ class _Calibrations(click.Group):
     former={"--scene": "write --at {}"},
     epilog="Exit codes: 0 done, 2 the points are rejected, 70 internal error.",
 )
-@path_argument("tracker_points", metavar="POINTS")
+@path_argument("tracker_points", metavar="POINTS", shell_complete=_first_words)
 @path_argument("scene_points", metavar="[SCENE_POINTS]", required=False)
 @click.option(
     "--frame",
@@ -160,7 +181,7 @@ def _by_points(
       ntagen calibrate measured.csv image.fcsv --frame tracker --to LPS -o registration.json
 
     \b
-    A file that is called as one of the commands below is ./pivot or ./hand-eye.
+    A file that is called as one of the commands below is ./pivot, ./hand-eye or ./needle.
     """  # noqa: D301  click wants the control character
     from ntagen.tracking.registration import register
     from ntagen.tracking.transform_file import to_json
