@@ -26,6 +26,7 @@ from typing import Final, Self
 
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.messages import (
+    Points,
     Position,
     Sensor,
     StartTracking,
@@ -315,7 +316,7 @@ class Client:
             return Sample(device, content, received_s, packet.stamp_s, packet.metadata)
 
         match packet.content:
-            case Transform() | Position() as content:
+            case Transform() | Position() | Points() as content:
                 self._keep_pose(sample(packet.device, content))
             case TrackingData(tools):
                 for tool in tools:

@@ -36,6 +36,7 @@ _UTF_8: Final = 106
 _MATRIX: Final = struct.Struct(">12f")
 _TOOL: Final = struct.Struct(">20sBx12f")
 _QUATERNION_TOOL: Final = struct.Struct(">20sBx7f")
+_POINT: Final = struct.Struct(">64s32s4B4f20s")
 _START: Final = struct.Struct(">i32s")
 _STATUS: Final = struct.Struct(">Hq20s")
 _SENSOR: Final = struct.Struct(">BBQ")
@@ -196,6 +197,35 @@ class QuaternionTrackingData(TrackingData):
             columns = turned((turn[0], turn[1], turn[2], turn[3]), (x_mm, y_mm, z_mm))
             found.append(Tool(until_zero(name), _freedom(kind), columns, cls.TYPE))
         return cls(tuple(found))
+
+
+@dataclass(frozen=True, slots=True)
+class Points:
+    """POINT: a list of points in their order; here the places of a needle, the tip last.
+
+    Their names, groups, colours, diameters and owners are not read.
+    """
+
+    TYPE: ClassVar[str] = "POINT"
+
+    positions_mm: tuple[Vector, ...]
+
+    def to_bytes(self) -> bytes:
+        """See `Content.to_bytes`."""
+        return b"".join(
+            packed(_POINT, fixed(f"P{number}", 64), b"", *_WHITE, *position_mm, 0.0, b"")
+            for number, position_mm in enumerate(self.positions_mm, start=1)
+        )
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """See `Content.from_bytes`."""
+        if not data:
+            raise MalformedError("POINT has no points")
+        return cls(tuple((one[6], one[7], one[8]) for one in _tools(cls.TYPE, _POINT, data)))
+
+
+_WHITE: Final = (255, 255, 255, 255)
 
 
 def turned(quaternion: tuple[float, float, float, float], position_mm: Vector) -> Columns:
@@ -388,7 +418,7 @@ class Text:
 TYPES: Final[dict[str, type[Content]]] = {
     kind.TYPE: kind
     for kind in (
-        *(Transform, Position, TrackingData, QuaternionTrackingData),
+        *(Transform, Position, TrackingData, QuaternionTrackingData, Points),
         *(StartTracking, StopTracking, TrackingReply, Status, Sensor, Text),
     )
 }
@@ -434,10 +464,10 @@ def _columns(numbers: tuple[float, ...]) -> Columns:
 
 
 def _tools(name: str, form: struct.Struct, data: bytes) -> Iterator[tuple[Any, ...]]:
-    """The fields of each tool.
+    """The fields of each tool or point.
 
     Raises:
-        MalformedError: The bytes are not those of whole tools.
+        MalformedError: The bytes are not those of whole ones.
     """
     if len(data) % form.size:
         raise MalformedError(f"{name} has {len(data)} bytes, which is no multiple of {form.size}")

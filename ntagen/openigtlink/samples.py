@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ntagen.openigtlink.messages import Position, Sensor, Status, Tool, Transform
+from ntagen.openigtlink.messages import Points, Position, Sensor, Status, Tool, Transform
 from ntagen.openigtlink.packets import Counts
 
 
@@ -35,8 +35,8 @@ class Policy:
     needs_checksum: bool = True
 
 
-Pose = Transform | Position | Tool
-"""What says where a device is."""
+Pose = Transform | Position | Tool | Points
+"""What says where a device is; of points, the last one is."""
 
 Kind = TypeVar("Kind")
 

@@ -8,9 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
+import numpy as np
+
 from ntagen.errors import DeviceError, InputError
 from ntagen.needle.measurement import Measurement
+from ntagen.needle.shape import Shape, measurement_of
 from ntagen.openigtlink.client import Client
+from ntagen.openigtlink.messages import Points
 from ntagen.openigtlink.messages import Sensor as Readings
 from ntagen.openigtlink.samples import Policy, Pose, Sample
 from ntagen.tracking.frames import ANATOMICAL, LPS, Transform
@@ -125,7 +129,11 @@ class LiveTracker:
         tip = tip_of(sample.content, source.mount, sample.device)
         force_n = self._force_n(waits)
         age_s = self.client.now_s() - sample.received_s + source.latency_s
-        return _in_scene(tip, self._transform, self._now_s() - age_s, force_n)
+        time_s = self._now_s() - age_s
+        if isinstance(sample.content, Points):
+            places = [self._transform.point(one) for one in sample.content.positions_mm]
+            return measurement_of(Shape(np.array(places), time_s), force_n)
+        return _in_scene(tip, self._transform, time_s, force_n)
 
     def _visible(self, after_s: float | None, waits: bool) -> Sample[Pose]:
         """The next sample in which the tool is visible."""

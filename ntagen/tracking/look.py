@@ -8,7 +8,7 @@ from typing import Final
 
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.client import Client
-from ntagen.openigtlink.messages import Freedom, Position, Sensor, Tool
+from ntagen.openigtlink.messages import Freedom, Points, Position, Sensor, Tool
 from ntagen.openigtlink.packets import Counts
 from ntagen.openigtlink.samples import Pose, Sample, Statistics
 from ntagen.scene import Vector
@@ -102,6 +102,8 @@ def _found(sample: Sample[Pose], source: Source, statistics: Statistics) -> Foun
     match sample.content:
         case Position(position_mm, quaternion):
             kind = "POSITION, a position only" if quaternion is None else "POSITION"
+        case Points(positions_mm):
+            kind, position_mm = f"POINT, a shape of {len(positions_mm)} places", positions_mm[-1]
         case Tool(freedom=freedom, message=message):
             kind = f"{message}, {_FREEDOM.get(freedom, f'a tool of the unknown type {freedom}')}"
             position_mm = sample.content.columns[3]

@@ -14,7 +14,7 @@ from typing import Final
 
 from ntagen.errors import DeviceError
 from ntagen.needle.vectors import add, combine, cross, dot, norm, scale, unit
-from ntagen.openigtlink.messages import Columns, Freedom, Position, Tool, Transform, turned
+from ntagen.openigtlink.messages import Columns, Freedom, Points, Position, Tool, Transform, turned
 from ntagen.openigtlink.samples import Pose
 from ntagen.scene import Vector
 from ntagen.shapes import UPRIGHT
@@ -87,6 +87,8 @@ def _known(pose: Pose, device: str) -> tuple[Freedom, Columns]:
             if quaternion is not None:
                 _require_finite(quaternion, device)
                 freedom, columns = Freedom.POSE, _from_quaternion(quaternion, position_mm, device)
+        case Points(positions_mm):
+            freedom, columns = Freedom.POSITION, (*UPRIGHT, positions_mm[-1])
         case Tool():
             if not isinstance(pose.freedom, Freedom):
                 raise DeviceError(

@@ -9,16 +9,20 @@ moves on after the recording has ended would be steered blindly.
 from __future__ import annotations
 
 import bisect
+import itertools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from ntagen.drive.reading import read_log
 from ntagen.drive.records import Measured
 from ntagen.errors import DeviceError, InputError
 from ntagen.needle.measurement import Measurement
+from ntagen.needle.shape import Shape, measurement_of
 from ntagen.needle.vectors import dot, unit
 from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
@@ -143,6 +147,34 @@ def samples_of_table(path: Path, transform: Transform) -> tuple[list[Measurement
     return [measurements.of(row) for row in table.rows], "force_n" in table.names
 
 
+def samples_of_shapes(path: Path, transform: Transform) -> tuple[list[Measurement], bool]:
+    """The shapes in a CSV file, in the frame of the scene, and whether they have a force.
+
+    Each line is a place of the needle, with the columns of `samples_of_table`. Lines that follow
+    each other with the same time are a shape, from the base of the needle to its tip.
+
+    Args:
+        path: The file.
+        transform: The registration; the identity if there is none.
+
+    Raises:
+        InputError: The file has a mistake, its frame is not that of the transform, or a shape is
+            none of a needle.
+    """
+    table = read_table(path)
+    measurements = _Measurements(table, transform)
+    found = []
+    for _, group in itertools.groupby(table.rows, measurements.time_s):
+        rows = list(group)
+        places = [measurements.of(row) for row in rows]
+        shape = Shape(np.array([one.position_mm for one in places]), places[0].time_s)
+        try:
+            found.append(measurement_of(shape, places[-1].force_n))
+        except DeviceError as error:
+            raise InputError(f"{rows[0].place}: {error}") from error
+    return found, "force_n" in table.names
+
+
 class _Measurements:
     """The columns of a table of measurements."""
 
@@ -161,6 +193,10 @@ class _Measurements:
         if frame.lower() != expected.lower():
             raise InputError(other_frame(path, frame, expected))
 
+    def time_s(self, row: Row) -> float:
+        """The time of a row."""
+        return self._number(row, self._columns["time_s"])
+
     def of(self, row: Row) -> Measurement:
         """The measurement in a row."""
         x, y, z = (self._number(row, column) * factor for column, factor in self._axes)
@@ -170,7 +206,7 @@ class _Measurements:
             raise InputError(f"{row.place}: heading and bevel are not at a right angle")
         force = self._columns.get("force_n")
         return Measurement(
-            time_s=self._number(row, self._columns["time_s"]),
+            time_s=self.time_s(row),
             position_mm=self._transform.point((x, y, z)),
             force_n=0.0 if force is None else self._number(row, force),
             heading=heading,

@@ -13,7 +13,7 @@ from typing import Final
 from ntagen.drive.device import Sensor
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.vectors import cross, dot, norm, scale, subtract, unit
-from ntagen.openigtlink.messages import NEWTON, Content, Position, Transform
+from ntagen.openigtlink.messages import NEWTON, Content, Points, Position, Transform
 from ntagen.openigtlink.messages import Sensor as Readings
 from ntagen.openigtlink.packets import Packet
 from ntagen.openigtlink.samples import Policy
@@ -86,8 +86,10 @@ def packets_of(measurement: Measurement) -> tuple[Packet, Packet]:
 
 
 def _pose_of(measurement: Measurement) -> Content:
-    """The pose of a tool whose z axis is the heading, and x the bevel direction."""
+    """The pose of a tool whose z axis is the heading, and x the bevel direction; or the shape."""
     heading = measurement.heading
+    if measurement.shape:
+        return Points(measurement.shape)
     if heading is None:
         return Position(measurement.position_mm)
     z = unit(heading)

@@ -4,6 +4,7 @@
 
     openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…
     csv:FILE
+    shape:FILE
     mcap:FILE
     PLUGIN[:ARGUMENT]
 
@@ -26,7 +27,7 @@ from ntagen.scene import Vector
 from ntagen.tracking.frames import IDENTITY, Transform
 from ntagen.tracking.live import N_PER, LiveTracker, Source
 from ntagen.tracking.mount import AXES
-from ntagen.tracking.playback import Playback, samples_of_log, samples_of_table
+from ntagen.tracking.playback import Playback, samples_of_log, samples_of_shapes, samples_of_table
 from ntagen.tracking.plugin import PluginSource, PluginTracker, open_plugin
 from ntagen.units import S_PER
 
@@ -46,7 +47,7 @@ OPTIONS: Final = {
 }
 """The options of ``openigtlink:``, with what they mean."""
 
-_FORMS: Final = "openigtlink:HOST:PORT[:DEVICE], csv:FILE or mcap:FILE"
+_FORMS: Final = "openigtlink:HOST:PORT[:DEVICE], csv:FILE, shape:FILE or mcap:FILE"
 _ADDRESS: Final = re.compile(
     r"(?:\[(?P<six>[^\]]*)\]|(?P<host>[^:,]*)):(?P<port>[^:,]*)(?::(?P<device>[^,]*))?(?P<rest>,.*)?"
 )
@@ -58,7 +59,7 @@ class Recording:
     """A recorded run.
 
     Attributes:
-        kind: ``csv`` or ``mcap``.
+        kind: ``csv``, ``shape`` or ``mcap``.
         path: The file.
     """
 
@@ -79,7 +80,7 @@ def parse_tracker(text: str) -> Tracker:
     kind, colon, rest = text.partition(":")
     if kind == "openigtlink" and colon:
         return _source(text, rest)
-    if kind in ("csv", "mcap") and colon:
+    if kind in ("csv", "shape", "mcap") and colon:
         if not rest:
             raise InputError(f"--tracker {text}: the file is missing\nhint: write {kind}:FILE")
         return Recording(kind, Path(rest))
@@ -116,8 +117,9 @@ def open_tracker(
                 return
             with LiveTracker(tracker, transform, now_s) as live:
                 yield live
-        case Recording("csv", path):
-            samples, has_force = samples_of_table(path, transform or IDENTITY)
+        case Recording("csv" | "shape" as kind, path):
+            read = samples_of_table if kind == "csv" else samples_of_shapes
+            samples, has_force = read(path, transform or IDENTITY)
             yield Playback(str(path), samples, now_s, measures_force=has_force)
         case Recording(_, path):
             if transform is not None and transform != IDENTITY:

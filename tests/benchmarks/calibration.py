@@ -7,8 +7,8 @@ inserted by the recipe, and measured every mm. The calibration begins with a rad
 great, and a bevel that is off by the true angle. Printed are, for radius, bevel and lag: the true
 value, the mean and the standard deviation of what was found, the mean of the claimed standard
 deviations, and how many of the true values lie within one and two of them (68 % and 95 % if the
-claims are exact; more if they are too large), of so many that were not refused. Ends with 1 if fewer
-than 90 % lie within two.
+claims are exact; more if they are too large), of so many that were not refused. Ends with 1 if
+fewer than 90 % lie within two.
 """
 
 from __future__ import annotations

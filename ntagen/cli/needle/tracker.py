@@ -34,8 +34,8 @@ tracker_option = click.option(
     "--tracker",
     metavar="TRACKER",
     help="What measures the needle, if not the needle itself: "
-    "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, mcap:FILE, openigtlink+sim, or "
-    "PLUGIN:ARGUMENT. docs/tracking.md has the options.",
+    "openigtlink:HOST:PORT[:DEVICE][,OPTION=VALUE]…, csv:FILE, shape:FILE, mcap:FILE, "
+    "openigtlink+sim, or PLUGIN:ARGUMENT. docs/tracking.md has the options.",
 )
 
 registration_option = click.option(

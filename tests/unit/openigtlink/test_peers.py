@@ -20,6 +20,7 @@ from ntagen.openigtlink.messages import (
     NEWTON,
     STATUS_NAMES,
     Freedom,
+    Points,
     Position,
     Sensor,
     StartTracking,
@@ -83,6 +84,24 @@ for message in (first, second, image, text):
         Packet("S", Text("done"), packets[2].stamp_s),
     ]
     assert decoder.counts == Counts(read=3, unknown=1)
+
+
+def test_points_of_pyigtl_are_read_and_ours_are_the_same() -> None:
+    out = pyigtl_peer(
+        """
+import pyigtl
+places = [[0.5, 20.25, -1], [0, 0, 0], [1, -30.5, 2.125]]
+names = ["P1", "P2", "P3"]
+colours = [[255, 255, 255, 255]] * 3
+message = pyigtl.PointMessage(positions=places, names=names, rgba_colors=colours, timestamp=3,
+    device_name="NeedleShape")
+print(message.pack().hex())
+"""
+    )
+    (packet,) = Decoder().feed(bytes.fromhex(out))
+    places = ((0.5, 20.25, -1.0), (0.0, 0.0, 0.0), (1.0, -30.5, 2.125))
+    assert (packet.device, packet.content) == ("NeedleShape", Points(places))
+    assert Points.from_bytes(Points(places).to_bytes()) == Points(places)
 
 
 def test_pyigtl_reads_our_server() -> None:

@@ -40,6 +40,7 @@ from ntagen.tracking.spec import OPTIONS, Recording, open_tracker, parse_tracker
         ),
         ("csv:a:b,c.csv", Recording("csv", Path("a:b,c.csv"))),
         ("mcap:run.mcap", Recording("mcap", Path("run.mcap"))),
+        ("shape:s.csv", Recording("shape", Path("s.csv"))),
     ],
 )
 def test_words_that_are_right(text: str, expected: object) -> None:
