@@ -1,7 +1,7 @@
 """What a whole shape tells more than the tip alone, on the phantom needle.
 
     python -m tests.benchmarks.shapes [--seeds 200] [--noise 0.3] [--radius 30] [--push 2]
-        [--narrow 1 1.2] [--tasks 0] [--workers 2]
+        [--narrow 1 1.2] [--tasks 0] [--known all] [--workers 2]
 
 Each phantom is pushed with one compensated roll by 180 deg at 20 mm, and measured once after each
 push, by its tip or by its whole shape, with the same noise of each coordinate. Two needles are
@@ -225,7 +225,7 @@ def show(way: Way, found: list[tuple[Looks, Pushes]]) -> None:
         )
 
 
-def drive_all(way: Way, count: int, workers: int) -> int:
+def drive_all(way: Way, count: int, known: str, workers: int) -> int:
     """Drives random tasks; prints how they end, and returns how many touch a region."""
     touched = 0
     radii = (30.0, 164.0)
@@ -237,7 +237,7 @@ def drive_all(way: Way, count: int, workers: int) -> int:
                 f"noise {way.noise_mm} mm",
                 f"whole shape {'on' if kind == 'shape' else 'off'}",
             )
-            jobs = [Job(one, radii, 100 * one, "all", "", None, False, given) for one in tasks]
+            jobs = [Job(one, radii, 100 * one, known, "", None, False, given) for one in tasks]
             ends: list[End] = pool.map(driven, jobs, chunksize=1)
             reached = sum(one.is_reached for one in ends)
             beside = sum(
@@ -246,8 +246,9 @@ def drive_all(way: Way, count: int, workers: int) -> int:
             pierced = sum(one.clearance_mm < 0.0 for one in ends)
             pulls = np.mean([one.ended.adjustments for one in ends])
             print(
-                f"random tasks, {kind:5}: {reached} of {len(ends)} reach the target, {beside} only "
-                f"seem to, {pierced} touch a region, {pulls:.2f} pull-backs each",
+                f"random tasks, regions known: {known}, {kind:5}: {reached} of {len(ends)} reach "
+                f"the target, {beside} only seem to, {pierced} touch a region, "
+                f"{pulls:.2f} pull-backs each",
                 flush=True,
             )
             touched += pierced
@@ -263,6 +264,7 @@ def main() -> int:
     parser.add_argument("--push", type=float, default=2.0, help="in mm")
     parser.add_argument("--narrow", type=float, nargs="+", default=[1.0, 1.2], help="in mm")
     parser.add_argument("--tasks", type=int, default=0, help="so many random tasks are drawn")
+    parser.add_argument("--known", default="all", help="all or none")
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
     way = Way(given.noise, given.radius, given.push, tuple(given.narrow))
@@ -270,7 +272,7 @@ def main() -> int:
     with multiprocessing.Pool(given.workers) as pool:
         found = pool.starmap(looks, [(way, seed) for seed in range(given.seeds)], chunksize=4)
     show(way, found)
-    return 1 if given.tasks and drive_all(way, given.tasks, given.workers) else 0
+    return 1 if given.tasks and drive_all(way, given.tasks, given.known, given.workers) else 0
 
 
 if __name__ == "__main__":
