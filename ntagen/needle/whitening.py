@@ -39,15 +39,16 @@ class Whitening:
         self._stds_mm = priors.noise_mm / np.sqrt(counts)
         self._weights: _Array | None = None
         self._directions: _Array | None = None
-        if priors.distortion_mm <= 0.0 and not across:
-            return
-        apart_mm = depths_mm[:, None] - depths_mm[None, :]
-        shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
-        covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
         if across:
             rows = [across.get(place, _ALL) for place in range(len(counts))]
             self._owners = np.repeat(np.arange(len(counts)), list(map(len, rows)))
             self._directions = np.concatenate(rows)
+        if priors.distortion_mm <= 0.0:
+            return
+        apart_mm = depths_mm[:, None] - depths_mm[None, :]
+        shared = oscillation(apart_mm, _DISTORTION_WAVELENGTH_MM, _DISTORTION_DAMPING)
+        covariance = priors.distortion_mm**2 * shared + np.diag(priors.noise_mm**2 / counts)
+        if self._directions is not None:
             covariance = covariance[np.ix_(self._owners, self._owners)]
             covariance *= self._directions @ self._directions.T
         self._weights = np.linalg.inv(np.linalg.cholesky(covariance))
@@ -64,6 +65,9 @@ class Whitening:
         columns = positions.shape[2]
         if self._directions is not None:
             seen = np.einsum("rc,rck->rk", self._directions, positions[self._owners])
+            if self._weights is None:
+                # Directions of one position are at right angles, so their errors are independent.
+                return np.asarray(seen / self._stds_mm[self._owners, None])
             return np.asarray(self._weights @ seen)
         if self._weights is None:
             return np.asarray(positions / self._stds_mm[:, None, None]).reshape(-1, columns)
