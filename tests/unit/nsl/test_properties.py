@@ -145,7 +145,7 @@ def test_any_words_are_answered(chosen: list[str], separator: str) -> None:
 
 @pytest.mark.slow
 @given(st.data())
-@settings(deadline=None, max_examples=examples(250))
+@settings(deadline=None, max_examples=examples(120))
 def test_changed_files_are_answered(data: st.DataObject) -> None:
     text = mutated(data)
     outcome(text)
