@@ -24,6 +24,9 @@ and plans from where the needle is; at the second time in a row it pulls back.
 The first push belongs to a plan from the entry. If there is none, the push is made only if no known
 region is near it for any start error (`ntagen.drive.planning`).
 
+A run that goes on from a log begins with all that the runs before it knew (`ntagen.drive.past`),
+and with a question (`ntagen.drive.resuming`). It keeps no plan of theirs.
+
 The driver looks at known points whether somebody wants the run to end: before each motion and each
 synthesis. Between two such points something is always recorded, so that a replay knows at which
 point the run ended.
@@ -44,8 +47,9 @@ from ntagen.drive.pieces import Moves, Pace, pieces
 from ntagen.drive.planning import Lack, Planner, is_free
 from ntagen.drive.posterior import promise_of
 from ntagen.drive.prospect import is_enough, is_surely_in
-from ntagen.drive.records import Ended, Journal, Predicted, Promised, Record, Relied
+from ntagen.drive.records import Command, Ended, Journal, Predicted, Promised, Record, Relied
 from ntagen.drive.reliance import relies_on
+from ntagen.drive.resuming import Ask, Resuming
 from ntagen.drive.settings import Settings
 from ntagen.drive.states import Event, State
 from ntagen.drive.steering import Steering
@@ -86,6 +90,7 @@ class Controller:
             the operator does not want that.
         course: In a tissue that answers, the strategy that is followed; plans without one.
         policy: In a tissue with chance, what is asked at each measurement; plans alone without one.
+        ask: Asks the operator whether a run that was cut off may go on.
 
     Attributes:
         reason: Why the run ends, as far as it is known.
@@ -103,6 +108,7 @@ class Controller:
         agree: Callable[[str], None] = lambda _: None,
         course: Course | None = None,
         policy: Policy | None = None,
+        ask: Ask = lambda _: False,
     ) -> None:
         self._settings = settings
         self._journal = journal
@@ -114,8 +120,15 @@ class Controller:
         self._planner = Planner(synthesise, settings, self._needle, self._learner, journal, listen)
         self._guide = Guide(course, scene, settings, self._needle, journal)
         self._advice = Advice(policy, scene, self._needle, journal)
+        self._resuming = Resuming(self._needle, self._learner, settings, journal, ask)
         self._deviation = DeviationMonitor(settings, scene.needle.length_mm)
-        self._divergence = DivergenceMonitor(settings)
+        self._adjustments = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begins without a plan."""
+        scene = self._learner.a_priori
+        self._divergence = DivergenceMonitor(self._settings)
         self._moves = Moves(scene)
         self._reviewed_mm = 0.0
         self._rest: Plan | None = None
@@ -124,20 +137,33 @@ class Controller:
         self._is_short = False
         self._short_in_row = 0
         self._retreat_mm: float | None = None
-        self._adjustments = 0
         self.reason = ""
 
     def run(self) -> Ended:
         """Drives until the run ends and the needle is stopped; returns the last record."""
+        return self._run(State.ARM)
+
+    def resume(self) -> Ended:
+        """The same for a needle that lies in the tissue, after `was_cut`."""
+        return self._run(State.RESUME)
+
+    def was_cut(self, pending: Command | None) -> None:
+        """Notes that a run was cut off, perhaps in a motion; its plan counts no more."""
+        self._resuming.was_cut(pending)
+        self._forget()
+
+    def _run(self, begin: State) -> Ended:
         self._journal.started(self._learner.a_priori)
         relied = relies_on(self._settings, self._learner.a_priori, self._guide.course)
         self._note(Relied(self._now_s(), relied))
-        return Workflow(self, self._needle, self._journal).run(State.ARM)
+        return Workflow(self, self._needle, self._journal).run(begin)
 
     def by_state(self) -> dict[State, Callable[[], Event]]:
         """The task of each state."""
         return {
             State.ARM: self._arm,
+            State.RESUME: self._resume,
+            State.RETREAT: self._retreat,
             State.INITIAL_PUSH: self._initial_push,
             State.ESTIMATE: self._make_estimate,
             State.SYNTHESISE: self._find_strategy,
@@ -176,12 +202,29 @@ class Controller:
 
     def _arm(self) -> Event:
         self._planner.start()
+        self._resuming.begins()
         measurement = self._needle.measure()
         self._learner.arm(measurement)
         if self._guide.is_on:
             self._guide.note(measurement.position_mm)
             self._guide.leave_if_lost()
         return Event.ARMED
+
+    def _resume(self) -> Event:
+        self._planner.start()
+        self._guide.leave("the run was cut off")
+        # The last reading of the run before may have been the one that felt a region.
+        self._learner.learn()
+        event = self._resuming.task()
+        # The operator took as long as it took.
+        self._planner.start()
+        return event
+
+    def _retreat(self) -> Event:
+        """Pulls the needle out. It is not turned: perhaps nobody knows how it stands."""
+        self._needle.withdraw()
+        self.reason = "the needle was pulled back along its channel to the entry"
+        return Event.IS_OUT
 
     def _make_estimate(self) -> Event:
         estimate = self._needle.estimated()

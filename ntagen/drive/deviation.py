@@ -110,7 +110,7 @@ def require_explained(estimate: Estimate, settings: Settings, radius_mm: float) 
         DeviceError: It does not, or does not say how much it errs.
     """
     _require_covariance(estimate)
-    allowed_mm = _allowed_mm(settings)
+    allowed_mm = allowed_misfit_mm(settings)
     if not estimate.misfit_mm <= allowed_mm:
         raise DeviceError(
             f"no needle that was moved as commanded is where the tracker sees this one: the last "
@@ -140,7 +140,9 @@ class DivergenceMonitor:
     def __init__(self, settings: Settings) -> None:
         priors = settings.priors
         self._std_mm = math.hypot(priors.noise_mm / math.sqrt(RECENT), priors.distortion_mm)
-        self._most_mm = max(_DIVERGED_STDS * self._std_mm, _DIVERGED_RATIO * _allowed_mm(settings))
+        self._most_mm = max(
+            _DIVERGED_STDS * self._std_mm, _DIVERGED_RATIO * allowed_misfit_mm(settings)
+        )
         self._count = 0
 
     def note(self, estimate: Estimate) -> None:
@@ -159,7 +161,7 @@ class DivergenceMonitor:
             )
 
 
-def _allowed_mm(settings: Settings) -> float:
+def allowed_misfit_mm(settings: Settings) -> float:
     """How far the mean of the last positions may be from the needle that fits best."""
     priors = settings.priors
     noise_mm = _SIGMAS * (priors.noise_mm / math.sqrt(RECENT) + priors.distortion_mm)

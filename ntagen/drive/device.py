@@ -141,6 +141,47 @@ class Spinning(Protocol):
         """
 
 
+Counts = tuple[float, float]
+"""Where the axes stand by the count of what moves them, from a place that is its own: mm in the
+direction of insertion, and rad of the roll, right-handed about the heading."""
+
+
+@runtime_checkable
+class Counting(Protocol):
+    """What counts its motions, and goes on counting while no program is connected to it."""
+
+    def counts(self) -> Counts | None:
+        """Where the axes stand; None if nobody knows.
+
+        Raises:
+            DeviceError: It does not answer.
+        """
+
+
+@runtime_checkable
+class Compensating(Protocol):
+    """What knows how deep the needle lies by what it was told; at first that is 0."""
+
+    def lies(self, depth_mm: float, wound_rad: float) -> None:
+        """Notes that the needle lies in the tissue already.
+
+        Args:
+            depth_mm: How deep.
+            wound_rad: By how much its base is ahead of its tip.
+        """
+
+
+def counts_of(actuator: Actuator) -> Counts | None:
+    """Where the axes of an actuator stand; None if it does not count."""
+    return actuator.counts() if isinstance(actuator, Counting) else None
+
+
+def lies(actuator: Actuator, depth_mm: float, wound_rad: float) -> None:
+    """Tells an actuator that the needle lies in the tissue already; see `Compensating.lies`."""
+    if isinstance(actuator, Compensating):
+        actuator.lies(depth_mm, wound_rad)
+
+
 def can_screw(actuator: Actuator) -> bool:
     """Whether an actuator can insert a needle and turn it at once."""
     return isinstance(actuator, Screwing) and getattr(actuator, "can_screw", True)
@@ -230,6 +271,14 @@ class Forwarding:
     def stop(self) -> None:
         """See `Actuator.stop`."""
         self._actuator.stop()
+
+    def counts(self) -> Counts | None:
+        """See `counts_of`."""
+        return counts_of(self._actuator)
+
+    def lies(self, depth_mm: float, wound_rad: float) -> None:
+        """See `lies`."""
+        lies(self._actuator, depth_mm, wound_rad)
 
 
 class Assembly(Forwarding):

@@ -3,7 +3,8 @@
 It contains:
 
 * metadata ``ntagen``: format version, program version, seed, settings and more from the caller;
-* attachments ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
+* attachments ``earlier.mcap`` (the log from which the run goes on, as it was),
+  ``scene.json`` (the scene that the driver knew), ``actual.json`` and ``scene.nsl``
   (the true scene and its source), ``against-tissue.json`` (the strategy against a tissue that
   answers, if one is followed), ``policy.json`` (the policy, if one is asked), and for each
   synthesis ``rebuild-0001/scene.json``, ``…/model.xml`` (``…/model.xml.gz`` if it is large),
@@ -33,6 +34,7 @@ from mcap_protobuf.schema import register_schema
 
 from ntagen.drive.messages import KINDS, encode, message_class
 from ntagen.drive.records import (
+    Answered,
     Ended,
     JournalError,
     Learned,
@@ -58,6 +60,10 @@ ACTUAL: Final = "actual.json"
 SOURCE: Final = "scene.nsl"
 TREE: Final = "against-tissue.json"
 POLICY: Final = "policy.json"
+EARLIER: Final = "earlier.mcap"
+RESUMES: Final = "resumes"
+"""The entry of a log with the name and the digest of the log from which its run goes on."""
+
 STRATEGY: Final = "strategy.json.gz"
 
 VIEW_S: Final = 2.0
@@ -179,7 +185,7 @@ class Log:
         self._sequence += 1
         self._show(self._viewers.recorded(record, is_due=self._is_due(record)))
         is_alarm = isinstance(record, Transition) and record.event in _ALARMS
-        self._keep(to_disk=is_alarm or isinstance(record, Learned | Ended))
+        self._keep(to_disk=is_alarm or isinstance(record, Answered | Learned | Ended))
 
     def close(self) -> None:
         """Completes the file; without this it is cut off, but readable.

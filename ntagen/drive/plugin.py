@@ -112,6 +112,23 @@ class PluginActuator:
             raise DeviceError(f"the plugin '{self._name}' says that it brakes with {ramp} mm/s²")
         return ramp
 
+    def counts(self) -> tuple[float, float] | None:
+        """Where its axes stand by its own count, in mm and rad; `None` if it does not count.
+
+        Raises:
+            DeviceError: It does not say so in numbers.
+        """
+        count = getattr(self._inner, "counts", None)
+        if count is None:
+            return None
+        with guarded(self._name, "tell where its axes stand"):
+            insert_mm, roll_rad = (float(one) for one in count())
+        if not (math.isfinite(insert_mm) and math.isfinite(roll_rad)):
+            raise DeviceError(
+                f"the plugin '{self._name}' says that its axes stand at {insert_mm}, {roll_rad}"
+            )
+        return insert_mm, roll_rad
+
     def now_s(self) -> float:
         """The time on the device's clock since it was opened.
 

@@ -26,7 +26,16 @@ from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
 from ntagen.drive.following import Course
-from ntagen.drive.log import ACTUAL, FORMAT_VERSION, METADATA, POLICY, SCENE, TREE
+from ntagen.drive.log import (
+    ACTUAL,
+    EARLIER,
+    FORMAT_VERSION,
+    METADATA,
+    POLICY,
+    RESUMES,
+    SCENE,
+    TREE,
+)
 from ntagen.drive.messages import PACKAGE, decode
 from ntagen.drive.no_log import HEAD, Contents, no_log, nothing_attached
 from ntagen.drive.records import Record
@@ -143,6 +152,41 @@ class RunLog:
         with self.naming():
             return read_policy(self.attachments[POLICY], None)
 
+    @property
+    def earlier(self) -> RunLog | None:
+        """The log from which this run goes on; None if it began at the entry.
+
+        Raises:
+            InputError: It is missing, is not the one that is named, or cannot be read.
+        """
+        named = self.resumes
+        if named is None:
+            return None
+        data = self.attachments.get(EARLIER, b"")
+        if hashlib.sha256(data).hexdigest() != named["sha256"]:
+            raise InputError(
+                f"{self.path}: the run goes on from {named['file']}, and that log is not in the "
+                f"attachment {EARLIER} as it was (SHA-256 {named['sha256']})"
+            )
+        return _log_in(io.BytesIO(data), Path(f"{self.path}: {named['file']}"))
+
+    @property
+    def resumes(self) -> dict[str, str] | None:
+        """The ``file`` and the ``sha256`` of the log from which this run goes on, if it does.
+
+        Raises:
+            InputError: They are not as they are written.
+        """
+        if RESUMES not in self.metadata:
+            return None
+        try:
+            named = json_of(self.metadata[RESUMES])
+            return {"file": str(named["file"]), "sha256": str(named["sha256"])}
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
+            raise InputError(
+                f"{self.path}: the log from which the run goes on is not named as it should be"
+            ) from error
+
     def scene_of(self, number: int) -> Scene:
         """The scene of a synthesis.
 
@@ -215,14 +259,19 @@ def read_log(path: str | Path) -> RunLog:
     except OSError as error:
         raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
     with file:
-        file_bytes = file.seek(0, io.SEEK_END)
-        file.seek(0)
-        collected = _Collected()
-        torn_at_byte = _read(file, collected, _Budget(path, file_bytes))
-        if METADATA not in collected.metadata:
-            count = len(collected.records)
-            raise no_log(path, file, collected.contents, count, torn_at_byte)
-        sha256 = _digest_of(file, file_bytes)
+        return _log_in(file, path)
+
+
+def _log_in(file: IO[bytes], path: Path) -> RunLog:
+    """The readable part of a log in an open file, whose name is for messages."""
+    file_bytes = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    collected = _Collected()
+    torn_at_byte = _read(file, collected, _Budget(path, file_bytes))
+    if METADATA not in collected.metadata:
+        count = len(collected.records)
+        raise no_log(path, file, collected.contents, count, torn_at_byte)
+    sha256 = _digest_of(file, file_bytes)
     metadata = collected.metadata[METADATA]
     if metadata.get("format_version") != str(FORMAT_VERSION):
         raise InputError(

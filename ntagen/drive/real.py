@@ -6,7 +6,7 @@ is therefore missing here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from ntagen.drive.controller import Controller
@@ -14,7 +14,9 @@ from ntagen.drive.device import Assembly, LiveSensor, WatchedActuator
 from ntagen.drive.following import Course
 from ntagen.drive.knowledge import told
 from ntagen.drive.outcome import Driven, SynthesisCounter
+from ntagen.drive.past import Leg, Relay, go_on
 from ntagen.drive.records import Journal, Journals
+from ntagen.drive.resuming import Ask
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import steered
 from ntagen.drive.supervisor import Supervisor
@@ -54,6 +56,8 @@ def drive(
     agree: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
     policy: Policy | None = None,
+    legs: Sequence[Leg] = (),
+    ask: Ask = lambda _: False,
 ) -> Driven:
     """Drives a real needle through the scene.
 
@@ -69,21 +73,29 @@ def drive(
         agree: As in `Controller`.
         course: As in `Controller`.
         policy: As in `Controller`.
+        legs: The runs from which this one goes on (`ntagen.drive.past`).
+        ask: As in `Controller`.
+
+    Raises:
+        InputError: Those runs are decided otherwise now.
     """
     supervisor = Supervisor(sensor, listen)
     actuator.watch = supervisor.watch
     counter = SynthesisCounter()
+    device = Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor)
+    relay = Relay(device, Journals(journal, counter), listen, agree, ask)
     controller = Controller(
         told(scene, known),
-        Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor),
+        relay,
         synthesise,
         settings,
-        Journals(journal, counter),
-        listen,
+        relay,
+        relay.listen,
         supervisor,
-        agree,
+        relay.agree,
         course,
         policy,
+        relay.ask,
     )
-    ended = controller.run()
+    ended = go_on(controller, relay, legs)
     return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)

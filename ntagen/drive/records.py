@@ -379,6 +379,67 @@ class Advised(Record):
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Stood(Record):
+    """Where the axes that move the needle stand, by the count of what moves it.
+
+    Attributes:
+        insert_mm: The axis that inserts, in the direction of insertion.
+        roll_rad: The axis that rolls, right-handed about the heading.
+    """
+
+    decided: ClassVar[bool] = False
+
+    insert_mm: float
+    roll_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Looked(Record):
+    """A reading of a needle of which nobody knows yet how deep it lies."""
+
+    decided: ClassVar[bool] = False
+
+    position_mm: Vector
+    force_n: float
+    heading: tuple[float, ...]
+    bevel: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Found(Record):
+    """A needle was found in the channel that an earlier run has cut (`ntagen.drive.finding`).
+
+    Attributes:
+        depth_mm: The insertion depth.
+        off_mm: How far the measured tip is from the channel.
+        allowed_mm: How far it may be.
+        text: What that relies on, in words.
+        lack: Why the driver may not go on, in words; empty if it may.
+    """
+
+    depth_mm: float
+    off_mm: float
+    allowed_mm: float
+    text: str
+    lack: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answered(Record):
+    """The operator answered whether a run may go on.
+
+    Attributes:
+        question: What the needle would do.
+        agrees: Whether it may.
+    """
+
+    decided: ClassVar[bool] = False
+
+    question: str
+    agrees: bool
+
+
 class Journal(Protocol):
     """Anything that records a run: the log, the terminal, a replay."""
 

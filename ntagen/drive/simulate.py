@@ -7,16 +7,18 @@ import gc
 import importlib
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 from ntagen.drive.controller import Controller
-from ntagen.drive.device import Assembly, Device, Sensor, Waiting
+from ntagen.drive.device import Assembly, Counts, Device, Forwarding, Sensor, Waiting
 from ntagen.drive.following import Course
 from ntagen.drive.knowledge import obstacles_of, told
 from ntagen.drive.outcome import Driven, SynthesisCounter
-from ntagen.drive.records import Ended, Journal, Journals, Measured, Record, Truth
+from ntagen.drive.past import Leg, Relay, go_on
+from ntagen.drive.records import Ended, Journal, Journals, Looked, Measured, Record, Truth
+from ntagen.drive.resuming import Ask
 from ntagen.drive.settings import Settings, engine_for
 from ntagen.drive.spinning import steered
 from ntagen.errors import InputError
@@ -149,6 +151,8 @@ def simulate(
     agree: Callable[[str], None] = lambda _: None,
     course: Course | None = None,
     policy: Policy | None = None,
+    legs: Sequence[Leg] = (),
+    ask: Ask = lambda _: False,
 ) -> Result:
     """Drives a simulated needle through the scene.
 
@@ -167,6 +171,13 @@ def simulate(
         agree: As in `Controller`.
         course: As in `Controller`.
         policy: As in `Controller`.
+        legs: The runs from which this one goes on (`ntagen.drive.past`). Their motions are made by
+            the needle once more, since it is nowhere else.
+        ask: As in `Controller`.
+
+    Raises:
+        InputError: The needle cannot wait for regions that move, or the runs before it are decided
+            otherwise now, or by another needle.
     """
     needle = simulated(scene, settings, seed, errors, make)
     if scene.breath is not None and not isinstance(needle, Waiting):
@@ -175,21 +186,30 @@ def simulate(
             "hint: use --needle virtual or --needle phantom"
         )
     sensor = needle if sense is None else sense(needle)
-    device = Assembly(steered(needle, scene, settings.compensated_lag_rad), sensor)
+    actuator = steered(Counted(needle), scene, settings.compensated_lag_rad)
     witness = Witness(needle, journal)
     counter = SynthesisCounter()
-    controller = Controller(
-        told(scene, known),
-        device,
-        synthesise,
-        settings,
+    relay = Relay(
+        Assembly(actuator, sensor),
         Journals(journal, witness, counter),
         listen,
-        agree=agree,
+        agree,
+        ask,
+        shadow=True,
+    )
+    controller = Controller(
+        told(scene, known),
+        relay,
+        synthesise,
+        settings,
+        relay,
+        relay.listen,
+        agree=relay.agree,
         course=course,
         policy=policy,
+        ask=relay.ask,
     )
-    ended = controller.run()
+    ended = go_on(controller, relay, legs)
     last = scene.targets[-1]
     tip_mm = needle.true_tip.position_mm
     # The driver decides by its last look; a target that moves goes on while the needle is stopped.
@@ -203,6 +223,42 @@ def simulate(
         guaranteed=counter.guaranteed,
         promised=counter.promised,
     )
+
+
+class Counted(Forwarding):
+    """A simulated needle that counts its motions, as the controller of a real one does."""
+
+    def __init__(self, needle: Simulated) -> None:
+        super().__init__(needle)
+        self._needle = needle
+        self._counts = (0.0, 0.0)
+
+    def push(self, length_mm: float) -> None:
+        """See `Actuator.push`."""
+        super().push(length_mm)
+        self._count(length_mm, 0.0)
+
+    def roll(self, angle_rad: float) -> None:
+        """See `Actuator.roll`."""
+        super().roll(angle_rad)
+        self._count(0.0, angle_rad)
+
+    def pull(self, length_mm: float) -> None:
+        """See `Actuator.pull`."""
+        super().pull(length_mm)
+        self._count(-length_mm, 0.0)
+
+    def screw(self, length_mm: float, angle_rad: float) -> None:
+        """See `Screwing.screw`."""
+        self._needle.screw(length_mm, angle_rad)
+        self._count(length_mm, angle_rad)
+
+    def counts(self) -> Counts:
+        """Where the axes stand: from 0."""
+        return self._counts
+
+    def _count(self, length_mm: float, angle_rad: float) -> None:
+        self._counts = (self._counts[0] + length_mm, self._counts[1] + angle_rad)
 
 
 def simulated(
@@ -252,7 +308,7 @@ class Witness:
 
     def record(self, record: Record) -> None:
         """Adds the truth to it, if it is a measurement or the end."""
-        if isinstance(record, Measured):
+        if isinstance(record, Measured | Looked):
             self._first_s = record.time_s if self._first_s is None else self._first_s
             self.watched_s = record.time_s - self._first_s
         if isinstance(record, Measured | Ended):

@@ -22,6 +22,10 @@ In a tissue that answers, a strategy may be followed instead of plans: then `syn
 leads to `estimate`, and plans follow, or the run ends. Where a strategy wins against all that the
 estimate leaves open, `execute` follows it instead of the plan, and its end leads to `estimate`.
 
+A run that goes on from a log begins with `resume` instead of `arm`: the needle is found in its
+channel, and the operator is asked. Then the way leads to `estimate`, or to `retreat`: the needle is
+pulled back to the entry, and the run is over.
+
 Each state is a task that ends with one of its events; the table gives the next state. `EVENTS`
 lists the events of each state, and `TRANSITIONS` has exactly one entry for each pair of state and
 event: nothing is undefined. Time-out, device fault and interruption can end every task; each has
@@ -40,6 +44,7 @@ class State(Enum):
     """The current task of the driver, or the end of the run."""
 
     ARM = "arm"
+    RESUME = "resume"
     INITIAL_PUSH = "initial push"
     ESTIMATE = "estimate"
     SYNTHESISE = "synthesise"
@@ -48,6 +53,7 @@ class State(Enum):
     STOP = "stop"
     PULL_BACK = "pull back"
     PUSH = "push"
+    RETREAT = "retreat"
 
     TARGET_REACHED = "target reached"
     NO_STRATEGY = "no strategy"
@@ -57,6 +63,7 @@ class State(Enum):
     TIMED_OUT = "time-out"
     FAULTED = "device fault"
     INTERRUPTED = "interrupted"
+    PULLED_OUT = "pulled back"
 
 
 @unique
@@ -88,6 +95,9 @@ class Event(Enum):
     FORCE = "force"
     STOPPED = "stopped"
     PULLED = "pulled"
+    GOES_ON = "goes on"
+    ONLY_BACK = "only back"
+    IS_OUT = "at the entry"
 
     TIMED_OUT = "time-out"
     FAULT = "device fault"
@@ -132,6 +142,9 @@ _WORKFLOW: Final = {
     (State.PULL_BACK, Event.PULLED): State.PUSH,
     (State.PUSH, Event.PUSHED): State.ESTIMATE,
     (State.PUSH, Event.FORCE): State.STOP,
+    (State.RESUME, Event.GOES_ON): State.ESTIMATE,
+    (State.RESUME, Event.ONLY_BACK): State.RETREAT,
+    (State.RETREAT, Event.IS_OUT): State.PULLED_OUT,
 }
 
 ENDS: Final = frozenset(State) - {state for state, _ in _WORKFLOW}

@@ -17,8 +17,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from ntagen.drive.device import Device, Halted, require_finite, rest, settle, spin_on
-from ntagen.drive.records import Command, CutShort, Estimated, Journal, Measured
+from ntagen.drive.device import (
+    Counts,
+    Device,
+    Halted,
+    counts_of,
+    lies,
+    require_finite,
+    rest,
+    settle,
+    spin_on,
+)
+from ntagen.drive.records import (
+    Command,
+    CutShort,
+    Estimated,
+    Journal,
+    Looked,
+    Measured,
+    Stood,
+)
 from ntagen.drive.settings import Settings
 from ntagen.drive.spinning import bent_last_mm, push_seconds
 from ntagen.drive.torsion import Lag
@@ -155,6 +173,7 @@ class Steering:
         self._journal = journal
         self._listen = listen
         self._estimator = Estimator(needle.tip, needle.radius_mm, settings.priors)
+        self._settings = settings
         self._reach = Reach(settings)
         noise_mm = settings.priors.noise_mm + settings.priors.distortion_mm
         self._bounds = Bounds.of(needle, noise_mm)
@@ -170,6 +189,8 @@ class Steering:
         self._has_grown = False
         self.path = Path(needle.tip)
         self.seen_s = 0.0
+        # The sum of all rolls: so far the base stands from where it stood at the entry.
+        self.turned_rad = 0.0
         self.estimate: Estimate | None = None
 
     @property
@@ -217,14 +238,18 @@ class Steering:
             self._journal.record(CutShort(self.now_s(), made_mm, str(halted)))
             return False
         finally:
-            from_mm = self._estimator.depth_mm
-            self._estimator.push(made_mm, spin)
-            self._note(began_s, from_mm, action)
-            self.path = self.path.push(action.radius_mm(self._radius_mm), made_mm)
-            self._all_cut_mm += max(0.0, self.path.depth_mm - self._cut_mm)
-            self._cut_mm = max(self._cut_mm, self.path.depth_mm)
-            self._has_grown = True
+            self._inserted(began_s, action, made_mm)
         return True
+
+    def _inserted(self, began_s: float, action: Push, made_mm: float) -> None:
+        """Notes how much of a push was made."""
+        from_mm = self._estimator.depth_mm
+        self._estimator.push(made_mm, action.spin)
+        self._note(began_s, from_mm, action)
+        self.path = self.path.push(action.radius_mm(self._radius_mm), made_mm)
+        self._all_cut_mm += max(0.0, self.path.depth_mm - self._cut_mm)
+        self._cut_mm = max(self._cut_mm, self.path.depth_mm)
+        self._has_grown = True
 
     def _note(self, began_s: float, from_mm: float, action: Push) -> None:
         """Notes a push for late measurements: turns take time, and what comes after them less."""
@@ -251,9 +276,14 @@ class Steering:
 
     def _turn(self, angle_rad: float) -> None:
         self._command("roll", angle_rad)
+        self._turned(angle_rad)
+        self._device.roll(angle_rad)
+
+    def _turned(self, angle_rad: float) -> None:
+        """Notes a roll."""
         self._estimator.roll(angle_rad)
         self.path = self.path.roll(angle_rad)
-        self._device.roll(angle_rad)
+        self.turned_rad += angle_rad
 
     @property
     def channels(self) -> tuple[Arc, ...]:
@@ -267,15 +297,24 @@ class Steering:
 
     def pull(self, length_mm: float) -> None:
         """Pulls the needle back along its channel."""
+        began_s, from_mm = self._command("pull", length_mm), self._estimator.depth_mm
+        self._reach.moved(length_mm)
+        self._drawn(length_mm)
+        self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._pull_speed_mm_per_s)
+        self._device.pull(length_mm)
+
+    def _drawn(self, length_mm: float) -> None:
+        """Notes a pull."""
         if self._has_grown:
             self._left += self.path.arcs
             self._has_grown = False
-        began_s, from_mm = self._command("pull", length_mm), self._estimator.depth_mm
-        self._reach.moved(length_mm)
         self._estimator.pull(length_mm)
-        self._lateness.note(began_s, from_mm, self._estimator.depth_mm, self._pull_speed_mm_per_s)
         self.path = self.path.pull(length_mm)
-        self._device.pull(length_mm)
+
+    def withdraw(self) -> None:
+        """Pulls the needle out to the entry along its channel, and never turns it."""
+        while self.path.stretches:
+            self.pull(self.path.stretches[-1].arc.length_mm)
 
     def undo_roll(self) -> None:
         """Undoes the rolls at or beyond this place, so that the tip fits its channel again."""
@@ -343,6 +382,46 @@ class Steering:
             )
         )
         return estimate
+
+    def counts(self) -> Counts | None:
+        """Where the axes stand by the count of what moves them, which is recorded if it counts."""
+        counts = counts_of(self._device)
+        if counts is not None:
+            self._journal.record(Stood(self.now_s(), *counts))
+        return counts
+
+    def look(self) -> Measurement:
+        """A reading of a needle of which nobody knows how deep it lies; no estimate takes it.
+
+        Raises:
+            DeviceError: There is no reading, or it is no number.
+        """
+        found = self._device.measure()
+        require_finite(found)
+        heading, bevel = found.heading or (), found.bevel or ()
+        self.seen_s = found.time_s
+        self._journal.record(Looked(found.time_s, found.position_mm, found.force_n, heading, bevel))
+        return found
+
+    def lies(self, depth_mm: float, turn_rad: float, wound_rad: float) -> None:
+        """Notes where the needle was found: what was moved without a record is made up for.
+
+        Args:
+            depth_mm: The insertion depth.
+            turn_rad: By how much the tip was turned since the last record.
+            wound_rad: By how much its base is ahead of the tip.
+        """
+        if turn_rad:
+            self._turned(turn_rad)
+            self._cut_mm = min(self._cut_mm, self.path.depth_mm)
+        way_mm = depth_mm - self.path.depth_mm
+        if way_mm > 0.0:
+            self._inserted(self.now_s(), Push(way_mm), way_mm)
+        elif way_mm < 0.0:
+            self._drawn(-way_mm)
+        # The clock of this run is not that of the run before.
+        self._reach, self._lateness = Reach(self._settings), Lateness()
+        lies(self._device, depth_mm, wound_rad)
 
     def believe(self, path: Path) -> None:
         """Takes another channel of the same depth for the one in which the needle lies."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from ntagen.drive.records import (
     Advised,
+    Answered,
     CutShort,
     Ended,
     Estimated,
     Followed,
     Forgotten,
+    Found,
     Guaranteed,
     Learned,
     Promised,
@@ -61,6 +63,8 @@ def text_of(record: Record) -> str | None:
             return record.text
         case Advised():
             return _advised(record)
+        case Found() | Answered():
+            return _resumed(record)
         case Visited():
             return f"target {record.target} reached"
         case Ended():
@@ -79,11 +83,24 @@ def _transition(record: Transition) -> str | None:
         case Event.PLAN_DONE.value:
             return "the plan is done"
     match record.following:
+        case State.RETREAT.value:
+            return "pull back to the entry"
         case State.INITIAL_PUSH.value:
             return "initial push"
         case State.PULL_BACK.value:
             return "pull back"
     return None
+
+
+def _resumed(record: Found | Answered) -> str:
+    """Where a needle was found, and what keeps the driver from going on; or what was answered."""
+    if isinstance(record, Answered):
+        return f"may the needle {record.question}? {'yes' if record.agrees else 'no'}"
+    place = (
+        f"found: {record.text}; the tip is {record.off_mm:.2f} mm off the channel "
+        f"({record.allowed_mm:.2f} mm allowed)"
+    )
+    return f"{place}; the needle may only be pulled back: {record.lack}" if record.lack else place
 
 
 def _advised(record: Advised) -> str | None:

@@ -52,6 +52,10 @@ class Compensated(Forwarding):
         # By how much the base is ahead of the tip, since a motion was ended early.
         self._wound_rad = 0.0
 
+    def lies(self, depth_mm: float, wound_rad: float) -> None:
+        """See `Compensating.lies`; the base is turned back before the next motion."""
+        self._depth_mm, self._wound_rad = depth_mm, wound_rad
+
     def push(self, length_mm: float) -> None:
         """See `Actuator.push`."""
         self._unwind()

@@ -28,11 +28,13 @@ from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
 from ntagen.drive.records import (
+    Answered,
     CutShort,
     Ended,
     Estimated,
     Followed,
     Forgotten,
+    Found,
     Guaranteed,
     Learned,
     Measured,
@@ -44,7 +46,7 @@ from ntagen.drive.records import (
     Visited,
 )
 from ntagen.drive.states import Event
-from ntagen.drive.story import of_strategy
+from ntagen.drive.story import of_strategy, text_of
 from ntagen.needle.kinematics import bending_axis
 from ntagen.needle.path import sample_poses
 from ntagen.plan.synthesise import Synthesis
@@ -200,6 +202,8 @@ def _text(record: Record) -> str:
             return of_strategy(record)
         case Relied():
             return record.text
+        case Found() | Answered():
+            return text_of(record) or ""
         case Visited():
             return f"reached target '{record.target}'"
         case Ended():

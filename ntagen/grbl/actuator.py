@@ -19,7 +19,7 @@ from ntagen.grbl.identity import Identity, identify, position_of, require_ready
 from ntagen.grbl.link import Link, RefusedError, Watch
 from ntagen.grbl.port import Port
 from ntagen.grbl.protocol import HOLD, JOG_CANCEL, RESET, Activity, Status
-from ntagen.units import deg_from_rad
+from ntagen.units import deg_from_rad, rad_from_deg
 
 POLL_S: Final = 0.1
 """How often the status is asked for in motion: GRBL recommends 5 to 10 times a second."""
@@ -136,6 +136,12 @@ class GrblActuator:
     def position(self) -> tuple[float, ...]:
         """Where the axes stand by the controller's count, in mm and degrees."""
         return self._expected
+
+    def counts(self) -> tuple[float, float]:
+        """Where the axes stand by the controller's count, in the needle's directions: mm, rad."""
+        insert, roll = self._insert, self._roll
+        insert_mm = insert.axis.sign * self._expected[insert.index]
+        return insert_mm, rad_from_deg(roll.axis.sign * self._expected[roll.index])
 
     def push(self, length_mm: float) -> None:
         """Inserts the needle by a length.

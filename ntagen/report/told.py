@@ -8,6 +8,7 @@ from typing import Any, Final
 from ntagen.drive.reading import RunLog
 from ntagen.drive.records import (
     Advised,
+    Answered,
     Command,
     CutShort,
     Ended,
@@ -15,6 +16,7 @@ from ntagen.drive.records import (
     Followed,
     Foreseen,
     Forgotten,
+    Found,
     Guaranteed,
     Learned,
     Measured,
@@ -42,6 +44,8 @@ _KINDS: Final[dict[type[Record], str]] = {
     Learned: "learned",
     Forgotten: "forgotten",
     CutShort: "cut short",
+    Found: "found",
+    Answered: "answer",
     Followed: "strategy",
     Guaranteed: "guarantee",
     Promised: "guarantee",
@@ -67,6 +71,9 @@ _ROUTINE: Final = frozenset(
         Event.AS_PREDICTED,
         Event.STOPPED,
         Event.PULLED,
+        Event.GOES_ON,
+        Event.ONLY_BACK,
+        Event.IS_OUT,
     )
 )
 """Events of the state machine that need no line of their own."""

@@ -39,10 +39,12 @@ def test_every_task_can_be_aborted_and_every_abort_is_an_end(state: State) -> No
 
 
 def test_every_state_can_be_reached() -> None:
-    assert reachable_from(State.ARM) == set(State)
+    from_log = {State.RESUME, State.RETREAT, State.PULLED_OUT}
+    assert reachable_from(State.ARM) == set(State) - from_log
+    assert reachable_from(State.ARM) | from_log == reachable_from(State.RESUME) | {State.ARM}
 
 
-@pytest.mark.parametrize("state", RUNNING)
+@pytest.mark.parametrize("state", [state for state in RUNNING if state is not State.RETREAT])
 def test_the_target_can_be_reached_from_every_state(state: State) -> None:
     assert State.TARGET_REACHED in reachable_from(state)
 

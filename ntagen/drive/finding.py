@@ -1,0 +1,374 @@
+"""Finds a needle in the channel that an earlier run has cut, and says what that relies on.
+
+Nothing moves here. There are four sources, and none is believed alone where another can contradict:
+
+* the log: the channel, how deep the needle was, and the motion that it may have been in. That
+  motion was recorded before it began, so any part of it may have been made;
+* the tracker: several readings of the tip, which must agree with each other. They must lie on the
+  channel, within the `deviation` that is allowed, three standard deviations of the estimated tip,
+  and noise: tissue relaxes while nobody pushes;
+* the count of the controller: how deep the needle is, and how its base is turned. A controller that
+  lost its power has lost its count, too: then the count does not fit the log, or the tracker;
+* the bevel, if the tracker sees it.
+
+If a source contradicts, nothing is moved (`DeviceError`). If nothing says how the bevel stands, or
+the log does not know the channel, the needle may only be pulled back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from ntagen.drive.deviation import allowed_misfit_mm
+from ntagen.drive.device import Counts
+from ntagen.drive.records import Command
+from ntagen.drive.settings import Settings
+from ntagen.errors import DeviceError
+from ntagen.needle.estimate import Estimate
+from ntagen.needle.kinematics import orthonormal
+from ntagen.needle.measurement import Measurement
+from ntagen.needle.path import Path
+from ntagen.needle.vectors import cross, distance, dot
+from ntagen.scene import Pose, Vector
+from ntagen.shapes import vector_of
+from ntagen.units import deg_from_rad
+
+LOOKS: Final = 8
+"""So many readings are taken before the operator is asked, and as many after the answer."""
+
+_TUBE_SIGMAS: Final = 3.0
+_NOISE_SIGMAS: Final = 6.0
+_STILL_MM: Final = 0.5
+"""Readings of a needle at rest differ by this and by noise: tissue creeps; ours."""
+
+_COUNT_MM: Final = 0.1
+_COUNT_RAD: Final = math.radians(1.0)
+"""The count of a controller that was left alone fits the log by this; ours."""
+
+_LEAST_MM: Final = 1.0
+"""A needle that is less deep is as good as at the entry: a run begins there anew; ours."""
+
+_SEEN_RAD: Final = math.radians(5.0)
+"""A bevel that is seen alone says how the needle is turned if it fits the log by this; ours."""
+
+_CROSS_RAD: Final = math.radians(30.0)
+"""A bevel or heading that is seen may differ by this from what else says how it stands; ours."""
+
+_BY_HAND: Final = (
+    "hint: pull the needle back by hand, along the way that it came, and begin anew at the entry"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Clues:
+    """What is known of a needle that lies in the tissue.
+
+    Attributes:
+        looks: The readings.
+        estimate: Where it was before the motion in which the log was cut off.
+        pending: That motion; None if the log ends between two motions.
+        counted: The count of the controller since the entry: how deep the needle is, and by how
+            much its base is turned more than the log says. None if it does not count.
+        lag_rad: By how much the base is ahead of the tip in a roll.
+    """
+
+    looks: Sequence[Measurement]
+    estimate: Estimate
+    pending: Command | None
+    counted: Counts | None
+    lag_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a needle was found.
+
+    Attributes:
+        depth_mm: The insertion depth.
+        turn_rad: By how much the tip was turned since the last record.
+        wound_rad: By how much its base is ahead of the tip.
+        tip_mm: The mean of the readings.
+        off_mm: How far that is from the channel.
+        allowed_mm: How far it may be.
+        text: What this relies on, in words.
+        lack: Why the driver may not go on from here; empty if it may.
+    """
+
+    depth_mm: float
+    turn_rad: float
+    wound_rad: float
+    tip_mm: Vector
+    off_mm: float
+    allowed_mm: float
+    text: str
+    lack: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Depth:
+    """How deep the needle is, and whether the controller has kept its count."""
+
+    depth_mm: float
+    is_counted: bool
+    text: str
+    lack: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """How the needle is turned since the last record; its tip, and its base ahead of that."""
+
+    turn_rad: float
+    wound_rad: float
+    text: str
+    lack: str = ""
+
+
+def find(clues: Clues, settings: Settings) -> Place:
+    """Where the needle is.
+
+    Raises:
+        DeviceError: The readings do not agree with each other, with the channel, or with what the
+            controller counts.
+    """
+    tip_mm = mean_mm(clues.looks)
+    require_still(clues.looks, tip_mm, settings)
+    span = _Span.of(clues, settings)
+    depth = span.depth_at(tip_mm, clues.counted)
+    end = span.path.pull(span.path.depth_mm - min(depth.depth_mm, span.path.depth_mm))
+    off_mm = end.nearest_to(tip_mm).distance_mm
+    turn = _turn(clues, orthonormal(end.tip), is_counted=depth.is_counted)
+    _require_heading(clues.looks, orthonormal(end.tip), off_mm)
+    lack = "; ".join(filter(None, (depth.lack, turn.lack)))
+    if not lack and depth.depth_mm < _LEAST_MM:
+        lack = f"it is {depth.depth_mm:.2f} mm deep: a run begins anew at the entry"
+    return Place(
+        depth_mm=depth.depth_mm,
+        turn_rad=turn.turn_rad,
+        wound_rad=turn.wound_rad,
+        tip_mm=tip_mm,
+        off_mm=off_mm,
+        allowed_mm=span.allowed_mm,
+        text=f"{depth.text}; {turn.text}",
+        lack=lack,
+    )
+
+
+def mean_mm(looks: Sequence[Measurement]) -> Vector:
+    """The mean position of some readings."""
+    axes = zip(*(one.position_mm for one in looks), strict=True)
+    return vector_of(sum(axis) / len(looks) for axis in axes)
+
+
+def require_still(looks: Sequence[Measurement], place_mm: Vector, settings: Settings) -> None:
+    """Refuses readings that are not those of a needle at rest at a place.
+
+    Raises:
+        DeviceError: One is too far away.
+    """
+    allowed_mm = _STILL_MM + _NOISE_SIGMAS * settings.priors.noise_mm
+    off_mm = max(distance(one.position_mm, place_mm) for one in looks)
+    if not off_mm <= allowed_mm:
+        raise DeviceError(
+            f"the needle does not lie still, or the tracker does not see it well: readings of the "
+            f"tip are {off_mm:.1f} mm apart, and {allowed_mm:.1f} mm is allowed\n"
+            "hint: wait until nothing moves, and resume the log again"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Span:
+    """The part of the channel in which the needle may be by the log.
+
+    Attributes:
+        path: The channel up to its far end.
+        low_mm: The least depth.
+        high_mm: The greatest depth.
+        allowed_mm: How far the tip may be from the channel.
+    """
+
+    path: Path
+    low_mm: float
+    high_mm: float
+    allowed_mm: float
+
+    @staticmethod
+    def of(clues: Clues, settings: Settings) -> _Span:
+        """The part of a channel, by the log."""
+        known, pending = clues.estimate, clues.pending
+        path, here_mm, length_mm = known.path, known.path.depth_mm, 0.0
+        low_mm = here_mm
+        if pending is not None and pending.kind == "push":
+            length_mm = pending.value
+            path = path.push(known.radius_mm / max(1e-6, 1.0 - pending.spin), length_mm)
+        elif pending is not None and pending.kind == "pull":
+            low_mm = max(0.0, here_mm - pending.value)
+        tube_mm = _TUBE_SIGMAS * known.position_std_mm(length_mm)
+        return _Span(path, low_mm, here_mm + length_mm, tube_mm + allowed_misfit_mm(settings))
+
+    def depth_at(self, tip_mm: Vector, counted: Counts | None) -> _Depth:
+        """The depth of a tip that is seen there.
+
+        Raises:
+            DeviceError: It is not on the channel, or not where the controller says.
+        """
+        count_mm = None if counted is None else counted[0]
+        near = self.path.nearest_to(tip_mm)
+        if count_mm is not None:
+            if self.low_mm - _COUNT_MM <= count_mm <= self.high_mm + _COUNT_MM:
+                return self._counted(count_mm, tip_mm)
+            beyond_mm = count_mm - self.high_mm
+            away_mm = distance(tip_mm, self.path.tip.position_mm)
+            if 0.5 * beyond_mm - self.allowed_mm <= away_mm <= beyond_mm + self.allowed_mm:
+                return _Depth(
+                    count_mm,
+                    True,
+                    f"{count_mm:.2f} mm deep by the count of the controller",
+                    f"it is {beyond_mm:.2f} mm deeper than the log tells: the end of the log is "
+                    "missing, and nobody knows the channel there",
+                )
+        self._require_on(near.distance_mm, tip_mm)
+        if near.at_mm < self.low_mm - self.allowed_mm:
+            return self._drawn_out(near.at_mm, count_mm)
+        depth_mm = max(self.low_mm, min(self.high_mm, near.at_mm))
+        seen = f"{depth_mm:.2f} mm deep by the log, as the tracker sees it"
+        if count_mm is None:
+            return _Depth(depth_mm, False, f"{seen}; no controller counts its axes")
+        return _Depth(
+            depth_mm,
+            False,
+            f"{seen}; the controller counts {count_mm:.2f} mm: it has lost its position",
+        )
+
+    def _counted(self, count_mm: float, tip_mm: Vector) -> _Depth:
+        """The depth by the controller, if the tracker sees the tip there."""
+        depth_mm = max(self.low_mm, min(self.high_mm, count_mm))
+        here = self.path.pull(self.path.depth_mm - depth_mm)
+        off_mm = distance(here.tip.position_mm, tip_mm)
+        if off_mm > self.allowed_mm:
+            raise DeviceError(
+                f"the controller counts {count_mm:.2f} mm, and the tracker sees the tip "
+                f"{off_mm:.1f} mm from there; {self.allowed_mm:.1f} mm is allowed\n"
+                "hint: does the tracker see this needle, and is its registration the same? Did "
+                f"the motors lose steps?\n{_BY_HAND}"
+            )
+        return _Depth(
+            depth_mm,
+            True,
+            f"{depth_mm:.2f} mm deep by the count of the controller and by the tracker",
+        )
+
+    def _require_on(self, off_mm: float, tip_mm: Vector) -> None:
+        """Refuses a tip that is not on the channel.
+
+        Raises:
+            DeviceError: It is not.
+        """
+        if off_mm <= self.allowed_mm:
+            return
+        place = ", ".join(f"{one:.1f}" for one in tip_mm)
+        raise DeviceError(
+            f"the tracker sees the tip at ({place}) mm, {off_mm:.1f} mm from the channel that the "
+            f"log tells; {self.allowed_mm:.1f} mm is allowed\n"
+            "hint: is this the last log of this needle, and the registration that of this tracker? "
+            f"Was the needle moved since?\n{_BY_HAND}"
+        )
+
+    def _drawn_out(self, seen_mm: float, count_mm: float | None) -> _Depth:
+        """The depth of a needle that is less deep than the log says: somebody pulled it back."""
+        back_mm = self.low_mm - seen_mm
+        since = f"{back_mm:.2f} mm less than the log tells: it was pulled back since"
+        if count_mm is not None and abs(count_mm - seen_mm) <= self.allowed_mm:
+            depth_mm = max(0.0, count_mm)
+            by = "by the count of the controller and by the tracker"
+            return _Depth(depth_mm, True, f"{depth_mm:.2f} mm deep {by}, {since}")
+        return _Depth(seen_mm, False, f"{seen_mm:.2f} mm deep as the tracker sees it, {since}")
+
+
+def _turn(clues: Clues, expected: Pose, *, is_counted: bool) -> _Turn:
+    """How the needle is turned, by the controller or by the bevel that the tracker sees."""
+    pending = clues.pending
+    roll_rad = pending.value if pending is not None and pending.kind == "roll" else 0.0
+    if pending is not None and pending.spin:
+        return _Turn(0.0, 0.0, "turned by nobody knows how much", "it was cut off while it spun")
+    seen_rad = _seen_rad(clues.looks, expected)
+    if is_counted and clues.counted is not None:
+        found = _counted_turn(clues.counted[1], roll_rad, clues.lag_rad)
+        if found.lack or seen_rad is None:
+            return found
+        off_deg = deg_from_rad(abs(math.remainder(seen_rad - found.turn_rad, math.tau)))
+        if off_deg <= deg_from_rad(_CROSS_RAD):
+            return found
+        lack = f"the tracker sees its bevel {off_deg:.0f} deg from where the controller counts it"
+        return _Turn(found.turn_rad, found.wound_rad, found.text, lack)
+    if seen_rad is None:
+        return _Turn(
+            0.0,
+            0.0,
+            "turned by nobody knows how much",
+            "nothing says how its bevel stands: the controller does not count it, or has lost its "
+            "position, and the tracker does not see it",
+        )
+    turn_rad = min((0.0, roll_rad), key=lambda one: abs(math.remainder(seen_rad - one, math.tau)))
+    off_rad = abs(math.remainder(seen_rad - turn_rad, math.tau))
+    text = "turned as the tracker sees its bevel"
+    if off_rad <= _SEEN_RAD:
+        return _Turn(turn_rad, 0.0, text)
+    off_deg = deg_from_rad(off_rad)
+    return _Turn(0.0, 0.0, text, f"its bevel is seen {off_deg:.0f} deg from where the log left it")
+
+
+def _counted_turn(count_rad: float, roll_rad: float, lag_rad: float) -> _Turn:
+    """How the needle is turned by a count, if it may have been in a roll.
+
+    The base goes too far by the lag, and comes back: meanwhile it is ahead of the tip.
+    """
+    text = "turned by the count of the controller"
+    if abs(count_rad) <= _COUNT_RAD:
+        return _Turn(0.0, 0.0, text)
+    if abs(count_rad - roll_rad) <= _COUNT_RAD:
+        return _Turn(roll_rad, 0.0, text)
+    sign = math.copysign(1.0, roll_rad)
+    gone_rad, whole_rad = sign * count_rad, abs(roll_rad)
+    if not 0.0 < gone_rad <= whole_rad + lag_rad + _COUNT_RAD or not roll_rad:
+        off_deg = deg_from_rad(count_rad)
+        return _Turn(
+            0.0, 0.0, text, f"its base stands {off_deg:.0f} deg from where the log left it"
+        )
+    wound_rad = min(gone_rad, lag_rad) if gone_rad < whole_rad else gone_rad - whole_rad
+    turn_rad = gone_rad - wound_rad
+    done = f"{text}: {deg_from_rad(sign * turn_rad):.0f} of {deg_from_rad(roll_rad):.0f} deg"
+    return _Turn(sign * turn_rad, sign * wound_rad, done)
+
+
+def _seen_rad(looks: Sequence[Measurement], expected: Pose) -> float | None:
+    """The angle about the heading from the expected bevel to the one that is seen, if it is."""
+    seen = [one.bevel for one in looks if one.bevel is not None]
+    if len(seen) < len(looks):
+        return None
+    bevel = vector_of(sum(axis) for axis in zip(*seen, strict=True))
+    side = cross(expected.heading, expected.bevel)
+    return math.atan2(dot(bevel, side), dot(bevel, expected.bevel))
+
+
+def _require_heading(looks: Sequence[Measurement], expected: Pose, off_mm: float) -> None:
+    """Refuses a needle on its channel that points elsewhere.
+
+    Raises:
+        DeviceError: It does.
+    """
+    seen = [one.heading for one in looks if one.heading is not None]
+    if not seen or off_mm > _LEAST_MM:
+        return
+    heading = vector_of(sum(axis) / len(seen) for axis in zip(*seen, strict=True))
+    length = math.sqrt(dot(heading, heading))
+    cosine = dot(heading, expected.heading) / length if length > 0.0 else -1.0
+    angle_rad = math.acos(max(-1.0, min(1.0, cosine)))
+    if angle_rad > _CROSS_RAD:
+        raise DeviceError(
+            f"the tracker sees the needle point {deg_from_rad(angle_rad):.0f} deg away from its "
+            f"channel\nhint: check axis=… of the tracker and the registration\n{_BY_HAND}"
+        )
