@@ -48,13 +48,8 @@ def text_of(record: Record) -> str | None:
             )
         case Synthesised():
             return _synthesis(record)
-        case Learned():
-            return (
-                f"learned: {record.kind} region '{record.name}' at "
-                f"{_point(record.center_mm)} mm, radius {record.radius_mm:.2f} mm"
-            )
-        case Forgotten():
-            return f"{record.kind} region '{record.name}' is now part of a larger one"
+        case Learned() | Forgotten():
+            return _region(record)
         case CutShort():
             return f"{record.reason}: stop after {record.made_mm:.2f} mm of the push"
         case Followed() | Guaranteed() | Promised():
@@ -90,6 +85,16 @@ def _transition(record: Transition) -> str | None:
         case State.PULL_BACK.value:
             return "pull back"
     return None
+
+
+def _region(record: Learned | Forgotten) -> str:
+    """A region that was learned, or is no more."""
+    if isinstance(record, Forgotten):
+        return f"{record.kind} region '{record.name}' is now part of a larger one"
+    return (
+        f"learned: {record.kind} region '{record.name}' at "
+        f"{_point(record.center_mm)} mm, radius {record.radius_mm:.2f} mm"
+    )
 
 
 def _resumed(record: Found | Answered) -> str:

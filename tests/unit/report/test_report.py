@@ -203,7 +203,8 @@ def test_names_from_a_log_are_text_on_the_page(plain: RunLog) -> None:
 def test_a_torn_log_is_reported_as_torn(hidden: RunLog, tmp_path: Path) -> None:
     data = hidden.path.read_bytes()
     path = tmp_path / "torn.mcap"
-    path.write_bytes(data[: 3 * len(data) // 10])
+    # Most of a log are models; in its last tenth, readings follow each other.
+    path.write_bytes(data[: 9 * len(data) // 10])
     log = read_log(path)
     facts = facts_of(log, list(checks_of(log)))
     assert not facts["log"]["is_whole"]
