@@ -19,7 +19,7 @@ import pytest
 from ntagen.cli import main
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.reading import RunLog, read_log
-from ntagen.drive.records import Advised, Foreseen, Measured, Synthesised
+from ntagen.drive.records import Advised, Foreseen, Measured, Synthesised, Truth
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import simulate
 from ntagen.errors import DeviceError, InputError
@@ -203,8 +203,11 @@ def test_names_from_a_log_are_text_on_the_page(plain: RunLog) -> None:
 def test_a_torn_log_is_reported_as_torn(hidden: RunLog, tmp_path: Path) -> None:
     data = hidden.path.read_bytes()
     path = tmp_path / "torn.mcap"
-    # Most of a log are models; in its last tenth, readings follow each other.
-    path.write_bytes(data[: 9 * len(data) // 10])
+    # A third of a log, and more up to a reading that comes after an estimate.
+    for share in range(33, 60):
+        path.write_bytes(data[: len(data) * share // 100])
+        if isinstance(read_log(path).records[-1], Measured | Truth):
+            break
     log = read_log(path)
     facts = facts_of(log, list(checks_of(log)))
     assert not facts["log"]["is_whole"]
