@@ -465,6 +465,26 @@ def lock(descriptor: int, refusal: str) -> None:
         return
 
 
+def require_unlocked(path: Path, refusal: str) -> None:
+    """Refuses a file to which a process is writing.
+
+    Args:
+        path: The file; one that cannot be opened is left to whoever reads it.
+        refusal: What to say.
+
+    Raises:
+        InputError: A process is writing to it.
+    """
+    try:
+        descriptor = os.open(path, _READING)
+    except OSError:
+        return
+    try:
+        lock(descriptor, refusal)
+    finally:
+        os.close(descriptor)
+
+
 def _is_special(path: Path) -> bool:
     """Whether this is a pipe or device, which is written directly."""
     try:

@@ -65,6 +65,9 @@ also as rows."""
 
 _PIECE_BYTES: Final = 2**16
 
+_HEAD_BYTES: Final = 2**18
+"""The options of a run stand so far in front in its log."""
+
 
 _LISTS: Final = frozenset({"way", "length_mm", "std_mm", "shape_mm", "x_mm", "y_mm", "z_mm"})
 """The fields of records that are lists; other tuples are vectors."""
@@ -260,6 +263,19 @@ def read_log(path: str | Path) -> RunLog:
         raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
     with file:
         return _log_in(file, path)
+
+
+def metadata_in(path: Path) -> dict[str, str]:
+    """The options of a run, from the beginning of its log alone; empty if it is none."""
+    try:
+        with open_file(path, MAX_LOG_BYTES) as file:
+            head = io.BytesIO(file.read(_HEAD_BYTES))
+    except OSError:
+        return {}
+    collected = _Collected()
+    with contextlib.suppress(InputError):
+        _read(head, collected, _Budget(path, len(head.getvalue())))
+    return collected.metadata.get(METADATA, {})
 
 
 def _log_in(file: IO[bytes], path: Path) -> RunLog:

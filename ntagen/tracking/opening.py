@@ -19,7 +19,7 @@ def opened_live(
     text: str,
     tracker: Tracker,
     transform: Transform | None,
-    entry: Pose,
+    entry: Pose | None,
     now_s: Callable[[], float],
     *,
     watches_force: bool,
@@ -31,7 +31,8 @@ def opened_live(
         text: The words of the tracker.
         tracker: What they mean; no recording.
         transform: The registration.
-        entry: Where the needle is at the start.
+        entry: Where the needle is at the start; None if it lies in the tissue, where the driver
+            looks for it itself.
         now_s: The clock of the actuator.
         watches_force: Whether the driver relies on a force.
         force_varies: Whether the force has noise (`ntagen.tracking.plausible.Plausible`).

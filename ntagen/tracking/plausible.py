@@ -50,7 +50,7 @@ class Plausible(Generic[Checked]):
 
     Args:
         sensor: The sensor.
-        entry: The pose at which the needle is at the start.
+        entry: The pose at which the needle is at the start; None if it may be anywhere.
         now_s: The clock of the measurements' times; without it they may be of any age.
         force_varies: Whether the force has noise, so that one that stays the same is wrong.
     """
@@ -58,7 +58,7 @@ class Plausible(Generic[Checked]):
     def __init__(
         self,
         sensor: Checked,
-        entry: Pose,
+        entry: Pose | None,
         now_s: Callable[[], float] | None = None,
         *,
         force_varies: bool = False,
@@ -95,10 +95,10 @@ class Plausible(Generic[Checked]):
         require_finite(found)
         if self._now_s is not None:
             require_fresh(found, self._now_s())
-        if self._last is None:
-            require_start(found, self._entry)
-        else:
+        if self._last is not None:
             require_near(found, self._last)
+        elif self._entry is not None:
+            require_start(found, self._entry)
         self._last = found
         return found
 
@@ -170,7 +170,8 @@ def require_start(found: Measurement, entry: Pose) -> None:
         raise DeviceError(
             f"the tracker sees the tip {depth_mm:.1f} mm beyond the entry, at "
             f"{_words(found.position_mm)} mm; {DEEPEST_MM:g} mm is allowed\n"
-            "hint: was a run before this one cut off? Pull the needle back to the entry first"
+            "hint: was a run before this one cut off? Go on from its log with `ntagen drive "
+            "--resume RUN.mcap`, or pull the needle back to the entry first"
         )
     for name, option, seen, expected in (
         ("heading", "axis", found.heading, entry.heading),

@@ -26,7 +26,7 @@ _TOLERANCE: Final = 1e-6
 def to_json(fit: Fit) -> dict[str, Any]:
     """The document of a registration, with its errors."""
     return {
-        **_head(fit.transform),
+        **transform_to_json(fit.transform),
         "fre_mm": fit.fre_mm,
         "fle_mm": fit.fle_mm,
         "points": [
@@ -41,7 +41,7 @@ def to_json(fit: Fit) -> dict[str, Any]:
 def stage_to_json(found: HandEye) -> dict[str, Any]:
     """The document of a registration from poses of a stage and a tracker, with its errors."""
     return {
-        **_head(found.transform),
+        **transform_to_json(found.transform),
         "rms_mm": rms(found.residuals_mm),
         "rms_deg": rms(found.residuals_deg),
         "left_out_rms_mm": known(rms(found.left_out_mm)),
@@ -76,8 +76,8 @@ def known(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _head(transform: Transform) -> dict[str, Any]:
-    """What `read_transform` reads."""
+def transform_to_json(transform: Transform) -> dict[str, Any]:
+    """What `read_transform` reads: the transform alone, without its errors."""
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -95,7 +95,24 @@ def read_transform(path: Path) -> Transform:
         InputError: The file cannot be read, or its transform is not rigid.
     """
     try:
-        document = json.loads(read_file(path, _LARGEST_BYTES))
+        text = read_file(path, _LARGEST_BYTES)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
+    return transform_in(text, str(path))
+
+
+def transform_in(text: str | bytes, name: str) -> Transform:
+    """The transform in the text of a registration.
+
+    Args:
+        text: The text, in JSON.
+        name: What it is, for messages.
+
+    Raises:
+        InputError: It is no registration, or its transform is not rigid.
+    """
+    try:
+        document = json.loads(text)
         if document["format"] != FORMAT or document["version"] != VERSION:
             raise ValueError("it has another format or version")
         x, y, z = (_vector(row) for row in document["rotation"])
@@ -105,11 +122,9 @@ def read_transform(path: Path) -> Transform:
             (x, y, z),
             _vector(document["translation_mm"]),
         )
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(
-            f"{path}: this is not a registration: {error}\n"
+            f"{name}: this is not a registration: {error}\n"
             "hint: make one with `ntagen calibrate POINTS -o FILE`"
         ) from None
     products = [
@@ -119,7 +134,7 @@ def read_transform(path: Path) -> Transform:
         *(a - b for a, b in zip(cross(x, y), z, strict=True)),
     ]
     if max(abs(one) for one in products) > _TOLERANCE:
-        raise InputError(f"{path}: the rotation is not a rotation: it scales, shears or mirrors")
+        raise InputError(f"{name}: the rotation is not a rotation: it scales, shears or mirrors")
     return transform
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -25,6 +25,14 @@ from ntagen.cli.needle.answering_tissue import (
 from ntagen.cli.needle.operator import SignalledOperator, signalled_operator
 from ntagen.cli.needle.optimise import load_policy
 from ntagen.cli.needle.report import lines, report, summary
+from ntagen.cli.needle.resume import (
+    Resumed,
+    hardware_facts,
+    new_log,
+    require_terminal,
+    resume_option,
+    resumed_of,
+)
 from ntagen.cli.needle.steering import (
     known_option,
     say_idle_errors,
@@ -41,7 +49,7 @@ from ntagen.cli.needle.tracker import (
 )
 from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
-from ntagen.cli.terminal import echo, say, say_idle
+from ntagen.cli.terminal import echo, given_options, say, say_idle
 from ntagen.drive.states import State
 from ntagen.errors import InputError, ModelError, NtagenError
 from ntagen.files import require_apart
@@ -63,8 +71,8 @@ if TYPE_CHECKING:
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
 4 no strategy that holds in exact kinematics, or nothing is guaranteed any more
-(--only-guaranteed), 5 device fault, 6 no strategy that ends in time, 70 internal error,
-130 interrupted, 143 ended by SIGTERM."""
+(--only-guaranteed), 5 device fault, 6 no strategy that ends in time, 7 pulled back to the entry
+(--resume), 70 internal error, 130 interrupted, 143 ended by SIGTERM."""
 
 
 @click.command(
@@ -76,7 +84,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     },
     epilog=_EPILOG,
 )
-@path_argument("environment", metavar="ENV.nsl")
+@path_argument("environment", metavar="[ENV.nsl]", required=False)
+@resume_option
 @click.option(
     "--needle",
     default="virtual",
@@ -117,7 +126,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
     "--log",
     "log_path",
     metavar="RUN.mcap",
-    help="The file to write the log of the run to; an existing file is replaced.",
+    help="The file to write the log of the run to; an existing file is replaced, but with --resume "
+    "nothing is.  [default: none; RUN-resumed.mcap with --resume RUN.mcap]",
 )
 @click.option(
     "--view",
@@ -148,7 +158,8 @@ Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or
 @include_option()
 @settings_options("seed", "noise", "time limit")
 def command(
-    environment: Path,
+    environment: Path | None,
+    resumed_path: Path | None,
     needle: str,
     confirm: bool,
     tracker: str | None,
@@ -176,6 +187,9 @@ def command(
     the tissue picks, and says up to which depth its guarantee held. A phantom or real needle is led
     by such a strategy as soon as one wins against all that the estimate leaves open.
 
+    After a stop, a cut or a kill, --resume goes on from the log: the driver measures, finds the
+    needle in the channel that it has cut, says what it relies on, and asks you.
+
     Ctrl-C and SIGTERM stop the needle and complete the log; a second Ctrl-C ends the program at
     once. Two runs cannot write the same log at the same time.
 
@@ -192,12 +206,59 @@ def command(
       ntagen drive examples/chance/chance.nsl --policy t.policy.json --log run.mcap
       ntagen drive examples/paper.nsl --needle phantom --view
       ntagen drive examples/paper.nsl --settings
+      ntagen drive --resume run.mcap
 
     \b
     --set takes what can stand in the braces drive { … } of ENV.nsl, and wins over them.
     """  # noqa: D301  click wants the control character
+    if as_json:
+        say_idle({"quiet": "--quiet"}, "with --json")
+    if resumed_path is not None:
+        given_needle = needle if "needle" in given_options() else None
+        resumed = resumed_of(
+            resumed_path, environment, include, given_needle, tracker, registration
+        )
+        log_path = new_log(resumed.log, log_path)
+        require_terminal()
+        run = _resumed_run(resumed)
+    else:
+        if environment is None:
+            raise click.UsageError("Missing argument 'ENV.nsl'.")
+        task = _breathing(load_task(environment, include), breath_phase_deg)
+        planned = _planned(environment, task, needle, known, given, wanted)
+        if only_settings:
+            show_settings(planned.configuration)
+            return 0
+        is_real = planned.configuration.needle.is_real
+        tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
+        run = replace(planned, tracking=tracking)
+    terminal = _Terminal(not (as_json or quiet), confirm, is_watched, foxglove_port)
+    with signalled_operator() as operator:
+        if run.resumed is None:
+            run = _led(run, policy_path, operator)
+        result = _drive(run, log_path, terminal, operator)
+    scene = run.scene
+    if as_json:
+        guarantee = guarantee_of(result, scene, run.course)
+        ended = summary(result, run.configuration, run.known, log_path)
+        echo(json.dumps(ended | {"guarantee": guarantee}))
+    else:
+        report(result, scene, log_path, short=quiet)
+    if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
+        return TERMINATED
+    return _exit_code(result.ended.outcome)
+
+
+def _planned(
+    environment: Path,
+    task: Task,
+    needle: str,
+    known: str,
+    given: tuple[Given, ...],
+    wanted: Wanted,
+) -> _Run:
+    """A run that begins at the entry, before anything measures it."""
     from ntagen.drive.configure import configure
-    from ntagen.drive.knowledge import told
     from ntagen.drive.needles import LAB
 
     if needle == LAB:
@@ -205,36 +266,40 @@ def command(
             "a needle in a lab is driven by its port and its tracker\n"
             "hint: `ntagen device simulate ENV.nsl` opens a lab, and prints the command"
         )
-    if as_json:
-        say_idle({"quiet": "--quiet"}, "with --json")
-    task = _breathing(load_task(environment, include), breath_phase_deg)
     configuration = configure((*task.given, *given), task.scene, known, needle)
-    is_real = configuration.needle.is_real
     _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
     say_idle_options(task.scene, configuration)
-    if only_settings:
-        show_settings(configuration)
-        return 0
-    tracking = tracking_of(tracker, registration, task.tracker, is_real=is_real)
-    terminal = _Terminal(not (as_json or quiet), confirm, is_watched, foxglove_port)
-    with signalled_operator() as operator:
-        course = course_of(wanted, told(task.scene, known), configuration, operator.listen)
-        policy = None
-        if policy_path is not None:
-            policy = load_policy(policy_path, told(task.scene, known))
-            if policy.is_silent:
-                say([f"{policy_path} is silent: plans are followed as without a policy"])
-        run = _Run(environment, task, configuration, known, tracking, wanted, course, policy)
-        result = _drive(run, needle, log_path, terminal, operator)
-    if as_json:
-        guarantee = guarantee_of(result, task.scene, course)
-        ended = summary(result, configuration, known, log_path)
-        echo(json.dumps(ended | {"guarantee": guarantee}))
-    else:
-        report(result, task.scene, log_path, short=quiet)
-    if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
-        return TERMINATED
-    return _exit_code(result.ended.outcome)
+    return _Run(environment, task, configuration, known, needle, wanted=wanted)
+
+
+def _led(run: _Run, policy_path: Path | None, operator: SignalledOperator) -> _Run:
+    """The run with the strategy or the policy that leads it."""
+    from ntagen.drive.knowledge import told
+
+    scene = told(run.scene, run.known)
+    course = course_of(run.wanted, scene, run.configuration, operator.listen)
+    policy = None
+    if policy_path is not None:
+        policy = load_policy(policy_path, scene)
+        if policy.is_silent:
+            say([f"{policy_path} is silent: plans are followed as without a policy"])
+    return replace(run, course=course, policy=policy)
+
+
+def _resumed_run(resumed: Resumed) -> _Run:
+    """A run that goes on from a log."""
+    log = resumed.log
+    return _Run(
+        log.path,
+        resumed.task,
+        resumed.configuration,
+        resumed.known,
+        resumed.needle,
+        tracking=resumed.tracking,
+        course=log.course,
+        policy=log.policy,
+        resumed=resumed,
+    )
 
 
 def _breathing(task: Task, phase_deg: float | None) -> Task:
@@ -262,16 +327,18 @@ def _say_idle(configuration: Configuration, given: Sequence[Given], *, picks: bo
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What is driven: the file, its task, the settings, what is known, what measures."""
+    """What is driven: the file, its task, the settings, what is known, what moves and measures."""
 
     environment: Path
     task: Task
     configuration: Configuration
     known: str
-    tracking: Tracking
-    wanted: Wanted
-    course: Course | None
-    policy: Policy | None
+    needle: str
+    tracking: Tracking = field(default_factory=Tracking)
+    wanted: Wanted = field(default_factory=Wanted)
+    course: Course | None = None
+    policy: Policy | None = None
+    resumed: Resumed | None = None
 
     @property
     def scene(self) -> Scene:
@@ -290,7 +357,7 @@ class _Terminal:
 
 
 @contextlib.contextmanager
-def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
+def _real_needle(run: _Run) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
     """What moves a real needle, and what measures it."""
     from ntagen.drive.needles import REAL
     from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
@@ -300,7 +367,7 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
     settings, scene, tracking = run.configuration.settings, run.scene, run.tracking
     if tracking.tracker is None:
         raise AssertionError("a real needle has a tracker (`tracking_of`)")
-    name, _, argument = needle.partition(":")
+    name, _, argument = run.needle.partition(":")
     if name == REAL:
         device = described(run.task, run.environment)
         axes = axes_for(device, scene.needle, settings)
@@ -314,7 +381,7 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
             tracking.text,
             tracking.tracker,
             tracking.transform,
-            scene.needle.tip,
+            scene.needle.tip if run.resumed is None else None,
             actuator.now_s,
             watches_force=settings.force_sensing,
             force_varies=settings.force_noise_n > 0.0,
@@ -325,7 +392,6 @@ def _real_needle(run: _Run, needle: str) -> Iterator[tuple[WatchedActuator, Live
 
 def _drive(
     run: _Run,
-    needle: str,
     log_path: Path | None,
     terminal: _Terminal,
     operator: SignalledOperator,
@@ -338,7 +404,7 @@ def _drive(
     steer: Callable[..., Driven]
     with contextlib.ExitStack() as stack:
         if configuration.needle.is_real:
-            steer = functools.partial(drive, scene, *stack.enter_context(_real_needle(run, needle)))
+            steer = functools.partial(drive, scene, *stack.enter_context(_real_needle(run)))
         else:
             watches_force = settings.force_sensing
             sensing = opened(run.tracking, scene.needle.tip, watches_force=watches_force)
@@ -362,6 +428,8 @@ def _drive(
             agree=agree,
             course=run.course,
             policy=run.policy,
+            legs=() if run.resumed is None else run.resumed.legs,
+            ask=operator.may,
         )
 
 
@@ -377,7 +445,7 @@ def _around(
     # The log has the strategies; nobody else asks for them.
     synthesise = synthesiser_for(settings, operator.listen, keeps_strategy=bool(log))
     agree = operator.agree if terminal.confirms else lambda _: None
-    told = lines(settings.ranking, moves=not terminal.confirms)
+    told = lines(settings.ranking, moves=not (terminal.confirms or run.resumed))
     with contextlib.ExitStack() as stack:
         journals = [*log, *stack.enter_context(_watched(run, operator, terminal))]
         if terminal.speaks:
@@ -433,9 +501,12 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
     # Mistakes on the command line must be found before an earlier log is replaced.
     told(run.scene, run.known)
     require_apart({"--log": path}, {"environment": run.environment})
+    # Of a run that goes on, the log before it has the source.
+    source = run.environment if run.resumed is None else Path()
     metadata, attachments = facts_of(
-        run.environment, run.scene, run.configuration, run.known, run.tracking.text
+        source, run.scene, run.configuration, run.known, run.tracking.text
     )
+    metadata |= hardware_facts(run.task, run.tracking.transform)
     if run.course is not None:
         from ntagen.drive.trees import COURSE, course_to_log
 
@@ -443,8 +514,22 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
         attachments |= {} if tree is None else {TREE: tree}
     if run.policy is not None:
         attachments[POLICY] = run.policy.text().encode()
-    with Log(path, metadata, attachments) as log:
+    if run.resumed is not None:
+        of_before, log_before = run.resumed.facts()
+        metadata, attachments = metadata | of_before, attachments | log_before
+    with Log(path, metadata, attachments) as log, _nothing_left_of(path, run.resumed):
         yield [log]
+
+
+@contextlib.contextmanager
+def _nothing_left_of(path: Path, resumed: Resumed | None) -> Iterator[None]:
+    """Removes the log of a run that could not go on, before anything was measured or moved."""
+    try:
+        yield
+    except InputError:
+        if resumed is not None:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _exit_code(outcome: str) -> int:
@@ -456,5 +541,6 @@ def _exit_code(outcome: str) -> int:
         State.NOT_GUARANTEED: 4,
         State.TIMED_OUT: 3,
         State.FAULTED: 5,
+        State.PULLED_OUT: 7,
         State.INTERRUPTED: 130,
     }[State(outcome)]

@@ -47,15 +47,18 @@ class SignalledOperator(Operator):
         Raises:
             KeyboardInterrupt: It may not.
         """
+        if not self.may(text):
+            raise KeyboardInterrupt(f"the operator did not agree to {text}")
+
+    def may(self, text: str) -> bool:
+        """Asks whether the driver may do this, and returns the answer; Ctrl-C is a no."""
         self._is_asked = True
         try:
-            agrees = click.confirm(f"May the needle {text}?", err=True)
+            return click.confirm(f"May the needle {text}?", err=True)
         except (click.Abort, KeyboardInterrupt):
-            agrees = False
+            return False
         finally:
             self._is_asked = False
-        if not agrees:
-            raise KeyboardInterrupt(f"the operator did not agree to {text}")
 
 
 @contextlib.contextmanager
