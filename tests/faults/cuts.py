@@ -47,6 +47,8 @@ LATEST_S = 45.0
 _LOST_S = 15.0
 """At most so much of a log is not on the disk when the power fails."""
 
+_SAMPLE_S = 0.05
+
 _DEPTH_MM = 1.0
 """A driver that goes on must know the depth this well."""
 
@@ -122,6 +124,8 @@ class Patient:
         self.device = Stepped(make(scene.needle, obstacles, seed), speed_mm_per_s)
         self.is_hidden = False
         self.lost_position = False
+        self._sample: Measurement | None = None
+        self._sampled_s = 0.0
 
     def now_s(self) -> float:
         """The time on the clock of the controller, which goes on without a driver."""
@@ -138,8 +142,10 @@ class Patient:
         return self.device.measure()
 
     def newest(self) -> Measurement:
-        """The same."""
-        return self.measure()
+        """The newest sample of a tracker that makes twenty a second."""
+        if self._sample is None or self.now_s() > self._sampled_s + _SAMPLE_S or self.is_hidden:
+            self._sample, self._sampled_s = self.measure(), self.now_s()
+        return self._sample
 
     @property
     def true_depth_mm(self) -> float:
