@@ -26,12 +26,14 @@ from ntagen.cli.needle.operator import SignalledOperator, signalled_operator
 from ntagen.cli.needle.optimise import load_policy
 from ntagen.cli.needle.report import lines, report, summary
 from ntagen.cli.needle.resume import (
+    FoundTeller,
     Resumed,
     hardware_facts,
     new_log,
     require_terminal,
     resume_option,
     resumed_of,
+    tell_past,
 )
 from ntagen.cli.needle.steering import (
     known_option,
@@ -220,6 +222,7 @@ def command(
         )
         log_path = new_log(resumed.log, log_path)
         require_terminal()
+        tell_past(resumed)
         run = _resumed_run(resumed)
     else:
         if environment is None:
@@ -450,6 +453,8 @@ def _around(
         journals = [*log, *stack.enter_context(_watched(run, operator, terminal))]
         if terminal.speaks:
             journals.append(stack.enter_context(told))
+        elif run.resumed is not None:
+            journals.append(FoundTeller())
         try:
             yield synthesise, Journals(*journals), agree
         except ModelError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+import time
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -14,6 +15,7 @@ import click
 from ntagen.cli.loading import load_task
 from ntagen.cli.needle.tracker import NO_REGISTRATION, Tracking
 from ntagen.cli.options import path_option
+from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
 from ntagen.files import json_of, read_file, require_unlocked
 from ntagen.values import dataclass
@@ -25,8 +27,10 @@ if TYPE_CHECKING:
     from ntagen.drive.needles import Chosen
     from ntagen.drive.past import Leg
     from ntagen.drive.reading import RunLog
+    from ntagen.drive.records import Record
     from ntagen.hardware import GrblDevice
     from ntagen.nsl import Task
+    from ntagen.plan.synthesise import Synthesis
     from ntagen.scene import Scene
     from ntagen.tracking.frames import Transform
 
@@ -60,6 +64,8 @@ _SHOWN: Final = 12
 """So many digits of a digest tell two of them apart."""
 
 _MOST_LOGS: Final = 1000
+
+_LONG_MIN: Final = 120.0
 
 resume_option = path_option(
     "--resume",
@@ -196,6 +202,34 @@ def require_terminal() -> None:
             "a run goes on only if somebody at a terminal agrees, and there is none\n"
             "hint: run `ntagen drive --resume` in a terminal, where the needle can be seen"
         )
+
+
+class FoundTeller:
+    """A journal that prints what an answer relies on, where nothing else is printed."""
+
+    def record(self, record: Record) -> None:
+        """Prints where the needle was found."""
+        from ntagen.drive.records import Found
+        from ntagen.drive.story import text_of
+
+        if isinstance(record, Found):
+            echo(text_of(record) or "", err=True)
+
+    def started(self, scene: Scene) -> None:
+        """Prints nothing."""
+
+    def synthesised(self, number: int, synthesis: Synthesis) -> None:
+        """Prints nothing."""
+
+
+def tell_past(resumed: Resumed) -> None:
+    """Prints from what a run goes on, and how old that is: tissue relaxes meanwhile."""
+    log, ended = resumed.log, resumed.legs[-1].ended
+    last_s = log.records[-1].time_s if log.records else 0.0
+    how = "was cut off" if ended is None else f"ended with '{ended.outcome}: {ended.reason}'"
+    minutes = max(0.0, time.time() - log.path.stat().st_mtime) / 60.0
+    ago = f"{minutes:.0f} min" if minutes < _LONG_MIN else f"{minutes / 60.0:.0f} h"
+    echo(f"{log.path} {how} at {last_s:.2f} s, {ago} ago", err=True)
 
 
 def hardware_facts(task: Task, transform: Transform | None) -> dict[str, str]:
