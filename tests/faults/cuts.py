@@ -227,7 +227,7 @@ class Driver:
 
     def die(self) -> None:
         """The process is killed: it writes nothing any more, neither to the log nor on the wire."""
-        self.acknowledged = self.path.read_bytes()
+        self.acknowledged = self.path.read_bytes() if self.path.exists() else b""
         self.port.write = lambda data: None  # type: ignore[method-assign]
         self.is_dead = True
         raise _Death
