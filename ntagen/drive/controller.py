@@ -213,8 +213,7 @@ class Controller:
     def _resume(self) -> Event:
         self._planner.start()
         self._guide.leave("the run was cut off")
-        # The last reading of the run before may have been the one that felt a region.
-        self._learner.learn()
+        self._learner.recall()
         event = self._resuming.task()
         # The operator took as long as it took.
         self._planner.start()

@@ -111,6 +111,14 @@ class Learner:
         )
         self._know(known)
 
+    def recall(self) -> None:
+        """Records what runs before this one learned, and learns what their last reading felt."""
+        before = self.knowledge.learned
+        self.learn()
+        for region in self.knowledge.learned:
+            if region in before:
+                self._journal.record(Learned.of(self._needle.now_s(), region))
+
     def doubt(self) -> bool:
         """Assumes smaller regions where some were felt; whether any got smaller."""
         known = self.knowledge.doubted(assumed_of(self._settings))

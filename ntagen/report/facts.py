@@ -81,6 +81,7 @@ def _file(log: RunLog) -> dict[str, Any]:
         "started_at": log.metadata.get("started_at"),
         "is_whole": log.torn_at_byte is None,
         "torn_at_byte": log.torn_at_byte,
+        "resumes": log.resumes,
         "records": len(log.records),
         "last_s": log.records[-1].time_s if log.records else None,
     }

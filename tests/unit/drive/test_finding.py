@@ -177,7 +177,7 @@ def test_a_tip_off_the_channel_is_refused(counted: tuple[float, float] | None) -
 
 
 def test_a_tip_that_is_not_where_the_controller_counts_is_refused() -> None:
-    with pytest.raises(DeviceError, match="the controller counts 20.00 mm, and the tracker sees"):
+    with pytest.raises(DeviceError, match=r"the controller counts 20\.00 mm, and the tracker sees"):
         found(looks(CHANNEL.pull(6.0).tip), counted=(DEPTH_MM, 0.0))
 
 
