@@ -138,6 +138,7 @@ bench-devices: $(INSTALLED) ## Measure how fast a stop is on the wire, and wheth
 	$(BIN)/python tests/benchmarks/stop.py
 	$(BIN)/python -m tests.benchmarks.faults
 	$(BIN)/python -m tests.benchmarks.lab_faults
+	$(BIN)/python -m tests.benchmarks.cuts
 
 .PHONY: bench-limits
 bench-limits: $(INSTALLED) ## Measure whether the time and memory limits hold: 20 models with up to 250 clocks

@@ -222,7 +222,12 @@ class Controller:
     def _retreat(self) -> Event:
         """Pulls the needle out. It is not turned: perhaps nobody knows how it stands."""
         self._needle.withdraw()
-        self.reason = "the needle was pulled back along its channel to the entry"
+        entry_mm = self._learner.a_priori.needle.tip.position_mm
+        off_mm = distance(self._needle.measure().position_mm, entry_mm)
+        self.reason = (
+            "the needle was pulled back along its channel to the entry, and the tip is measured "
+            f"{off_mm:.1f} mm from there"
+        )
         return Event.IS_OUT
 
     def _make_estimate(self) -> Event:

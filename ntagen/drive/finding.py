@@ -32,6 +32,7 @@ from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
 from ntagen.needle.vectors import cross, distance, dot
+from ntagen.plan.actions import Push
 from ntagen.scene import Pose, Vector
 from ntagen.shapes import vector_of
 from ntagen.units import deg_from_rad
@@ -49,7 +50,8 @@ _COUNT_RAD: Final = math.radians(1.0)
 """The count of a controller that was left alone fits the log by this; ours."""
 
 _LEAST_MM: Final = 1.0
-"""A needle that is less deep is as good as at the entry: a run begins there anew; ours."""
+"""Less than this is nothing, where the tracker alone tells how deep the needle is; and a needle
+that is less deep is as good as at the entry: a run begins there anew; ours."""
 
 _SEEN_RAD: Final = math.radians(5.0)
 """A bevel that is seen alone says how the needle is turned if it fits the log by this; ours."""
@@ -138,7 +140,7 @@ def find(clues: Clues, settings: Settings) -> Place:
     require_still(clues.looks, tip_mm, settings)
     span = _Span.of(clues, settings)
     depth = span.depth_at(tip_mm, clues.counted)
-    end = span.path.pull(span.path.depth_mm - min(depth.depth_mm, span.path.depth_mm))
+    end = span.upto(depth.depth_mm)
     off_mm = end.nearest_to(tip_mm).distance_mm
     turn = _turn(clues, orthonormal(end.tip), is_counted=depth.is_counted)
     _require_heading(clues.looks, orthonormal(end.tip), off_mm)
@@ -185,12 +187,14 @@ class _Span:
 
     Attributes:
         path: The channel up to its far end.
+        beyond: The same and a little more: a log may lack its end.
         low_mm: The least depth.
         high_mm: The greatest depth.
         allowed_mm: How far the tip may be from the channel.
     """
 
     path: Path
+    beyond: Path
     low_mm: float
     high_mm: float
     allowed_mm: float
@@ -203,11 +207,18 @@ class _Span:
         low_mm = here_mm
         if pending is not None and pending.kind == "push":
             length_mm = pending.value
-            path = path.push(known.radius_mm / max(1e-6, 1.0 - pending.spin), length_mm)
+            path = path.push(Push(length_mm, pending.spin).radius_mm(known.radius_mm), length_mm)
         elif pending is not None and pending.kind == "pull":
             low_mm = max(0.0, here_mm - pending.value)
         tube_mm = _TUBE_SIGMAS * known.position_std_mm(length_mm)
-        return _Span(path, low_mm, here_mm + length_mm, tube_mm + allowed_misfit_mm(settings))
+        allowed_mm = tube_mm + allowed_misfit_mm(settings)
+        beyond = path.push(known.radius_mm, allowed_mm)
+        return _Span(path, beyond, low_mm, here_mm + length_mm, allowed_mm)
+
+    def upto(self, depth_mm: float) -> Path:
+        """The channel up to a depth, or as far as it is known."""
+        path = self.path if depth_mm <= self.path.depth_mm else self.beyond
+        return path.pull(max(0.0, path.depth_mm - depth_mm))
 
     def depth_at(self, tip_mm: Vector, counted: Counts | None) -> _Depth:
         """The depth of a tip that is seen there.
@@ -216,32 +227,28 @@ class _Span:
             DeviceError: It is not on the channel, or not where the controller says.
         """
         count_mm = None if counted is None else counted[0]
-        near = self.path.nearest_to(tip_mm)
         if count_mm is not None:
             if self.low_mm - _COUNT_MM <= count_mm <= self.high_mm + _COUNT_MM:
                 return self._counted(count_mm, tip_mm)
             beyond_mm = count_mm - self.high_mm
             away_mm = distance(tip_mm, self.path.tip.position_mm)
             if 0.5 * beyond_mm - self.allowed_mm <= away_mm <= beyond_mm + self.allowed_mm:
-                return _Depth(
-                    count_mm,
-                    True,
-                    f"{count_mm:.2f} mm deep by the count of the controller",
-                    f"it is {beyond_mm:.2f} mm deeper than the log tells: the end of the log is "
-                    "missing, and nobody knows the channel there",
-                )
+                text = f"{count_mm:.2f} mm deep by the count of the controller"
+                return _Depth(count_mm, True, text, _deeper(beyond_mm))
+        near = self.beyond.nearest_to(tip_mm)
         self._require_on(near.distance_mm, tip_mm)
         if near.at_mm < self.low_mm - self.allowed_mm:
             return self._drawn_out(near.at_mm, count_mm)
-        depth_mm = max(self.low_mm, min(self.high_mm, near.at_mm))
-        seen = f"{depth_mm:.2f} mm deep by the log, as the tracker sees it"
-        if count_mm is None:
-            return _Depth(depth_mm, False, f"{seen}; no controller counts its axes")
-        return _Depth(
-            depth_mm,
-            False,
-            f"{seen}; the controller counts {count_mm:.2f} mm: it has lost its position",
-        )
+        depth_mm, lack = max(self.low_mm, min(self.high_mm, near.at_mm)), ""
+        if near.at_mm > self.high_mm + _LEAST_MM:
+            depth_mm, lack = near.at_mm, _deeper(near.at_mm - self.high_mm)
+        text = f"{depth_mm:.2f} mm deep as the tracker sees it; no controller counts its axes"
+        if count_mm is not None:
+            text = (
+                f"{depth_mm:.2f} mm deep as the tracker sees it; the controller counts "
+                f"{count_mm:.2f} mm: it has lost its position"
+            )
+        return _Depth(depth_mm, False, text, lack)
 
     def _counted(self, count_mm: float, tip_mm: Vector) -> _Depth:
         """The depth by the controller, if the tracker sees the tip there."""
@@ -286,6 +293,14 @@ class _Span:
             by = "by the count of the controller and by the tracker"
             return _Depth(depth_mm, True, f"{depth_mm:.2f} mm deep {by}, {since}")
         return _Depth(seen_mm, False, f"{seen_mm:.2f} mm deep as the tracker sees it, {since}")
+
+
+def _deeper(beyond_mm: float) -> str:
+    """Why nobody goes on from a needle that is deeper than its log tells."""
+    return (
+        f"it is {beyond_mm:.2f} mm deeper than the log tells: the end of the log is missing, and "
+        "nobody knows the channel there"
+    )
 
 
 def _turn(clues: Clues, expected: Pose, *, is_counted: bool) -> _Turn:

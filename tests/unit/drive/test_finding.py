@@ -161,6 +161,16 @@ def test_a_needle_that_is_deeper_than_its_log_may_only_be_pulled_back() -> None:
     assert "7.00 mm deeper than the log tells" in place.lack
 
 
+def test_the_tracker_alone_sees_that_the_end_of_a_log_is_missing() -> None:
+    for counted in (None, (0.0, 0.0)):
+        tip = CHANNEL.push(RADIUS_MM, 1.5).tip
+        place = found(looks(tip, bevel=True), counted=counted)
+        assert place.depth_mm == pytest.approx(21.5, abs=0.2)
+        assert "deeper than the log tells" in place.lack
+        near = found(looks(CHANNEL.push(RADIUS_MM, 0.3).tip, bevel=True), counted=counted)
+        assert (near.depth_mm, near.lack) == (DEPTH_MM, "")
+
+
 def test_a_needle_that_is_hardly_in_begins_anew() -> None:
     short = Estimator(ENTRY, RADIUS_MM, SETTINGS.priors)
     short.push(0.5)
