@@ -136,6 +136,11 @@ class Log:
             # The user wants an end at once, perhaps in the middle of a record.
             self._file.close()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was recorded."""
+        return self._sequence == 0
+
     def started(self, scene: Scene) -> None:
         """Writes the a-priori scene."""
         text = scene_to_json(scene)

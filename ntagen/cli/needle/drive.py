@@ -522,19 +522,14 @@ def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
     if run.resumed is not None:
         of_before, log_before = run.resumed.facts()
         metadata, attachments = metadata | of_before, attachments | log_before
-    with Log(path, metadata, attachments) as log, _nothing_left_of(path, run.resumed):
-        yield [log]
-
-
-@contextlib.contextmanager
-def _nothing_left_of(path: Path, resumed: Resumed | None) -> Iterator[None]:
-    """Removes the log of a run that could not go on, before anything was measured or moved."""
-    try:
-        yield
-    except InputError:
-        if resumed is not None:
-            path.unlink(missing_ok=True)
-        raise
+    with Log(path, metadata, attachments) as log:
+        try:
+            yield [log]
+        except InputError:
+            if run.resumed is not None and log.is_empty:
+                # The run could not go on, and its log was not there before.
+                path.unlink(missing_ok=True)
+            raise
 
 
 def _exit_code(outcome: str) -> int:
