@@ -45,6 +45,8 @@ _NOISE_SIGMAS: Final = 6.0
 _STILL_MM: Final = 0.5
 """Readings of a needle at rest differ by this and by noise: tissue creeps; ours."""
 
+_ROUNDING_MM: Final = 1e-6
+
 _COUNT_MM: Final = 0.1
 _COUNT_RAD: Final = math.radians(1.0)
 """The count of a controller that was left alone fits the log by this; ours."""
@@ -236,7 +238,8 @@ class _Span:
                 text = f"{count_mm:.2f} mm deep by the count of the controller"
                 return _Depth(count_mm, True, text, _deeper(beyond_mm))
         near = self.beyond.nearest_to(tip_mm)
-        self._require_on(near.distance_mm, tip_mm)
+        is_farther = near.at_mm >= self.beyond.depth_mm - _ROUNDING_MM
+        self._require_on(math.inf if is_farther else near.distance_mm, tip_mm)
         if near.at_mm < self.low_mm - self.allowed_mm:
             return self._drawn_out(near.at_mm, count_mm)
         depth_mm, lack = max(self.low_mm, min(self.high_mm, near.at_mm)), ""
@@ -277,8 +280,9 @@ class _Span:
         if off_mm <= self.allowed_mm:
             return
         place = ", ".join(f"{one:.1f}" for one in tip_mm)
+        away_mm = self.path.nearest_to(tip_mm).distance_mm
         raise DeviceError(
-            f"the tracker sees the tip at ({place}) mm, {off_mm:.1f} mm from the channel that the "
+            f"the tracker sees the tip at ({place}) mm, {away_mm:.1f} mm from the channel that the "
             f"log tells; {self.allowed_mm:.1f} mm is allowed\n"
             "hint: is this the last log of this needle, and the registration that of this tracker? "
             f"Was the needle moved since?\n{_BY_HAND}"

@@ -167,6 +167,8 @@ def test_the_tracker_alone_sees_that_the_end_of_a_log_is_missing() -> None:
         place = found(looks(tip, bevel=True), counted=counted)
         assert place.depth_mm == pytest.approx(21.5, abs=0.2)
         assert "deeper than the log tells" in place.lack
+        with pytest.raises(DeviceError, match=r"2\.5 mm from the channel"):
+            found(looks(CHANNEL.push(RADIUS_MM, 2.5).tip, bevel=True), counted=counted)
         near = found(looks(CHANNEL.push(RADIUS_MM, 0.3).tip, bevel=True), counted=counted)
         assert (near.depth_mm, near.lack) == (DEPTH_MM, "")
 
