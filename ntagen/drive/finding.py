@@ -232,16 +232,17 @@ class _Span:
         if count_mm is not None:
             if self.low_mm - _COUNT_MM <= count_mm <= self.high_mm + _COUNT_MM:
                 return self._counted(count_mm, tip_mm)
-            beyond_mm = count_mm - self.high_mm
-            away_mm = distance(tip_mm, self.path.tip.position_mm)
-            if 0.5 * beyond_mm - self.allowed_mm <= away_mm <= beyond_mm + self.allowed_mm:
+            if self._is_deeper(count_mm, tip_mm):
                 text = f"{count_mm:.2f} mm deep by the count of the controller"
-                return _Depth(count_mm, True, text, _deeper(beyond_mm))
+                return _Depth(count_mm, True, text, _deeper(count_mm - self.high_mm))
         near = self.beyond.nearest_to(tip_mm)
         is_farther = near.at_mm >= self.beyond.depth_mm - _ROUNDING_MM
         self._require_on(math.inf if is_farther else near.distance_mm, tip_mm)
+        agrees = count_mm is not None and abs(count_mm - near.at_mm) <= self.allowed_mm
+        if count_mm is not None and count_mm < self.low_mm and agrees:
+            return self._drawn_out(max(0.0, count_mm), is_counted=True)
         if near.at_mm < self.low_mm - self.allowed_mm:
-            return self._drawn_out(near.at_mm, count_mm)
+            return self._drawn_out(near.at_mm, is_counted=False)
         depth_mm, lack = max(self.low_mm, min(self.high_mm, near.at_mm)), ""
         if near.at_mm > self.high_mm + _LEAST_MM:
             depth_mm, lack = near.at_mm, _deeper(near.at_mm - self.high_mm)
@@ -288,15 +289,20 @@ class _Span:
             f"Was the needle moved since?\n{_BY_HAND}"
         )
 
-    def _drawn_out(self, seen_mm: float, count_mm: float | None) -> _Depth:
+    def _is_deeper(self, count_mm: float, tip_mm: Vector) -> bool:
+        """Whether the tip can be so deep that the log lacks the end of its way: it may bend."""
+        beyond_mm = count_mm - self.high_mm
+        away_mm = distance(tip_mm, self.path.tip.position_mm)
+        is_near = 0.5 * beyond_mm - self.allowed_mm <= away_mm <= beyond_mm + self.allowed_mm
+        return beyond_mm > 0.0 and is_near
+
+    def _drawn_out(self, depth_mm: float, *, is_counted: bool) -> _Depth:
         """The depth of a needle that is less deep than the log says: somebody pulled it back."""
-        back_mm = self.low_mm - seen_mm
+        back_mm = self.low_mm - depth_mm
+        counted = "by the count of the controller and by the tracker"
+        by = counted if is_counted else "as the tracker sees it"
         since = f"{back_mm:.2f} mm less than the log tells: it was pulled back since"
-        if count_mm is not None and abs(count_mm - seen_mm) <= self.allowed_mm:
-            depth_mm = max(0.0, count_mm)
-            by = "by the count of the controller and by the tracker"
-            return _Depth(depth_mm, True, f"{depth_mm:.2f} mm deep {by}, {since}")
-        return _Depth(seen_mm, False, f"{seen_mm:.2f} mm deep as the tracker sees it, {since}")
+        return _Depth(depth_mm, is_counted, f"{depth_mm:.2f} mm deep {by}, {since}")
 
 
 def _deeper(beyond_mm: float) -> str:

@@ -145,13 +145,20 @@ def test_a_bevel_that_contradicts_the_count_lets_nobody_go_on() -> None:
     assert "90 deg from where the controller counts it" in found(turned, None, (DEPTH_MM, 0.0)).lack
 
 
-def test_a_needle_that_was_pulled_back_since_is_found_on_its_channel() -> None:
-    tip = CHANNEL.pull(9.0).tip
-    place = found(looks(tip), counted=(DEPTH_MM - 9.0, 0.0))
-    assert place.depth_mm == pytest.approx(11.0)
-    assert "9.0" in place.text
-    assert "pulled back since" in place.text
+@pytest.mark.parametrize("back_mm", [0.8, 9.0])
+def test_a_needle_that_was_pulled_back_since_is_found_on_its_channel(back_mm: float) -> None:
+    tip = CHANNEL.pull(back_mm).tip
+    place = found(looks(tip), counted=(DEPTH_MM - back_mm, 0.0))
+    assert place.depth_mm == pytest.approx(DEPTH_MM - back_mm)
+    assert f"{back_mm:.2f} mm less than the log tells: it was pulled back since" in place.text
     assert not place.lack
+
+
+def test_a_needle_that_was_pulled_back_by_hand_may_only_be_pulled_farther() -> None:
+    place = found(looks(CHANNEL.pull(9.0).tip))
+    assert place.depth_mm == pytest.approx(11.0, abs=0.2)
+    assert "as the tracker sees it, 9." in place.text
+    assert "nothing says how its bevel stands" in place.lack
 
 
 def test_a_needle_that_is_deeper_than_its_log_may_only_be_pulled_back() -> None:
