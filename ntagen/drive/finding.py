@@ -26,12 +26,13 @@ from ntagen.drive.deviation import allowed_misfit_mm
 from ntagen.drive.device import Counts
 from ntagen.drive.records import Command
 from ntagen.drive.settings import Settings
+from ntagen.drive.turning import turn_of
 from ntagen.errors import DeviceError
 from ntagen.needle.estimate import Estimate
 from ntagen.needle.kinematics import orthonormal
 from ntagen.needle.measurement import Measurement
 from ntagen.needle.path import Path
-from ntagen.needle.vectors import cross, distance, dot
+from ntagen.needle.vectors import distance, dot
 from ntagen.plan.actions import Push
 from ntagen.scene import Pose, Vector
 from ntagen.shapes import vector_of
@@ -48,18 +49,14 @@ _STILL_MM: Final = 0.5
 _ROUNDING_MM: Final = 1e-6
 
 _COUNT_MM: Final = 0.1
-_COUNT_RAD: Final = math.radians(1.0)
 """The count of a controller that was left alone fits the log by this; ours."""
 
 _LEAST_MM: Final = 1.0
 """Less than this is nothing, where the tracker alone tells how deep the needle is; and a needle
 that is less deep is as good as at the entry: a run begins there anew; ours."""
 
-_SEEN_RAD: Final = math.radians(5.0)
-"""A bevel that is seen alone says how the needle is turned if it fits the log by this; ours."""
-
-_CROSS_RAD: Final = math.radians(30.0)
-"""A bevel or heading that is seen may differ by this from what else says how it stands; ours."""
+_ASKEW_RAD: Final = math.radians(30.0)
+"""A heading that is seen may differ by this from that of the channel; ours."""
 
 _BY_HAND: Final = (
     "hint: pull the needle back by hand, along the way that it came, and begin anew at the entry"
@@ -121,16 +118,6 @@ class _Depth:
     lack: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Turn:
-    """How the needle is turned since the last record; its tip, and its base ahead of that."""
-
-    turn_rad: float
-    wound_rad: float
-    text: str
-    lack: str = ""
-
-
 def find(clues: Clues, settings: Settings) -> Place:
     """Where the needle is.
 
@@ -144,8 +131,10 @@ def find(clues: Clues, settings: Settings) -> Place:
     depth = span.depth_at(tip_mm, clues.counted)
     end = span.upto(depth.depth_mm)
     off_mm = end.nearest_to(tip_mm).distance_mm
-    turn = _turn(clues, orthonormal(end.tip), is_counted=depth.is_counted)
-    _require_heading(clues.looks, orthonormal(end.tip), off_mm)
+    counted_rad = clues.counted[1] if clues.counted is not None and depth.is_counted else None
+    expected = orthonormal(end.tip)
+    turn = turn_of(clues.looks, expected, clues.pending, counted_rad, clues.lag_rad)
+    _require_heading(clues.looks, expected, off_mm)
     lack = "; ".join(filter(None, (depth.lack, turn.lack)))
     if not lack and depth.depth_mm < _LEAST_MM:
         lack = f"it is {depth.depth_mm:.2f} mm deep: a run begins anew at the entry"
@@ -313,72 +302,6 @@ def _deeper(beyond_mm: float) -> str:
     )
 
 
-def _turn(clues: Clues, expected: Pose, *, is_counted: bool) -> _Turn:
-    """How the needle is turned, by the controller or by the bevel that the tracker sees."""
-    pending = clues.pending
-    roll_rad = pending.value if pending is not None and pending.kind == "roll" else 0.0
-    if pending is not None and pending.spin:
-        return _Turn(0.0, 0.0, "turned by nobody knows how much", "it was cut off while it spun")
-    seen_rad = _seen_rad(clues.looks, expected)
-    if is_counted and clues.counted is not None:
-        found = _counted_turn(clues.counted[1], roll_rad, clues.lag_rad)
-        if found.lack or seen_rad is None:
-            return found
-        off_deg = deg_from_rad(abs(math.remainder(seen_rad - found.turn_rad, math.tau)))
-        if off_deg <= deg_from_rad(_CROSS_RAD):
-            return found
-        lack = f"the tracker sees its bevel {off_deg:.0f} deg from where the controller counts it"
-        return _Turn(found.turn_rad, found.wound_rad, found.text, lack)
-    if seen_rad is None:
-        return _Turn(
-            0.0,
-            0.0,
-            "turned by nobody knows how much",
-            "nothing says how its bevel stands: the controller does not count it, or has lost its "
-            "position, and the tracker does not see it",
-        )
-    turn_rad = min((0.0, roll_rad), key=lambda one: abs(math.remainder(seen_rad - one, math.tau)))
-    off_rad = abs(math.remainder(seen_rad - turn_rad, math.tau))
-    text = "turned as the tracker sees its bevel"
-    if off_rad <= _SEEN_RAD:
-        return _Turn(turn_rad, 0.0, text)
-    off_deg = deg_from_rad(off_rad)
-    return _Turn(0.0, 0.0, text, f"its bevel is seen {off_deg:.0f} deg from where the log left it")
-
-
-def _counted_turn(count_rad: float, roll_rad: float, lag_rad: float) -> _Turn:
-    """How the needle is turned by a count, if it may have been in a roll.
-
-    The base goes too far by the lag, and comes back: meanwhile it is ahead of the tip.
-    """
-    text = "turned by the count of the controller"
-    if abs(count_rad) <= _COUNT_RAD:
-        return _Turn(0.0, 0.0, text)
-    if abs(count_rad - roll_rad) <= _COUNT_RAD:
-        return _Turn(roll_rad, 0.0, text)
-    sign = math.copysign(1.0, roll_rad)
-    gone_rad, whole_rad = sign * count_rad, abs(roll_rad)
-    if not 0.0 < gone_rad <= whole_rad + lag_rad + _COUNT_RAD or not roll_rad:
-        off_deg = deg_from_rad(count_rad)
-        return _Turn(
-            0.0, 0.0, text, f"its base stands {off_deg:.0f} deg from where the log left it"
-        )
-    wound_rad = min(gone_rad, lag_rad) if gone_rad < whole_rad else gone_rad - whole_rad
-    turn_rad = gone_rad - wound_rad
-    done = f"{text}: {deg_from_rad(sign * turn_rad):.0f} of {deg_from_rad(roll_rad):.0f} deg"
-    return _Turn(sign * turn_rad, sign * wound_rad, done)
-
-
-def _seen_rad(looks: Sequence[Measurement], expected: Pose) -> float | None:
-    """The angle about the heading from the expected bevel to the one that is seen, if it is."""
-    seen = [one.bevel for one in looks if one.bevel is not None]
-    if len(seen) < len(looks):
-        return None
-    bevel = vector_of(sum(axis) for axis in zip(*seen, strict=True))
-    side = cross(expected.heading, expected.bevel)
-    return math.atan2(dot(bevel, side), dot(bevel, expected.bevel))
-
-
 def _require_heading(looks: Sequence[Measurement], expected: Pose, off_mm: float) -> None:
     """Refuses a needle on its channel that points elsewhere.
 
@@ -392,7 +315,7 @@ def _require_heading(looks: Sequence[Measurement], expected: Pose, off_mm: float
     length = math.sqrt(dot(heading, heading))
     cosine = dot(heading, expected.heading) / length if length > 0.0 else -1.0
     angle_rad = math.acos(max(-1.0, min(1.0, cosine)))
-    if angle_rad > _CROSS_RAD:
+    if angle_rad > _ASKEW_RAD:
         raise DeviceError(
             f"the tracker sees the needle point {deg_from_rad(angle_rad):.0f} deg away from its "
             f"channel\nhint: check axis=… of the tracker and the registration\n{_BY_HAND}"

@@ -28,13 +28,13 @@ from ntagen.cli.needle.report import lines, report, summary
 from ntagen.cli.needle.resume import (
     FoundTeller,
     Resumed,
-    hardware_facts,
     new_log,
     require_terminal,
     resume_option,
     resumed_of,
     tell_past,
 )
+from ntagen.cli.needle.same_devices import hardware_facts
 from ntagen.cli.needle.steering import (
     known_option,
     say_idle_errors,

@@ -6,14 +6,21 @@ import json
 import re
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
 
 from ntagen.cli.loading import load_task
-from ntagen.cli.needle.tracker import NO_REGISTRATION, Tracking
+from ntagen.cli.needle.same_devices import (
+    BY_HAND,
+    device_of,
+    needle_of,
+    require_simulated,
+    tracking_of_log,
+)
+from ntagen.cli.needle.tracker import Tracking
 from ntagen.cli.options import path_option
 from ntagen.cli.terminal import echo
 from ntagen.errors import InputError
@@ -32,13 +39,6 @@ if TYPE_CHECKING:
     from ntagen.nsl import Task
     from ntagen.plan.synthesise import Synthesis
     from ntagen.scene import Scene
-    from ntagen.tracking.frames import Transform
-
-DEVICE: Final = "device"
-"""The entry of a log with the axes of the controller, as the task describes them."""
-
-REGISTRATION: Final = "registration"
-"""The entry of a log with the registration of the tracker."""
 
 _KEPT: Final = frozenset(
     {
@@ -59,7 +59,6 @@ _KEPT: Final = frozenset(
 """What may stand beside --resume; all else is as the log has it."""
 
 _RESUMED: Final = re.compile(r"(?P<stem>.+-resumed)(-(?P<number>[1-9][0-9]{0,3}))?")
-_BY_HAND: Final = "hint: pull the needle back by hand, and begin anew at the entry"
 _SHOWN: Final = 12
 """So many digits of a digest tell two of them apart."""
 
@@ -150,7 +149,7 @@ def resumed_of(
     if log.file_bytes > MAX_RECORD_BYTES:
         raise InputError(
             f"{path} has {log.file_bytes / 2**20:.0f} MiB, and a log of more than "
-            f"{MAX_RECORD_BYTES / 2**20:.0f} MiB does not fit into another one\n{_BY_HAND}"
+            f"{MAX_RECORD_BYTES / 2**20:.0f} MiB does not fit into another one\n{BY_HAND}"
         )
     legs = legs_of(log)
     _require_in_tissue(path, legs)
@@ -160,12 +159,12 @@ def resumed_of(
         _require_same_task(log, task)
     configuration = _configuration_of(log)
     chosen = configuration.needle
-    name = _needle_of(chosen, needle)
+    name = needle_of(chosen, needle)
     if chosen.is_real:
-        tracking = _tracking_of(log, tracker, registration)
-        device = task.device if task is not None else _device_of(log)
+        tracking = tracking_of_log(log, tracker, registration)
+        device = task.device if task is not None else device_of(log)
     else:
-        _require_simulated(log, tracker, registration)
+        require_simulated(log, tracker, registration)
         tracking, device = Tracking(), None
     return Resumed(log, legs, _task_of(log, chosen, device), configuration, name, tracking)
 
@@ -230,18 +229,6 @@ def tell_past(resumed: Resumed) -> None:
     minutes = max(0.0, time.time() - log.path.stat().st_mtime) / 60.0
     ago = f"{minutes:.0f} min" if minutes < _LONG_MIN else f"{minutes / 60.0:.0f} h"
     echo(f"{log.path} {how} at {last_s:.2f} s, {ago} ago", err=True)
-
-
-def hardware_facts(task: Task, transform: Transform | None) -> dict[str, str]:
-    """What a log must say about devices, so that a run can go on with the same ones."""
-    from ntagen.tracking.transform_file import transform_to_json
-
-    facts = {}
-    if task.device is not None:
-        facts[DEVICE] = json.dumps(asdict(task.device))
-    if transform is not None:
-        facts[REGISTRATION] = json.dumps(transform_to_json(transform))
-    return facts
 
 
 def _refuse_others() -> None:
@@ -365,106 +352,8 @@ def _configuration_of(log: RunLog) -> Configuration:
         return Configuration(log.settings, errors, int(metadata["seed"]), {}, chosen)
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(
-            f"{log.path}: the log does not say which needle was driven: {error}\n{_BY_HAND}"
+            f"{log.path}: the log does not say which needle was driven: {error}\n{BY_HAND}"
         ) from error
-
-
-def _needle_of(chosen: Chosen, given: str | None) -> str:
-    """What moves the needle: as in the log, perhaps at another port.
-
-    Raises:
-        InputError: It is another kind of device.
-    """
-    if given is None or given == chosen.name:
-        return chosen.name
-    if chosen.is_real and given.partition(":")[0] == chosen.name.partition(":")[0]:
-        return given
-    raise InputError(
-        f"the log is of a run with --needle {chosen.name}, not {given}\n"
-        "hint: leave --needle out; only the port of the same kind of device may be another one"
-    )
-
-
-def _tracking_of(log: RunLog, given: str | None, registration: str | None) -> Tracking:
-    """What measures a real needle: the tracker of the log, with its registration.
-
-    Raises:
-        InputError: It is another tracker, or cannot say where the needle is now.
-    """
-    from ntagen.tracking.frames import IDENTITY
-    from ntagen.tracking.live import Source
-    from ntagen.tracking.spec import no_registration, parse_tracker
-    from ntagen.tracking.transform_file import read_transform, transform_in
-
-    text = log.metadata.get("tracker", "")
-    logged = parse_tracker(text)
-    tracker = logged if given is None else parse_tracker(given)
-    if isinstance(logged, Source) and isinstance(tracker, Source):
-        same = replace(tracker, host=logged.host, port=logged.port) == logged
-        if not tracker.repeats:
-            raise InputError(
-                f"the tracker {text} sends changes only, so nobody knows whether a reading of a "
-                f"needle at rest is a fresh one\n{_BY_HAND}"
-            )
-    else:
-        same = tracker == logged
-    if not same:
-        raise InputError(
-            f"the log is of a run with --tracker {text}, not {given}\n"
-            "hint: leave --tracker out; only host and port of the server may be other ones"
-        )
-    if REGISTRATION in log.metadata:
-        if registration is not None:
-            raise InputError(
-                "--registration cannot stand beside --resume: the log has its own\n"
-                "hint: leave it out"
-            )
-        with log.naming():
-            transform = transform_in(log.metadata[REGISTRATION], "the registration")
-    elif registration is None:
-        raise no_registration()
-    else:
-        is_none = registration == NO_REGISTRATION
-        transform = IDENTITY if is_none else read_transform(Path(registration))
-    return Tracking(text if given is None else given, tracker, transform)
-
-
-def _require_simulated(log: RunLog, tracker: str | None, registration: str | None) -> None:
-    """Refuses simulated needles that cannot be brought back by the motions in the log.
-
-    Raises:
-        InputError: This is one.
-    """
-    lab = "hint: a needle in a lab (`ntagen device simulate`) keeps its place"
-    if tracker is not None or registration is not None:
-        raise InputError("the simulated needle of this log measures itself\nhint: no --tracker")
-    if log.metadata.get("tracker"):
-        raise InputError(
-            f"{log.path}: a simulated needle that {log.metadata['tracker']} measured cannot be "
-            f"brought back\n{lab}"
-        )
-    if log.scene.tissue.is_adversarial:
-        raise InputError(
-            f"{log.path}: the log does not say what the simulated tissue answered, so its needle "
-            f"cannot be brought back\n{lab}"
-        )
-
-
-def _device_of(log: RunLog) -> GrblDevice | None:
-    """The device of the task, as the log has it.
-
-    Raises:
-        InputError: It does not say so in the way in which it is written.
-    """
-    from ntagen.drive.json_values import value_from_json
-    from ntagen.hardware import GrblDevice
-
-    if DEVICE not in log.metadata:
-        return None
-    try:
-        return value_from_json(json_of(log.metadata[DEVICE]), GrblDevice)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{log.path}: the device cannot be read: {error}") from error
 
 
 def _task_of(log: RunLog, chosen: Chosen, device: GrblDevice | None) -> Task:
