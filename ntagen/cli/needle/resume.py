@@ -100,7 +100,7 @@ class Resumed:
     @property
     def known(self) -> str:
         """The critical regions that the driver knows; those of a real needle's scene are all."""
-        return "all" if self.configuration.needle.is_real else self.log.metadata["known"]
+        return "all" if self.configuration.needle.is_real else self.log.metadata.get("known", "all")
 
     def facts(self) -> tuple[dict[str, str], dict[str, bytes]]:
         """What the new log says about the one from which it goes on, and that log itself."""
@@ -159,7 +159,9 @@ def resumed_of(
         _require_same_task(log, task)
     configuration = _configuration_of(log)
     chosen = configuration.needle
+    # The port may be another one now.
     name = needle_of(chosen, needle)
+    configuration = replace(configuration, needle=replace(chosen, name=name))
     if chosen.is_real:
         tracking = tracking_of_log(log, tracker, registration)
         device = task.device if task is not None else device_of(log)
@@ -336,7 +338,6 @@ def _configuration_of(log: RunLog) -> Configuration:
     metadata = log.metadata
     try:
         name = metadata["needle"]
-        kind = name.partition(":")[0] if ":" in name else name
         if "seed" not in metadata:
             return Configuration(settings=log.settings, needle=choose(name, Errors()))
         errors = Errors(
@@ -345,7 +346,7 @@ def _configuration_of(log: RunLog) -> Configuration:
             radius_mm=float(metadata["true_radius_mm"]),
             bevel_rad=float(metadata["true_bevel_rad"]),
         )
-        chosen = choose(kind, errors)
+        chosen = choose(name, errors)
         if "phantom" in metadata:
             parameters = value_from_json(json_of(metadata["phantom"]), PhantomParameters)
             chosen = replace(chosen, parameters=parameters)
