@@ -312,12 +312,14 @@ def _cut_off(cut: str, patient: Patient, driver: Driver, draw: random.Random) ->
     patient.device.emulator.after(at_s, struck)
     try:
         driver.run()
-    except BaseException:
-        # Whatever a dead process does is not done.
-        if not driver.is_dead:
+    except BaseException as error:
+        # Whatever a dead process does is not done; and a cable may be pulled before there is a log.
+        if not driver.is_dead and (driver.path.exists() or not isinstance(error, DeviceError)):
             raise
     is_over = True
-    data = driver.acknowledged if driver.is_dead else driver.path.read_bytes()
+    data = driver.acknowledged
+    if not driver.is_dead and driver.path.exists():
+        data = driver.path.read_bytes()
     if cut.startswith("power of"):
         data = _less(data, driver.diary.lengths, draw.uniform(0.0, _LOST_S))
     driver.path.write_bytes(data)
