@@ -131,7 +131,7 @@ class Stage:
             force_n=logged.force_n,
             heading=_vector_or_none(logged.heading),
             bevel=_vector_or_none(logged.bevel),
-            shape=logged.shape,
+            shape=logged.shape if isinstance(logged, Measured) else (),
         )
 
     # The operator.
