@@ -55,11 +55,13 @@ class Feed:
         self._records: list[Record] = []
         self._found: dict[int, _Found] = {}
         self._told = scene
+        self._is_ended = False
 
     def record(self, record: Record) -> None:
         """Takes an event."""
         with self._lock:
             self._records.append(record)
+            self._is_ended = self._is_ended or isinstance(record, Ended)
 
     def started(self, scene: Scene) -> None:
         """Takes the scene that the driver was told."""
@@ -91,7 +93,7 @@ class Feed:
         """What is new from the event with this number on, as plain data."""
         with self._lock:
             records, found = self._records[number:], dict(self._found)
-        is_ended = any(isinstance(record, Ended) for record in records)
+            is_ended = self._is_ended
         tubes = [
             tube_of(record, self._settings.accept)
             for record in records
