@@ -130,8 +130,16 @@ class TreeBuilder(Transformer[Any, tree.Statement]):
     sphere = tree.Sphere
     around = tree.Around
     region_name = _listed(tree.RegionName, 1)
-    image = _with_word(_listed(tree.Image, 2))
-    words = _with_word(_listed(tree.Clause, 1))
+
+    @_with_word
+    def image(self, span: Span, form: _Part, path: _Part, *clauses: _Part) -> tree.Image:
+        """``mesh "ribs.stl" in LPS``."""
+        return tree.Image(span, form, path, clauses)
+
+    @_with_word
+    def words(self, span: Span, keyword: _Part, *words: _Part) -> tree.Clause:
+        """``in LPS``."""
+        return tree.Clause(span, keyword, words)
 
     @_with_word
     def solid(self, span: Span, form: tree.SolidForm, *parts: _Part) -> tree.Solid:

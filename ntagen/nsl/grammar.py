@@ -16,8 +16,9 @@ import sys
 import zlib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, cast
+from typing import Final, Literal, cast
 
+import lark
 from lark import Lark, UnexpectedToken
 from lark import Token as LarkToken
 
@@ -72,13 +73,23 @@ def grammar() -> Lark:
     return Lark(
         text,
         parser="lalr",
-        lexer="basic",
+        lexer=_lexer(),
         start=["statement", "outside"],
         keep_all_tokens=True,
         maybe_placeholders=False,
         transformer=TreeBuilder(),
         cache=_tables(text) or False,
     )
+
+
+def _lexer() -> Literal["basic"]:
+    """The lexer that knows no context, by the name that it has in the version of lark at hand.
+
+    Before version 1 it was called ``standard``. The ROS 2 packages for pip bring lark 0.12, which
+    takes the place of the newer one in the same folder.
+    """
+    is_old = lark.__version__.startswith("0.")
+    return cast(Literal["basic"], "standard" if is_old else "basic")
 
 
 def _tables(text: str) -> str | None:
