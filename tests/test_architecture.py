@@ -120,6 +120,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
+    "ros": BASE | {"files", "needle", "plan", "drive", "openigtlink", "tracking", "lab"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"} | {"checker.picture"},
     "report": BASE | {"checker", "drive", "files", "plan", "plot", "render", "version"},
     "cluster": {"checker", "checker.queries", "errors", "version"},
@@ -150,7 +151,18 @@ MAY_IMPORT: dict[str, set[str]] = {
         "loading",
         "explanations",
     }
-    | {"extensions", "grbl", "drive", "lab", "plot", "testing", "traces", "tracking", "version"}
+    | {
+        "extensions",
+        "grbl",
+        "drive",
+        "lab",
+        "plot",
+        "ros",
+        "testing",
+        "traces",
+        "tracking",
+        "version",
+    }
     | {"checker.picture", "report", "system"}
     | {"editor", "serve", "verifyta", "watch"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
@@ -177,6 +189,7 @@ NEEDLE = {
     "traces",
     "lab",
     "watch",
+    "ros",
 }
 """The rooms that are about needles; the face of the engine serves any model."""
 
@@ -203,6 +216,15 @@ ONLY_IN: dict[str, set[str]] = {
     "foxglove": {"watch"},
     "foxglove_schemas_protobuf": {"drive", "watch"},
     "serial": {"grbl"},
+    # ROS 2.
+    "rclpy": {"ros"},
+    "builtin_interfaces": {"ros"},
+    "diagnostic_msgs": {"ros"},
+    "geometry_msgs": {"ros"},
+    "rosgraph_msgs": {"ros"},
+    "std_msgs": {"ros"},
+    "std_srvs": {"ros"},
+    "visualization_msgs": {"ros"},
     # Devices and clocks.
     "socket": {"drive", "openigtlink"},
     "selectors": {"openigtlink"},
@@ -215,7 +237,7 @@ ONLY_IN: dict[str, set[str]] = {
     "termios": set(),
     "resource": {"serve"},
     "threading": {"cluster", "drive", "grbl", "cli", "experiment", "lab", "openigtlink"}
-    | {"plugins", "serve", "testing", "watch"},
+    | {"plugins", "ros", "serve", "testing", "watch"},
     "time": {
         "cluster",
         "drive",
@@ -225,6 +247,7 @@ ONLY_IN: dict[str, set[str]] = {
         "lab",
         "openigtlink",
         "plot",
+        "ros",
         "serve",
         "testing",
         "watch",

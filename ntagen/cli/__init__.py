@@ -45,6 +45,7 @@ COMMANDS: Final = {
     "plot": ("plot", "Draw a scene, its plans, a run or a model."),
     "serve": ("serve", "Show models, tasks and runs on a page in the browser."),
     "drive": ("needle.drive", "Steer a needle to the target and log the run."),
+    "ros": ("needle.ros", "Steer a needle as a node of ROS 2."),
     "experiment": ("needle.experiment", "Drive many simulated runs, and make a table of them."),
     "sweep": ("needle.sweep", "Show how much of an error a task stands."),
     "policies": ("needle.policies", "Show what policies gain over plans, task by task."),

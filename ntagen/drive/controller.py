@@ -158,6 +158,18 @@ class Controller:
         self._note(Relied(self._now_s(), relied))
         return Workflow(self, self._needle, self._journal).run(begin)
 
+    def retract(self) -> None:
+        """Pulls the needle back to the entry after the run: in its channel, its rolls undone.
+
+        Raises:
+            DeviceError: The needle cannot be moved or seen.
+            KeyboardInterrupt: Somebody wants it to end.
+        """
+        try:
+            self._needle.pull_back_to(0.0)
+        finally:
+            self._needle.stop_at_once()
+
     def by_state(self) -> dict[State, Callable[[], Event]]:
         """The task of each state."""
         return {

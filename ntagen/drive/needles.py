@@ -30,6 +30,9 @@ LAB: Final = "lab"
 REAL: Final = "grbl"
 """A needle behind a GRBL controller: `grbl:PORT`, or `grbl` for the port in the task."""
 
+ROS: Final = "ros"
+"""A needle behind a stage that `ntagen ros` commands over topics."""
+
 _REAL_ROLL_RAD_PER_S: Final = 0.5 * math.pi
 """A real needle is rolled at half the speed of simulated ones; ours."""
 
@@ -185,7 +188,7 @@ def choose(name: str, errors: Errors) -> Chosen:
     kind, _, _ = name.partition(":")
     if name in (*NAMES, LAB) and name != "virtual":
         return Chosen(name, errors, errors.true_phantom(_usual_phantom()))
-    if name == "virtual" or kind == REAL or kind in names(DEVICES):
+    if name in ("virtual", ROS) or kind == REAL or kind in names(DEVICES):
         return Chosen(name, errors)
     raise InputError(
         f"there is no needle '{name}'\n"

@@ -79,23 +79,72 @@ def drive(
     Raises:
         InputError: Those runs are decided otherwise now.
     """
-    supervisor = Supervisor(sensor, listen)
-    actuator.watch = supervisor.watch
-    counter = SynthesisCounter()
-    device = Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor)
-    relay = Relay(device, Journals(journal, counter), listen, agree, ask)
-    controller = Controller(
-        told(scene, known),
-        relay,
+    return RealRun(
+        scene,
+        actuator,
+        sensor,
         synthesise,
         settings,
-        relay,
-        relay.listen,
-        supervisor,
-        relay.agree,
-        course,
-        policy,
-        relay.ask,
-    )
-    ended = go_on(controller, relay, legs)
-    return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)
+        journal,
+        known=known,
+        listen=listen,
+        agree=agree,
+        course=course,
+        policy=policy,
+        ask=ask,
+    ).drive(legs)
+
+
+class RealRun:
+    """A run with a real needle, which can be pulled back after it; the arguments are of `drive`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        actuator: WatchedActuator,
+        sensor: LiveSensor,
+        synthesise: Synthesiser,
+        settings: Settings,
+        journal: Journal,
+        *,
+        known: str = "all",
+        listen: Callable[[], None] = lambda: None,
+        agree: Callable[[str], None] = lambda _: None,
+        course: Course | None = None,
+        policy: Policy | None = None,
+        ask: Callable[[str], bool] = lambda _: False,
+    ) -> None:
+        supervisor = Supervisor(sensor, listen)
+        actuator.watch = supervisor.watch
+        self._counter = SynthesisCounter()
+        device = Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor)
+        self._relay = Relay(device, Journals(journal, self._counter), listen, agree, ask)
+        self._controller = Controller(
+            told(scene, known),
+            self._relay,
+            synthesise,
+            settings,
+            self._relay,
+            self._relay.listen,
+            supervisor,
+            self._relay.agree,
+            course,
+            policy,
+            self._relay.ask,
+        )
+
+    def drive(self, legs: Sequence[Leg] = ()) -> Driven:
+        """Drives until the run ends.
+
+        Args:
+            legs: The runs from which this one goes on (`ntagen.drive.past`).
+
+        Raises:
+            InputError: Those runs are decided otherwise now.
+        """
+        ended, counter = go_on(self._controller, self._relay, legs), self._counter
+        return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)
+
+    def retract(self) -> None:
+        """Pulls the needle back to the entry, after the run has ended; see `Controller.retract`."""
+        self._controller.retract()

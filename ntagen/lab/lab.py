@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Final, Self
+from typing import Final, Protocol, Self
 
 from ntagen.drive.plant import NeedlePlant, simulated_axes, simulated_controller
 from ntagen.grbl.axes import Axes
@@ -217,6 +217,13 @@ class TrackerFaults:
     stamp_shift_s: float = 0.0
 
 
+class Sends(Protocol):
+    """What sends messages to whoever listens."""
+
+    def send(self, *packets: Packet) -> None:
+        """Sends them, in this order."""
+
+
 class Publisher:
     """Publishes what is seen, in a thread of its own; use it as a context manager.
 
@@ -231,7 +238,7 @@ class Publisher:
     """
 
     def __init__(
-        self, server: Server, look: Callable[[], Frame], period_s: float, latency_s: float
+        self, server: Sends, look: Callable[[], Frame], period_s: float, latency_s: float
     ) -> None:
         self.faults = TrackerFaults()
         self._server = server

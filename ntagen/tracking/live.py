@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -65,6 +65,35 @@ class Source:
     policy: Policy = field(default_factory=Policy)
 
 
+class Receiver(Protocol):
+    """What has the newest samples of a tracker; see `ntagen.openigtlink.client.Client`."""
+
+    def now_s(self) -> float:
+        """The clock of all times of receipt."""
+
+    def pose(
+        self,
+        device: str | None = None,
+        *,
+        after_s: float | None = None,
+        any_age: bool = False,
+        waits: bool = True,
+    ) -> Sample[Pose]:
+        """The newest sample that says where a device is.
+
+        Raises:
+            DeviceError: There is none in time.
+        """
+
+    def sensor(
+        self, device: str | None = None, *, any_age: bool = False, waits: bool = True
+    ) -> Sample[Readings]:
+        """The newest reading of a sensor, as `pose`."""
+
+    def close(self) -> None:
+        """Ends what receives."""
+
+
 class LiveTracker:
     """A `ntagen.drive.device.Sensor` behind an OpenIGTLink server; use it as a context manager.
 
@@ -72,19 +101,26 @@ class LiveTracker:
         source: What to listen to.
         transform: From the tracker's frame to that of the scene.
         now_s: The clock for the times of measurements; that of the actuator.
+        receiver: What has the samples, if they do not come from such a server.
 
     Raises:
         InputError: The transform is not for this device.
         DeviceError: There is no connection.
     """
 
-    def __init__(self, source: Source, transform: Transform, now_s: Callable[[], float]) -> None:
+    def __init__(
+        self,
+        source: Source,
+        transform: Transform,
+        now_s: Callable[[], float],
+        receiver: Receiver | None = None,
+    ) -> None:
         require_frame(source, transform)
         self._source = source
         self._transform = transform
         self._now_s = now_s
         self._least_delay_s = math.inf
-        self.client = Client(source.host, source.port, source.policy)
+        self.client = receiver or Client(source.host, source.port, source.policy)
 
     def __enter__(self) -> LiveTracker:
         return self

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -34,7 +34,7 @@ from ntagen.cli.needle.resume import (
     resumed_of,
     tell_past,
 )
-from ntagen.cli.needle.same_devices import hardware_facts
+from ntagen.cli.needle.runs import Run, exit_code, log_of, moved_by
 from ntagen.cli.needle.steering import (
     known_option,
     say_idle_errors,
@@ -43,7 +43,6 @@ from ntagen.cli.needle.steering import (
     show_settings,
 )
 from ntagen.cli.needle.tracker import (
-    Tracking,
     opened,
     registration_option,
     tracker_option,
@@ -54,21 +53,17 @@ from ntagen.cli.signals import TERMINATED
 from ntagen.cli.terminal import echo, given_options, say, say_idle
 from ntagen.drive.states import State
 from ntagen.errors import InputError, ModelError, NtagenError
-from ntagen.files import require_apart
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from ntagen.drive.configure import Configuration
     from ntagen.drive.device import LiveSensor, WatchedActuator
-    from ntagen.drive.following import Course
     from ntagen.drive.outcome import Driven
     from ntagen.drive.records import Journal
     from ntagen.nsl import Task
     from ntagen.parameters import Given
-    from ntagen.plan.policy import Policy
     from ntagen.plan.synthesise import Synthesiser
-    from ntagen.scene import Scene
 
 _EPILOG: Final = """\
 Exit codes: 0 target reached, 1 no strategy, 2 the input is wrong, 3 time-out or another limit,
@@ -249,7 +244,7 @@ def command(
         report(result, scene, log_path, short=quiet)
     if operator.was_terminated and result.ended.outcome == State.INTERRUPTED.value:
         return TERMINATED
-    return _exit_code(result.ended.outcome)
+    return exit_code(result.ended.outcome)
 
 
 def _planned(
@@ -259,11 +254,16 @@ def _planned(
     known: str,
     given: tuple[Given, ...],
     wanted: Wanted,
-) -> _Run:
+) -> Run:
     """A run that begins at the entry, before anything measures it."""
     from ntagen.drive.configure import configure
-    from ntagen.drive.needles import LAB
+    from ntagen.drive.needles import LAB, ROS
 
+    if needle == ROS:
+        raise InputError(
+            "a needle behind topics of ROS 2 is driven by a node\n"
+            "hint: `ntagen ros ENV.nsl --needle ros` is that node"
+        )
     if needle == LAB:
         raise InputError(
             "a needle in a lab is driven by its port and its tracker\n"
@@ -272,10 +272,10 @@ def _planned(
     configuration = configure((*task.given, *given), task.scene, known, needle)
     _say_idle(configuration, given, picks=picks_at_random(wanted, task.scene))
     say_idle_options(task.scene, configuration)
-    return _Run(environment, task, configuration, known, needle, wanted=wanted)
+    return Run(environment, task, configuration, known, needle, wanted=wanted)
 
 
-def _led(run: _Run, policy_path: Path | None, operator: SignalledOperator) -> _Run:
+def _led(run: Run, policy_path: Path | None, operator: SignalledOperator) -> Run:
     """The run with the strategy or the policy that leads it."""
     from ntagen.drive.knowledge import told
 
@@ -289,10 +289,10 @@ def _led(run: _Run, policy_path: Path | None, operator: SignalledOperator) -> _R
     return replace(run, course=course, policy=policy)
 
 
-def _resumed_run(resumed: Resumed) -> _Run:
+def _resumed_run(resumed: Resumed) -> Run:
     """A run that goes on from a log."""
     log = resumed.log
-    return _Run(
+    return Run(
         log.path,
         resumed.task,
         resumed.configuration,
@@ -329,27 +329,6 @@ def _say_idle(configuration: Configuration, given: Sequence[Given], *, picks: bo
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
-    """What is driven: the file, its task, the settings, what is known, what moves and measures."""
-
-    environment: Path
-    task: Task
-    configuration: Configuration
-    known: str
-    needle: str
-    tracking: Tracking = field(default_factory=Tracking)
-    wanted: Wanted = field(default_factory=Wanted)
-    course: Course | None = None
-    policy: Policy | None = None
-    resumed: Resumed | None = None
-
-    @property
-    def scene(self) -> Scene:
-        """The true scene."""
-        return self.task.scene
-
-
-@dataclass(frozen=True, slots=True)
 class _Terminal:
     """How the operator sees the run: told by the terminal, asked there, in the browser."""
 
@@ -360,26 +339,15 @@ class _Terminal:
 
 
 @contextlib.contextmanager
-def _real_needle(run: _Run) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
+def _real_needle(run: Run) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
     """What moves a real needle, and what measures it."""
-    from ntagen.drive.needles import REAL
-    from ntagen.drive.steppers import axes_for, described, opened_plugin, opened_steppers
-    from ntagen.grbl.port import SerialPort
     from ntagen.tracking.opening import opened_live
 
     settings, scene, tracking = run.configuration.settings, run.scene, run.tracking
     if tracking.tracker is None:
         raise AssertionError("a real needle has a tracker (`tracking_of`)")
-    name, _, argument = run.needle.partition(":")
-    if name == REAL:
-        device = described(run.task, run.environment)
-        axes = axes_for(device, scene.needle, settings)
-        port = SerialPort(argument or device.port)
-        opening = opened_steppers(port, axes, scene.needle, settings)
-    else:
-        opening = opened_plugin(name, argument, scene.needle, settings)
     with (
-        opening as actuator,
+        moved_by(run) as actuator,
         opened_live(
             tracking.text,
             tracking.tracker,
@@ -394,7 +362,7 @@ def _real_needle(run: _Run) -> Iterator[tuple[WatchedActuator, LiveSensor]]:
 
 
 def _drive(
-    run: _Run,
+    run: Run,
     log_path: Path | None,
     terminal: _Terminal,
     operator: SignalledOperator,
@@ -420,7 +388,7 @@ def _drive(
                 sense=stack.enter_context(sensing),
             )
         # A tracker or a port that cannot be reached must not cost an earlier log.
-        log = stack.enter_context(_log(log_path, run))
+        log = stack.enter_context(log_of(log_path, run))
         synthesise, journal, agree = stack.enter_context(_around(run, log, terminal, operator))
         return steer(
             synthesise,
@@ -438,7 +406,7 @@ def _drive(
 
 @contextlib.contextmanager
 def _around(
-    run: _Run, log: list[Journal], terminal: _Terminal, operator: SignalledOperator
+    run: Run, log: list[Journal], terminal: _Terminal, operator: SignalledOperator
 ) -> Iterator[tuple[Synthesiser, Journal, Callable[[str], None]]]:
     """What a run needs besides the needle: what finds plans, what records, and who agrees."""
     from ntagen.drive.records import Journals
@@ -463,9 +431,7 @@ def _around(
 
 
 @contextlib.contextmanager
-def _watched(
-    run: _Run, operator: SignalledOperator, terminal: _Terminal
-) -> Iterator[list[Journal]]:
+def _watched(run: Run, operator: SignalledOperator, terminal: _Terminal) -> Iterator[list[Journal]]:
     """The journals of a run that is watched in the browser or in Foxglove."""
     if not terminal.is_watched and terminal.foxglove_port is None:
         yield []
@@ -491,56 +457,3 @@ def _watched(
         if not run.configuration.needle.is_real:
             journals.insert(0, Pace(lambda: operator.wants_end))
         yield journals
-
-
-@contextlib.contextmanager
-def _log(path: Path | None, run: _Run) -> Iterator[list[Journal]]:
-    """The journal that writes the log, if one is wanted."""
-    if path is None:
-        yield []
-        return
-    from ntagen.drive.knowledge import told
-    from ntagen.drive.log import POLICY, TREE, Log
-    from ntagen.drive.log_facts import facts_of
-
-    # Mistakes on the command line must be found before an earlier log is replaced.
-    told(run.scene, run.known)
-    require_apart({"--log": path}, {"environment": run.environment})
-    # Of a run that goes on, the log before it has the source.
-    source = run.environment if run.resumed is None else Path()
-    metadata, attachments = facts_of(
-        source, run.scene, run.configuration, run.known, run.tracking.text
-    )
-    metadata |= hardware_facts(run.task, run.tracking.transform)
-    if run.course is not None:
-        from ntagen.drive.trees import COURSE, course_to_log
-
-        metadata[COURSE], tree = course_to_log(run.course)
-        attachments |= {} if tree is None else {TREE: tree}
-    if run.policy is not None:
-        attachments[POLICY] = run.policy.text().encode()
-    if run.resumed is not None:
-        of_before, log_before = run.resumed.facts()
-        metadata, attachments = metadata | of_before, attachments | log_before
-    with Log(path, metadata, attachments) as log:
-        try:
-            yield [log]
-        except InputError:
-            if run.resumed is not None and log.is_empty:
-                # The run could not go on, and its log was not there before.
-                path.unlink(missing_ok=True)
-            raise
-
-
-def _exit_code(outcome: str) -> int:
-    return {
-        State.TARGET_REACHED: 0,
-        State.NO_STRATEGY: 1,
-        State.NONE_HOLDS: 4,
-        State.NO_TIME_LEFT: 6,
-        State.NOT_GUARANTEED: 4,
-        State.TIMED_OUT: 3,
-        State.FAULTED: 5,
-        State.PULLED_OUT: 7,
-        State.INTERRUPTED: 130,
-    }[State(outcome)]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shlex
 import signal
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,31 +16,39 @@ import click
 
 from ntagen.cli.former_options import Renamed
 from ntagen.cli.loading import load_task
+from ntagen.cli.needle.ros import RosArguments, ros_arguments, topics_option
 from ntagen.cli.needle.steering import say_idle_errors, settings_options
 from ntagen.cli.options import include_option, path_argument
 from ntagen.cli.signals import handled
-from ntagen.cli.terminal import echo
+from ntagen.cli.terminal import echo, say_idle
 from ntagen.drive.steppers import axes_for, described
 from ntagen.lab.lab import RATE_HZ
 from ntagen.lab.speeds import FASTEST, SLOWEST
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import FrameType
 
     from ntagen.drive.configure import Configuration
     from ntagen.grbl.axes import Axes
     from ntagen.hardware import GrblDevice
     from ntagen.lab.lab import Lab, Truth
+    from ntagen.lab.needles import Placed
     from ntagen.nsl import Task
     from ntagen.parameters import Given
+    from ntagen.ros.lab import RosLab
 
 _LOOK_S: Final = 0.1
 """How often it is asked whether the lab should end."""
 
 
+class _Simulate(RosArguments, Renamed):
+    """The command, whose last arguments may be for ROS."""
+
+
 @click.command(
     "simulate",
-    cls=Renamed,
+    cls=_Simulate,
     former={
         "--help-settings": "`ntagen drive --help-settings` prints them",
         "--rate": f"a lab publishes {RATE_HZ:g} samples a second",
@@ -71,6 +80,14 @@ _LOOK_S: Final = 0.1
     type=click.FloatRange(min=0.1),
     help="Close the lab when nothing has moved for so long, after something has moved.",
 )
+@click.option(
+    "--ros",
+    "as_nodes",
+    is_flag=True,
+    help="Make the lab of nodes of ROS 2, for ntagen ros: /lab_stage and /lab_tracker. With "
+    "another speed than 1 they also publish /clock.",
+)
+@topics_option
 @click.option("--json", "as_json", is_flag=True, help="Print two JSON objects, nothing else.")
 @include_option()
 @settings_options("seed", listed=False)
@@ -79,6 +96,8 @@ def command(
     needle: str,
     speed: float,
     until_idle_s: float | None,
+    as_nodes: bool,
+    topics_path: Path | None,
     as_json: bool,
     include: tuple[Path, ...],
     given: tuple[Given, ...],
@@ -102,6 +121,7 @@ def command(
       ntagen device simulate examples/stepper.nsl
       ntagen device simulate examples/stepper.nsl --seed 3 --speed 5 --until-idle 20
       ntagen device simulate examples/stepper.nsl --needle virtual --set 'roll error 2 deg'
+      ntagen device simulate examples/stepper.nsl --ros
     """  # noqa: D301  click wants the control character
     from ntagen.drive.configure import configure
     from ntagen.lab.lab import Lab
@@ -112,20 +132,23 @@ def command(
     say_idle_errors(fitted.needle, given)
     margin_mm = fitted.settings.sensing_margin_mm
     placed = place(needle, task.scene, fitted.seed, margin_mm, fitted.errors)
-    axes = _axes(described(task, environment), task, given)
     closing = _Closing(until_idle_s)
-    with (
-        handled({signal.SIGINT: closing.close, signal.SIGTERM: closing.close}),
-        Lab(task.scene, placed, axes=axes, speed=speed) as lab,
-    ):
-        words = ["ntagen", "drive", str(environment), *_of_lab(lab)]
-        for path in include:
-            words += ["--include", str(path)]
-        words += _fitting(fitted, task)
-        _open(lab, shlex.join(words), as_json=as_json)
-        while not closing.is_due(lab.idle_s()):
-            time.sleep(_LOOK_S)
-        truth = lab.truth()
+    with handled({signal.SIGINT: closing.close, signal.SIGTERM: closing.close}):
+        if as_nodes:
+            opening = _of_nodes(task, fitted, placed, topics_path, speed)
+        else:
+            say_idle({"topics_path": "--topics"}, "without --ros")
+            axes = _axes(described(task, environment), task, given)
+            opening = _of_lab(Lab(task.scene, placed, axes=axes, speed=speed))
+        with opening as opened:
+            words = ["ntagen", opened.command, str(environment), *opened.address]
+            for path in include:
+                words += ["--include", str(path)]
+            words += [*_fitting(fitted, task), *opened.ros]
+            _open(opened.facts, shlex.join(words), as_json=as_json)
+            while not closing.is_due(opened.lab.idle_s()):
+                time.sleep(_LOOK_S)
+            truth = opened.lab.truth()
     _close(truth, as_json=as_json)
     return 0
 
@@ -161,10 +184,66 @@ def _axes(device: GrblDevice, task: Task, given: tuple[Given, ...]) -> Axes:
     )
 
 
-def _of_lab(lab: Lab) -> list[str]:
-    """The options of `ntagen drive` for the devices of the lab."""
-    needle = ["--needle", f"grbl:{lab.port}"]
-    return [*needle, "--tracker", lab.tracker_address, "--registration", "none"]
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """A lab, and how a driver reaches it.
+
+    Attributes:
+        lab: The lab, with a port and a server, or of nodes.
+        command: The command of the driver.
+        address: Its options for the devices of the lab.
+        facts: What a program may want to know besides.
+        ros: The arguments of ROS; they stand at the end.
+    """
+
+    lab: Lab | RosLab
+    command: str
+    address: list[str]
+    facts: dict[str, str] = field(default_factory=dict)
+    ros: tuple[str, ...] = ()
+
+
+@contextlib.contextmanager
+def _of_lab(lab: Lab) -> Iterator[_Opened]:
+    """A lab with a port and a server."""
+    with lab:
+        needle = f"grbl:{lab.port}"
+        address = ["--needle", needle, "--tracker", lab.tracker_address, "--registration", "none"]
+        facts = {"device": needle, "port": lab.port, "tracker": lab.tracker_address}
+        yield _Opened(lab, "drive", address, facts | {"registration": "none"})
+
+
+@contextlib.contextmanager
+def _of_nodes(
+    task: Task, fitted: Configuration, placed: Placed, topics_path: Path | None, speed: float
+) -> Iterator[_Opened]:
+    """A lab of nodes."""
+    from ntagen.drive.configure import configure
+    from ntagen.drive.needles import ROS
+    from ntagen.drive.steppers import speeds_for
+    from ntagen.ros.loading import require_ros
+    from ntagen.ros.topics import read_topics
+
+    topics = read_topics(topics_path)
+    require_ros()
+    from ntagen.ros.lab import opened_lab
+
+    settings = configure(task.given, task.scene, needle=ROS).settings
+    speeds = speeds_for(task.scene.needle, settings)
+    address = ["--needle", ROS]
+    if topics_path is not None:
+        address += ["--topics", str(topics_path)]
+    ros = ["--ros-args", "-p", "bevel:=+x"]
+    if placed.latency_s:
+        ros += ["-p", f"latency_s:={placed.latency_s:g}"]
+    if speed != 1.0:
+        ros += ["-p", "use_sim_time:=true"]
+    lab_arguments = ros_arguments()
+    with opened_lab(
+        task.scene, placed, speeds, topics, speed=speed, arguments=lab_arguments
+    ) as lab:
+        # Other names in the lab are other names for its driver.
+        yield _Opened(lab, "ros", address, ros=(*ros, *lab_arguments[1:]))
 
 
 def _fitting(fitted: Configuration, task: Task) -> list[str]:
@@ -186,11 +265,10 @@ def _fitting(fitted: Configuration, task: Task) -> list[str]:
     return ["--set", "  ".join(settings)] if settings else []
 
 
-def _open(lab: Lab, driving: str, *, as_json: bool) -> None:
+def _open(facts: dict[str, str], driving: str, *, as_json: bool) -> None:
     """Says how the lab is reached."""
     if as_json:
-        facts = {"device": f"grbl:{lab.port}", "port": lab.port, "tracker": lab.tracker_address}
-        echo(json.dumps(facts | {"registration": "none", "command": driving}))
+        echo(json.dumps(facts | {"command": driving}))
         return
     echo(f"the lab is open; in another terminal, run\n\n  {driving}\n\nCtrl-C closes it")
 

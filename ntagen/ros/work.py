@@ -1,0 +1,293 @@
+"""What a node does when it is asked: it arms, steers and pulls back (`ntagen.ros.session.Work`)."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from typing import Final, Protocol
+
+from ntagen.drive.device import LiveSensor, WatchedActuator
+from ntagen.drive.fitting import overrun_mm
+from ntagen.drive.outcome import Driven
+from ntagen.drive.real import RealRun, require_overrun
+from ntagen.drive.records import Ended, Journal, Journals
+from ntagen.drive.settings import Settings
+from ntagen.drive.steppers import speeds_for
+from ntagen.errors import DeviceError, InputError, ModelError, NtagenError
+from ntagen.needle.vectors import distance, subtract
+from ntagen.plan.synthesise import Synthesiser
+from ntagen.ros.bridge import Bridge
+from ntagen.ros.clock import Clock
+from ntagen.ros.frames import NeedleFrame
+from ntagen.ros.hearing import Hearing
+from ntagen.ros.link import TopicLink
+from ntagen.ros.observer import Observer
+from ntagen.ros.stage import StageActuator
+from ntagen.ros.topics import ENTRY, TARGET, Topics
+from ntagen.ros.tracker import tracker_of, unit_error
+from ntagen.scene import Scene, Vector
+from ntagen.shapes import UPRIGHT
+from ntagen.tracking.frames import IDENTITY, Transform
+from ntagen.tracking.live import ANY_FRAME
+from ntagen.tracking.plausible import FARTHEST_MM
+
+_SAME_MM: Final = 1e-3
+_CLOCK_S: Final = 3.0
+
+
+class Task(Protocol):
+    """What is steered, and what `ntagen ros` alone knows of it."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
+    def settings(self) -> Settings:
+        """How to drive."""
+
+    @property
+    def known(self) -> str:
+        """The critical regions that the driver knows."""
+
+    @property
+    def is_behind_topics(self) -> bool:
+        """Whether the needle is moved by a stage that is commanded over topics."""
+
+    def moved_by(self) -> AbstractContextManager[WatchedActuator]:
+        """Opens what moves the needle, if that is no stage behind topics."""
+
+    def with_scene(self, scene: Scene) -> Task:
+        """The same with another scene.
+
+        Raises:
+            InputError: It cannot be steered in.
+        """
+
+    def synthesiser(self, listen: Callable[[], None]) -> Synthesiser:
+        """What finds plans."""
+
+    def journals(self) -> AbstractContextManager[list[Journal]]:
+        """What else records the run, until the end of the block."""
+
+
+class NodeWork:
+    """The work of a node.
+
+    Args:
+        bridge: The node.
+        topics: Names, frames and units.
+        task: What is steered.
+        transform: The registration.
+    """
+
+    def __init__(
+        self, bridge: Bridge, topics: Topics, task: Task, transform: Transform = IDENTITY
+    ) -> None:
+        self.bridge = bridge
+        self._topics = topics
+        self._task = self._armed = task
+        self._transform = transform
+        entry = task.scene.needle.tip
+        needle = NeedleFrame(entry)
+        self.clock = Clock(bridge.time_s if bridge.is_simulated else None, self.fail)
+        self._hearing = Hearing(
+            bridge,
+            topics,
+            needle,
+            self.clock,
+            self._tip_frames(),
+            hears_force=task.settings.force_sensing,
+        )
+        is_ours = task.is_behind_topics
+        self._link = TopicLink(bridge, topics, needle, self.clock) if is_ours else None
+        accept = task.settings.accept
+        self.observer = Observer(bridge, topics, needle, accept, commands=not is_ours)
+        self.driven: Driven | None = None
+        self._stack = contextlib.ExitStack()
+        self._run: RealRun | None = None
+        self._devices: tuple[WatchedActuator, LiveSensor] | None = None
+        self._listen: Callable[[], None] = lambda: None
+
+    def __enter__(self) -> NodeWork:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def fail(self, trouble: str) -> None:
+        """Notes that something is wrong for good: what moves is stopped."""
+        self._hearing.inbox.fail(trouble)
+
+    def _tip_frames(self) -> tuple[str, ...]:
+        """The frames in which the tip may come; empty for any."""
+        if self._transform == IDENTITY:
+            return (self._topics.stage_frame,)
+        return () if self._transform.source == ANY_FRAME else (self._transform.source,)
+
+    def arm(self) -> str:
+        """See `ntagen.ros.session.Work.arm`."""
+        self._stack.close()
+        self._devices = None
+        self.clock.begin()
+        self._hearing.inbox.forget()
+        self._wait_for_clock()
+        self._hearing.require_one_each()
+        self._armed = self._with_subject()
+        try:
+            actuator = self._stack.enter_context(self._actuator())
+            sensor = self._sensor(actuator)
+            found = sensor.measure()
+        except BaseException:
+            self._stack.close()
+            raise
+        self._devices = (actuator, sensor)
+        self._hearing.use(TARGET, self._armed.scene.targets[-1].center_mm)
+        place = ", ".join(f"{number:.1f}" for number in found.position_mm)
+        return f"the tip is seen at ({place}) mm; call the service start"
+
+    def drive(self, listen: Callable[[], None]) -> Ended:
+        """See `ntagen.ros.session.Work.drive`."""
+        if self._devices is None:
+            raise AssertionError("the needle is armed first")
+        self._listen = listen
+        task = self._armed
+        with task.journals() as journals:
+            self._run = RealRun(
+                task.scene,
+                *self._devices,
+                task.synthesiser(self._hear),
+                task.settings,
+                Journals(*journals, self.observer),
+                known=task.known,
+                listen=self._hear,
+            )
+            try:
+                self.driven = self._run.drive()
+            except ModelError as error:
+                raise NtagenError(
+                    f"the planner failed, and the needle is stopped: {error}"
+                ) from error
+            return self.driven.ended
+
+    def retract(self, listen: Callable[[], None]) -> None:
+        """See `ntagen.ros.session.Work.retract`."""
+        if self._run is None:
+            raise AssertionError("a needle that was not steered is not pulled back")
+        self._listen = listen
+        # What ended the run may be over; whether it is, the next samples show.
+        self._hearing.inbox.forget()
+        self._hearing.require_one_each()
+        if self._devices is not None:
+            self._devices[1].measure()
+        self._run.retract()
+
+    def _hear(self) -> None:
+        self._listen()
+
+    def _wait_for_clock(self) -> None:
+        """Waits for the first time of a simulated clock.
+
+        Raises:
+            DeviceError: Nobody says it.
+        """
+        if not self.clock.is_simulated:
+            return
+        end_s = time.monotonic() + _CLOCK_S
+        while self.bridge.time_s() == 0.0:
+            if time.monotonic() > end_s:
+                raise DeviceError(
+                    "use_sim_time is set, and nobody publishes /clock\n"
+                    "hint: start the simulation or the bag (`ros2 bag play --clock`), or leave "
+                    "use_sim_time out"
+                )
+            time.sleep(0.02)
+
+    @contextlib.contextmanager
+    def _actuator(self) -> Iterator[WatchedActuator]:
+        settings, needle = self._armed.settings, self._armed.scene.needle
+        if self._link is None:
+            with self._armed.moved_by() as actuator:
+                yield actuator
+            return
+        ramp = self._topics.stage_ramp_mm_per_s2
+        require_overrun(settings, overrun_mm(needle.speed_mm_per_s, ramp))
+        speeds = speeds_for(needle, settings)
+        self._link.begin()
+        stage = StageActuator(self._link, speeds, self._topics.stage_tolerance_mm, ramp)
+        try:
+            yield stage
+        finally:
+            with contextlib.suppress(DeviceError):
+                stage.stop()
+
+    def _sensor(self, actuator: WatchedActuator) -> LiveSensor:
+        settings = self._armed.settings
+        moved = (lambda: actuator.moved_mm) if isinstance(actuator, StageActuator) else lambda: 0.0
+        return tracker_of(
+            self._hearing.inbox,
+            self._topics,
+            self._transform,
+            self._armed.scene.needle.tip,
+            actuator.now_s,
+            moved,
+            watches_force=settings.force_sensing,
+            force_varies=settings.force_noise_n > 0.0,
+        )
+
+    def _with_subject(self) -> Task:
+        """The task with the target that was told last, if one was.
+
+        Raises:
+            DeviceError: The entry or the target cannot be meant.
+            InputError: There is no way to such a target.
+        """
+        scene = self._task.scene
+        entry_mm, target_mm = (self._hearing.told_mm(one) for one in (ENTRY, TARGET))
+        if entry_mm is not None:
+            self._require_entry(entry_mm, scene.needle.tip.position_mm)
+        if target_mm is None:
+            return self._task
+        last = scene.targets[-1]
+        self._require_unit(TARGET, target_mm, last.center_mm)
+        if distance(target_mm, last.center_mm) <= _SAME_MM:
+            return self._task
+        return self._task.with_scene(_with_target(scene, target_mm, self._topics.name(TARGET)))
+
+    def _require_entry(self, told_mm: Vector, entry_mm: Vector) -> None:
+        self._require_unit(ENTRY, told_mm, entry_mm)
+        away_mm = distance(told_mm, entry_mm)
+        if away_mm > FARTHEST_MM:
+            raise DeviceError(
+                f"{self._topics.name(ENTRY)} is {away_mm:.1f} mm from the entry of the task; "
+                f"{FARTHEST_MM:g} mm is allowed\n"
+                "hint: write the tip of the task where the needle is, or remap the topic"
+            )
+
+    def _require_unit(self, usual: str, told_mm: Vector, wanted_mm: Vector) -> None:
+        topics = self._topics
+        trouble = unit_error(told_mm, wanted_mm, 0.0, topics.name(usual), topics.units)
+        if trouble:
+            raise DeviceError(
+                trouble.replace("the tip is", "it is").replace("sensor_units", "units")
+            )
+
+
+def _with_target(scene: Scene, target_mm: Vector, topic: str) -> Scene:
+    """A scene whose last target is elsewhere.
+
+    Raises:
+        InputError: The new place lies in a region that must not be entered.
+    """
+    last = scene.targets[-1]
+    moved = replace(last, shape=last.shape.placed(UPRIGHT, subtract(target_mm, last.center_mm)))
+    for region in scene.avoided:
+        if region.distance_mm(target_mm) <= 0.0:
+            raise InputError(
+                f"{topic} is in the {region.kind} region '{region.name}'\n"
+                "hint: choose another target, or move the regions of the task"
+            )
+    return scene.with_targets([*scene.targets[:-1], moved])
