@@ -221,6 +221,7 @@ ONLY_IN: dict[str, set[str]] = {
     "builtin_interfaces": {"ros"},
     "diagnostic_msgs": {"ros"},
     "geometry_msgs": {"ros"},
+    "rcl_interfaces": {"ros"},
     "rosgraph_msgs": {"ros"},
     "std_msgs": {"ros"},
     "std_srvs": {"ros"},

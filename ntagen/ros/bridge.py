@@ -9,9 +9,8 @@ from typing import Any, Final
 
 import rclpy
 from builtin_interfaces.msg import Time
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.exceptions import InvalidParameterTypeException
-from rclpy.executors import MultiThreadedExecutor
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import Trigger
@@ -21,9 +20,7 @@ from ntagen.ros.inbox import Publisher
 from ntagen.ros.topics import Topics, parameters, topics_of
 
 _S_PER_NS: Final = 1e-9
-_THREADS: Final = 3
-"""One for what is heard, and two for services: one that waits must not keep back a stop."""
-
+_TURN_S: Final = 0.1
 _JOIN_S: Final = 2.0
 
 Answer = tuple[bool, str]
@@ -51,8 +48,6 @@ class Bridge:
         self.node = node
         self._fail = fail
         self._publishers: dict[str, Any] = {}
-        self._hearing = MutuallyExclusiveCallbackGroup()
-        self._answering = ReentrantCallbackGroup()
 
     def with_parameters(self, topics: Topics) -> Topics:
         """The settings with those that are given as parameters of the node.
@@ -60,17 +55,12 @@ class Bridge:
         Raises:
             InputError: One is wrong.
         """
-        values = {}
-        for name in parameters():
-            usual = getattr(topics, name)
-            try:
-                found = self.node.declare_parameter(name, usual).value
-            except InvalidParameterTypeException as error:
-                raise InputError(
-                    f"the parameter {name}: {error}\nhint: write a number with its point, as in "
-                    f"-p {name}:=0.5"
-                ) from error
-            values[name] = found
+        # ROS would refuse a whole number where a default has a point.
+        anything = ParameterDescriptor(dynamic_typing=True)
+        values = {
+            name: self.node.declare_parameter(name, getattr(topics, name), anything).value
+            for name in parameters()
+        }
         return topics_of(values | {"names": topics.names}, "the parameters of the node")
 
     def publish(self, topic: str, message: Any, qos: QoSProfile | None = None) -> None:  # noqa: ANN401
@@ -87,9 +77,7 @@ class Bridge:
 
     def hear(self, topic: str, kind: type, take: Callable[[Any], None], qos: QoSProfile) -> None:
         """Takes the messages of a topic."""
-        self.node.create_subscription(
-            kind, topic, self._guarded(take), qos, callback_group=self._hearing
-        )
+        self.node.create_subscription(kind, topic, self._guarded(take), qos)
 
     def answer(self, name: str, do: Callable[[], Answer]) -> None:
         """Answers a service without a question (``std_srvs/Trigger``)."""
@@ -98,15 +86,13 @@ class Bridge:
             response.success, response.message = do()
             return response
 
-        self.node.create_service(Trigger, name, reply, callback_group=self._answering)
+        self.node.create_service(Trigger, name, reply)
 
     def every(self, seconds: float, do: Callable[[], None]) -> None:
         """Does something again and again, by the clock of the machine."""
         clock = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)
         guarded = self._guarded(lambda _: do())
-        self.node.create_timer(
-            seconds, lambda: guarded(None), callback_group=self._hearing, clock=clock
-        )
+        self.node.create_timer(seconds, lambda: guarded(None), clock=clock)
 
     def stamp(self) -> Time:
         """The time of the node, for messages."""
@@ -154,7 +140,7 @@ class Bridge:
 
 @contextlib.contextmanager
 def opened_nodes(names: Sequence[str], arguments: Sequence[str]) -> Iterator[list[Any]]:
-    """Nodes of rclpy, whose threads run until the end of the block.
+    """Nodes of rclpy, each with a thread that runs until the end of the block.
 
     Args:
         names: The names of the nodes.
@@ -181,13 +167,27 @@ def opened_nodes(names: Sequence[str], arguments: Sequence[str]) -> Iterator[lis
         for name in names:
             nodes.append(rclpy.create_node(name, context=context))
             stack.callback(nodes[-1].destroy_node)
-        executor = MultiThreadedExecutor(num_threads=_THREADS, context=context)
-        for node in nodes:
-            executor.add_node(node)
-        thread = threading.Thread(target=executor.spin, name="ros", daemon=True)
-        thread.start()
+        closing = threading.Event()
+
+        threads = [
+            threading.Thread(target=_spin, args=(node, context, closing), name="ros", daemon=True)
+            for node in nodes
+        ]
+        for thread in threads:
+            thread.start()
         try:
             yield nodes
         finally:
-            executor.shutdown(timeout_sec=_JOIN_S)
-            thread.join(_JOIN_S)
+            # Nothing that is still worked on may find its node gone.
+            closing.set()
+            for thread in threads:
+                thread.join(_JOIN_S)
+
+
+def _spin(node: Any, context: Any, closing: threading.Event) -> None:  # noqa: ANN401  no types
+    """Does the work of a node until it is to be closed."""
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    while not closing.is_set():
+        executor.spin_once(timeout_sec=_TURN_S)
+    executor.shutdown(timeout_sec=_JOIN_S)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 _BACK_S: Final = 1e-6
-_STILL_S: Final = 3.0
+_STILL_S: Final = 2.0
 """A clock that has not gone on for so long, on the machine's clock, stands still."""
 
 _AHEAD_S: Final = 1.0
@@ -58,9 +58,10 @@ class Clock:
             now_s, machine_s = self._simulated_s(), time.monotonic()
             last_s, self._last_s = self._last_s, now_s
             passed_s = machine_s - self._changed_s
-            if last_s is None or now_s != last_s:
+            # A time of 0 says that nobody has told it yet.
+            if not last_s or now_s != last_s:
                 self._changed_s = machine_s
-            if last_s is not None:
+            if last_s:
                 trouble = _trouble(now_s - last_s, passed_s)
                 # Whoever measures a time by differences must not see the jump.
                 self._shown_s += 0.0 if trouble else now_s - last_s

@@ -20,6 +20,9 @@ from ntagen.openigtlink.messages import Sensor
 from ntagen.openigtlink.samples import Kind, Pose, Sample
 from ntagen.values import dataclass
 
+DISCOVERY_S: Final = 5.0
+"""Nodes find each other within this time, also on a busy machine."""
+
 _STEP_S: Final = 0.02
 """A wait looks at the clock so often: a simulated clock does not wake anybody."""
 
@@ -100,6 +103,21 @@ class Inbox:
             self._pose = self._reading = None
             self._repeats = 0
             self._trouble = ""
+
+    def wait_for_first(self, *, with_force: bool) -> None:
+        """Waits until something has come from each topic, or for `DISCOVERY_S`.
+
+        Args:
+            with_force: Whether a force is waited for, too.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: (
+                    bool(self._trouble)
+                    or (self._pose is not None and not (with_force and self._reading is None))
+                ),
+                DISCOVERY_S,
+            )
 
     def take_pose(self, content: Pose, stamp_s: float | None) -> None:
         """Takes a pose of the tip, in mm and in the frame of the stage or the tracker."""

@@ -14,7 +14,7 @@ from ntagen.openigtlink.messages import turned
 from ntagen.ros.bridge import Bridge, quality
 from ntagen.ros.clock import Clock
 from ntagen.ros.frames import NeedleFrame
-from ntagen.ros.inbox import Wanted, two_publishers, why_silent
+from ntagen.ros.inbox import DISCOVERY_S, Wanted, two_publishers, why_silent
 from ntagen.ros.messages import header, place_of, pose, rotation_of, stamped_point, stamped_pose
 from ntagen.ros.stage import Place
 from ntagen.ros.topics import COMMAND, STAGE_COMMAND, STAGE_STATE, Topics
@@ -56,6 +56,7 @@ class TopicLink:
         """
         with self._lock:
             self._trouble = ""
+        self._wait_for_first()
         state, command = (self._topics.name(one) for one in (STAGE_STATE, STAGE_COMMAND))
         trouble = two_publishers(self._bridge.resolved(state), self._bridge.publishers(state))
         if trouble:
@@ -67,7 +68,6 @@ class TopicLink:
                 f"the stage has two masters: {names} publish {self._bridge.resolved(command)}\n"
                 "hint: end all but this node"
             )
-        self._wait_for_first()
         hearers = (command, self._topics.name(COMMAND))
         if not any(self._bridge.hearers(one) for one in hearers):
             raise DeviceError(
@@ -102,8 +102,8 @@ class TopicLink:
         return newest[0]
 
     def _wait_for_first(self) -> None:
-        """Waits for the stage's first word, as long as it may be silent."""
-        end_s = time.monotonic() + max(1.0, 2.0 * self._topics.stale_s)
+        """Waits for the stage's first word: nodes need some time to find each other."""
+        end_s = time.monotonic() + DISCOVERY_S
         while self._newest is None and not self._trouble and time.monotonic() < end_s:
             time.sleep(_STEP_S)
         self.where()

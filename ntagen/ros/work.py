@@ -132,9 +132,10 @@ class NodeWork:
         """See `ntagen.ros.session.Work.arm`."""
         self._stack.close()
         self._devices = None
+        self._wait_for_clock()
         self.clock.begin()
         self._hearing.inbox.forget()
-        self._wait_for_clock()
+        self._hearing.inbox.wait_for_first(with_force=self._task.settings.force_sensing)
         self._hearing.require_one_each()
         self._armed = self._with_subject()
         try:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from ntagen.nsl import Task
     from ntagen.parameters import Given
     from ntagen.plan.synthesise import Synthesiser
+    from ntagen.ros.bridge import Bridge
     from ntagen.ros.topics import Topics
     from ntagen.ros.work import NodeWork
     from ntagen.scene import Scene
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 _ROS_ARGUMENTS: Final = "--ros-args"
 _SIMULATED: Final = ("phantom", "virtual")
 _NODE: Final = "ntagen"
+_SERVICES: Final = "ntagen_services"
+"""The node of the services: while one of them waits, the other node hears."""
 
 _EPILOG: Final = """\
 Exit codes: those of `ntagen drive` for how the run ended; 0 if the node was ended and nothing was
@@ -147,12 +150,14 @@ def command(
 
     topics = read_topics(topics_path)
     steered = replace(steered, speaks=not as_json)
-    with signalled_operator() as operator, _opened(steered, topics, transform, arguments) as work:
+    opening = _opened(steered, topics, transform, arguments)
+    with signalled_operator() as operator, opening as (work, services):
         from ntagen.ros.session import Session
 
         session = Session(work, work.observer.tell)
-        if not at_once:
-            _offer(work, session, as_json=as_json)
+        _offer(services, session)
+        if not (at_once or as_json):
+            _say_services()
         session.run(operator.listen, at_once=at_once)
     if work.driven is None:
         return TERMINATED if operator.was_terminated else 0
@@ -272,8 +277,8 @@ def _configuration(task: Task, needle: str, known: str, given: tuple[Given, ...]
 @contextlib.contextmanager
 def _opened(
     steered: Steered, topics: Topics, transform: Transform, arguments: list[str]
-) -> Iterator[NodeWork]:
-    """The node, until the end of the block."""
+) -> Iterator[tuple[NodeWork, Bridge]]:
+    """The node that steers and the one of its services, until the end of the block."""
     from ntagen.ros.bridge import Bridge, opened_nodes
     from ntagen.ros.work import NodeWork
 
@@ -284,13 +289,13 @@ def _opened(
             one.fail(trouble)
 
     with contextlib.ExitStack() as stack:
-        (node,) = stack.enter_context(opened_nodes([_NODE], arguments))
-        bridge = Bridge(node, fail)
+        nodes = stack.enter_context(opened_nodes([_NODE, _SERVICES], arguments))
+        bridge, services = (Bridge(node, fail) for node in nodes)
         topics = bridge.with_parameters(topics)
         if steered.run.needle in _SIMULATED:
             topics = stack.enter_context(_simulation(steered, topics))
         works.append(stack.enter_context(NodeWork(bridge, topics, steered, transform)))
-        yield works[0]
+        yield works[0], services
 
 
 @contextlib.contextmanager
@@ -310,8 +315,8 @@ def _simulation(steered: Steered, topics: Topics) -> Iterator[Topics]:
         yield topics
 
 
-def _offer(work: NodeWork, session: Any, *, as_json: bool) -> None:  # noqa: ANN401  imported late
-    """Offers the services, and says so."""
+def _offer(bridge: Bridge, session: Any) -> None:  # noqa: ANN401  imported late
+    """Offers the services."""
     services = {
         "arm": session.arm,
         "start": session.start,
@@ -319,9 +324,11 @@ def _offer(work: NodeWork, session: Any, *, as_json: bool) -> None:  # noqa: ANN
         "pull_back": session.pull_back,
     }
     for name, do in services.items():
-        work.bridge.answer(f"~/{name}", do)
-    if not as_json:
-        echo(
-            f"the node /{_NODE} waits; call /{_NODE}/arm, then /{_NODE}/start, for example\n\n"
-            f"  ros2 service call /{_NODE}/arm std_srvs/srv/Trigger\n\nCtrl-C ends it"
-        )
+        bridge.answer(f"/{_NODE}/{name}", do)
+
+
+def _say_services() -> None:
+    echo(
+        f"the node /{_NODE} waits; call /{_NODE}/arm, then /{_NODE}/start, for example\n\n"
+        f"  ros2 service call /{_NODE}/arm std_srvs/srv/Trigger\n\nCtrl-C ends it"
+    )
