@@ -48,6 +48,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "render": BASE | {"cache"},
     "files": {"errors", "system"},
     "frames": {"errors"},
+    "bags": {"errors"},
     "checker.edges": set(),
     "checker.errors": {"errors", "_checker"},
     "checker.picture": {"errors", "files"},
@@ -102,6 +103,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "extensions": {"errors"},
     "drive": BASE
     | {
+        "bags",
         "extensions",
         "files",
         "frames",
@@ -116,7 +118,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"version"},
     "openigtlink": {"errors"},
     "tracking": BASE | {"extensions", "files", "needle", "drive", "openigtlink"},
-    "traces": BASE | {"files", "needle", "nsl", "plan", "tracking"},
+    "traces": BASE | {"bags", "files", "needle", "nsl", "plan", "tracking"},
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
@@ -216,6 +218,7 @@ ONLY_IN: dict[str, set[str]] = {
     "foxglove": {"watch"},
     "foxglove_schemas_protobuf": {"drive", "watch"},
     "serial": {"grbl"},
+    "rosbags": {"bags"},
     # ROS 2.
     "rclpy": {"ros"},
     "builtin_interfaces": {"ros"},

@@ -28,9 +28,10 @@ _ROS_ENCODINGS: Final = frozenset({"cdr", "ros1"})
 _TOPICS_SHOWN: Final = 5
 
 _GIVE: Final = "hint: give a file that `ntagen drive --log` wrote"
-_TABLE: Final = (
-    "hint: write the positions that you need to a table: `ntagen match` and --tracker csv:FILE "
-    "read those"
+_BAG: Final = (
+    "hint: a bag has a run if `ntagen ros --log` was recorded with the topic /ntagen/log, and if "
+    "the package rosbags is there (pip install 'ntagen[bags]'); `ntagen match` reads the positions "
+    "of any bag"
 )
 _FILTERED: Final = (
     "hint: tools that filter, merge or repair logs leave out metadata and attachments unless they "
@@ -69,11 +70,11 @@ def no_log(
     if not start.startswith(MAGIC):
         is_other = (words for begin, words in _OTHER_FILES.items() if start.startswith(begin))
         words = next(is_other, "no MCAP file")
-        hint = _TABLE if "ROS" in words else _GIVE
+        hint = _BAG if "ROS" in words else _GIVE
         return InputError(f"{what}: it is {words if start else 'empty'}\n{hint}")
     if found.profile.startswith("ros") or _ROS_ENCODINGS & set(found.topics.values()):
         topics = f" with the topics {_shown(found.topics)}" if found.topics else ""
-        return InputError(f"{what}: it is a bag of ROS{topics}\n{_TABLE}")
+        return InputError(f"{what}: it is a bag of ROS{topics}\n{_BAG}")
     if records:
         return InputError(
             f"{what}: it has {records} records of a run, but the metadata `ntagen` with the "
@@ -90,6 +91,11 @@ def no_log(
         )
     topics = f"it has the topics {_shown(found.topics)}" if found.topics else "it has no topics"
     return InputError(f"{what}: {topics}, and none of a run\n{_GIVE}")
+
+
+def no_log_in_bag(path: Path) -> InputError:
+    """The error about a folder that is a bag without the log of a run."""
+    return InputError(f"{path}: not the log of a run: it is a bag of ROS\n{_BAG}")
 
 
 def nothing_attached(

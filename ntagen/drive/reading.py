@@ -25,6 +25,7 @@ from mcap.records import Attachment, Channel, Chunk, Footer, Header, McapRecord,
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 
+from ntagen.bags import is_bag, log_in
 from ntagen.drive.following import Course
 from ntagen.drive.log import (
     ACTUAL,
@@ -37,7 +38,7 @@ from ntagen.drive.log import (
     TREE,
 )
 from ntagen.drive.messages import PACKAGE, decode
-from ntagen.drive.no_log import HEAD, Contents, no_log, nothing_attached
+from ntagen.drive.no_log import HEAD, Contents, no_log, no_log_in_bag, nothing_attached
 from ntagen.drive.records import Record
 from ntagen.drive.scene_json import samples_in, scene_from_json
 from ntagen.drive.settings import Settings
@@ -251,17 +252,13 @@ def _flat(fields: dict[str, Any]) -> dict[str, Any]:
 
 
 def read_log(path: str | Path) -> RunLog:
-    """Reads the readable part of a log.
+    """Reads the readable part of a log, also one in a bag of ROS (`ntagen.bags`).
 
     Raises:
         InputError: The file cannot be read, is not MCAP, or is not the log of a run.
     """
     path = Path(path)
-    try:
-        file = open_file(path, MAX_LOG_BYTES)
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
-    with file:
+    with _opened(path) as file:
         return _log_in(file, path)
 
 
@@ -296,6 +293,23 @@ def _log_in(file: IO[bytes], path: Path) -> RunLog:
         )
     records = tuple(record for _, record in sorted(collected.records, key=lambda item: item[0]))
     return RunLog(records, metadata, collected.attachments, torn_at_byte, path, file_bytes, sha256)
+
+
+def _opened(path: Path) -> IO[bytes]:
+    """The log in a file, or in a bag.
+
+    Raises:
+        InputError: It cannot be read.
+    """
+    data = log_in(path) if is_bag(path) else None
+    if data is not None:
+        return io.BytesIO(data)
+    if path.is_dir() and is_bag(path):
+        raise no_log_in_bag(path)
+    try:
+        return open_file(path, MAX_LOG_BYTES)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from error
 
 
 def _digest_of(file: IO[bytes], file_bytes: int) -> str:

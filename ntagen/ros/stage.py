@@ -101,7 +101,6 @@ class StageActuator:
 
     Attributes:
         watch: See `WatchedActuator`.
-        moved_mm: How far the needle is inserted, as it was told; for checks of the tip.
 
     Raises:
         DeviceError: The stage is silent, or moves.
@@ -122,8 +121,12 @@ class StageActuator:
 
     @property
     def moved_mm(self) -> float:
-        """How far the needle is inserted since this was opened."""
-        return self._at.depth_mm - self._origin.depth_mm
+        """How far the needle is inserted now, since this was opened.
+
+        Raises:
+            DeviceError: The stage is silent.
+        """
+        return self._link.where().depth_mm - self._origin.depth_mm
 
     def now_s(self) -> float:
         """The clock of motions."""

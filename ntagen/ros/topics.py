@@ -20,6 +20,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
+from ntagen.bags import LOG as LOG
 from ntagen.errors import InputError
 from ntagen.files import read_file
 from ntagen.tracking.mount import AXES
@@ -40,7 +41,6 @@ PREDICTED: Final = "/needle/state/predicted_shape"
 MARKERS: Final = "/visualization_marker_array"
 DIAGNOSTICS: Final = "/diagnostics"
 STATUS: Final = "/ntagen/status"
-LOG: Final = "/ntagen/log"
 
 NAMES: Final = (
     *(TIP, SHAPE, FORCE, TARGET, ENTRY, STAGE_STATE, STAGE_COMMAND, COMMAND),

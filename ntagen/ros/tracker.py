@@ -9,7 +9,7 @@ from typing import Final
 from ntagen.drive.device import LiveSensor
 from ntagen.errors import DeviceError
 from ntagen.needle.measurement import Measurement
-from ntagen.needle.vectors import distance, scale
+from ntagen.needle.vectors import distance, norm, scale
 from ntagen.openigtlink.samples import Policy
 from ntagen.ros.inbox import Inbox
 from ntagen.ros.topics import FORCE, Topics
@@ -20,7 +20,7 @@ from ntagen.tracking.mount import Mount
 from ntagen.tracking.plausible import FARTHEST_MM, LivePlausible
 
 _THOUSAND: Final = 1000.0
-_FAR_MM: Final = 5000.0
+_FAR_MM: Final = 1000.0
 """No needle of a lab is so far from its entry."""
 
 _INSERTED_MM: Final = 2.0
@@ -28,6 +28,9 @@ _INSERTED_MM: Final = 2.0
 
 _NEAR_RATIO: Final = 0.02
 """A tip that has gone by less than this part of the depth is not where it should be."""
+
+_LEAST_RATIO: Final = 0.3
+"""A needle that bends still goes this part of the depth away from its entry."""
 
 
 def unit_error(
@@ -50,16 +53,21 @@ def unit_error(
         f"\nhint: if {topic} is in {other}, add --ros-args -p sensor_units:={other}; REP 103 asks "
         "for metres"
     )
-    if inserted_mm >= _INSERTED_MM and away_mm < _NEAR_RATIO * inserted_mm:
+    is_in = inserted_mm >= _INSERTED_MM
+    if is_in and _NEAR_RATIO * inserted_mm > away_mm >= _LEAST_RATIO * inserted_mm / _THOUSAND:
         return (
             f"the needle is inserted by {inserted_mm:.1f} mm, and {topic} has moved by "
             f"{away_mm:.3f} mm: this is a unit error{hint}"
         )
-    if away_mm <= FARTHEST_MM + 2.0 * inserted_mm:
+    reach_mm = FARTHEST_MM + 2.0 * inserted_mm
+    if away_mm <= reach_mm:
         return ""
     factor = 1.0 / _THOUSAND if unit == "m" else _THOUSAND
     in_other_mm = distance(scale(factor, found_mm), entry_mm)
-    if away_mm >= _FAR_MM or in_other_mm <= FARTHEST_MM + 2.0 * inserted_mm:
+    # Near the origin, whatever is divided by a thousand is near it, too: that says nothing.
+    least_mm = _LEAST_RATIO * inserted_mm if is_in else 0.0
+    is_telling = is_in or norm(entry_mm) > 2.0 * FARTHEST_MM
+    if away_mm >= _FAR_MM or (is_telling and least_mm <= in_other_mm <= reach_mm):
         far = f"{away_mm:.1f} mm" if away_mm < _THOUSAND else f"{away_mm / _THOUSAND:.1f} m"
         return f"{topic} says that the tip is {far} from the entry: this is a unit error{hint}"
     return ""

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from pathlib import Path
 from typing import Final, Protocol
 
 from ntagen.drive.device import LiveSensor, WatchedActuator
@@ -24,9 +25,10 @@ from ntagen.ros.clock import Clock
 from ntagen.ros.frames import NeedleFrame
 from ntagen.ros.hearing import Hearing
 from ntagen.ros.link import TopicLink
+from ntagen.ros.log_topic import LogTopic
 from ntagen.ros.observer import Observer
 from ntagen.ros.stage import StageActuator
-from ntagen.ros.topics import ENTRY, TARGET, Topics
+from ntagen.ros.topics import ENTRY, LOG, TARGET, Topics
 from ntagen.ros.tracker import tracker_of, unit_error
 from ntagen.scene import Scene, Vector
 from ntagen.shapes import UPRIGHT
@@ -70,8 +72,12 @@ class Task(Protocol):
     def synthesiser(self, listen: Callable[[], None]) -> Synthesiser:
         """What finds plans."""
 
+    @property
+    def log_path(self) -> Path | None:
+        """The log of the run, if there is one."""
+
     def journals(self) -> AbstractContextManager[list[Journal]]:
-        """What else records the run, until the end of the block."""
+        """What else records the run, until the end of the block; the log is the first of them."""
 
 
 class NodeWork:
@@ -156,13 +162,13 @@ class NodeWork:
             raise AssertionError("the needle is armed first")
         self._listen = listen
         task = self._armed
-        with task.journals() as journals:
+        with self._log_topic() as topic, task.journals() as journals:
             self._run = RealRun(
                 task.scene,
                 *self._devices,
                 task.synthesiser(self._hear),
                 task.settings,
-                Journals(*journals, self.observer),
+                Journals(*journals, *topic, self.observer),
                 known=task.known,
                 listen=self._hear,
             )
@@ -173,6 +179,17 @@ class NodeWork:
                     f"the planner failed, and the needle is stopped: {error}"
                 ) from error
             return self.driven.ended
+
+    @contextlib.contextmanager
+    def _log_topic(self) -> Iterator[list[LogTopic]]:
+        """What publishes the log, if there is one; its rest at the end of the block."""
+        path = self._armed.log_path
+        if path is None:
+            yield []
+            return
+        topic = LogTopic(self.bridge, self._topics.name(LOG), path)
+        yield [topic]
+        topic.finish()
 
     def retract(self, listen: Callable[[], None]) -> None:
         """See `ntagen.ros.session.Work.retract`."""

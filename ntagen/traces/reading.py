@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 
+from ntagen.bags import is_bag, positions_in
 from ntagen.errors import InputError
 from ntagen.files import open_file
 from ntagen.traces.trace import Samples
@@ -57,20 +58,23 @@ class Columns:
 
     Attributes:
         wanted: Three names or numbers (from 1) with commas, or what the names of three columns
-            begin with; None for those that are found by their names.
-        unit: The unit of positions whose column does not name one.
+            begin with, or the topic of a bag; None for those that are found by their names.
+        unit: The unit of positions whose column does not name one; None for mm, and for metres in
+            a bag of ROS.
     """
 
     wanted: str | None = None
-    unit: str = "mm"
+    unit: str | None = None
 
 
 def read_samples(path: Path, columns: Columns | None = None) -> Samples:
-    """The positions in a file: a table, or the log of a run (MCAP).
+    """The positions in a file: a table, the log of a run (MCAP), or a bag of ROS.
 
     Raises:
         InputError: The file cannot be read or has a mistake.
     """
+    if is_bag(path):
+        return _samples_of_bag(path, columns or Columns())
     if _is_log(path):
         return _samples_of_run(path)
     return _samples_of_table(read_table(path, comments="#%"), columns or Columns())
@@ -91,6 +95,17 @@ def _samples_of_run(path: Path) -> Samples:
     found = samples_of_log(path)
     points = np.array([sample.position_mm for sample in found]).reshape(-1, 3)
     return Samples(str(path), points, tuple(range(1, len(found) + 1)), word="measurement")
+
+
+def _samples_of_bag(path: Path, columns: Columns) -> Samples:
+    """The positions on a topic of a bag, in metres unless another unit is given (REP 103)."""
+    found = positions_in(path, columns.wanted)
+    order = sorted(range(len(found.points)), key=found.times_s.__getitem__)
+    points = np.array([found.points[index] for index in order]).reshape(-1, 3)
+    factor = MM_PER[columns.unit or "m"]
+    numbers = tuple(index + 1 for index in order)
+    name = f"{path}, {found.topic}"
+    return Samples(name, factor * points, numbers, found.missing, word="message")
 
 
 def _samples_of_table(table: Table, columns: Columns) -> Samples:
@@ -201,7 +216,7 @@ def _state_beside(names: list[str], index: int) -> int | None:
 def _numbered(table: Table, columns: Columns) -> Axes:
     """The columns of a table without names."""
     path, width = table.path, len(table.rows[0].cells)
-    factor = MM_PER[columns.unit]
+    factor = MM_PER[columns.unit or "mm"]
     if columns.wanted is None:
         if width != 3:
             raise InputError(
@@ -294,7 +309,7 @@ def _with_units(table: Table, names: list[str], indices: list[int], columns: Col
     axes = []
     for index in indices:
         told, match = table.units[index], _AXIS.fullmatch(names[index])
-        unit = ((match and match["unit"]) or told or columns.unit).lower()
+        unit = ((match and match["unit"]) or told or columns.unit or "mm").lower()
         unit = "um" if unit in ("µm", "μm") else unit
         if unit not in MM_PER:
             raise InputError(

@@ -301,7 +301,7 @@ def _require_insertion(trace: Trace) -> None:
     raise InputError(
         f"{samples.name}: the tip moves by {extent_mm:.3g} mm in {len(samples.points_mm)} samples, "
         f"and at least {SHORTEST_MM:g} mm of insertion are needed\n"
-        "hint: give a trace of a whole insertion; --unit says another unit than mm"
+        "hint: give a trace of a whole insertion; --unit says another unit"
     )
 
 

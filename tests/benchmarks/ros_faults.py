@@ -42,7 +42,7 @@ def one(number: int, needle: str, seed: int) -> list[str]:
             "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
         },
     )
-    lines = done.stdout.strip().splitlines()
+    lines = done.stdout.splitlines()
     if done.returncode or not lines:
         return ["?", "0", f"the run failed: {done.stderr.strip()[-300:]}", ""]
     return lines[-1].split("\t")

@@ -313,7 +313,7 @@ FAULTS = (
         shows_at_once=False,
     ),
     Fault("tip is NaN", _set("is_nan", True), words=("not a number",)),
-    Fault("tip jumps", _jump, words=("jumped", "off its way", "explains", "deviat")),
+    Fault("tip jumps", _jump, words=("jumped", "off its way", "moved as commanded", "deviat")),
     Fault(
         "tip mirrored",
         _set("signs", (-1.0, 1.0, 1.0)),
@@ -331,7 +331,11 @@ FAULTS = (
     Fault("tip in m for mm", _set_lab("factor", 0.001), words=("unit error", "jumped")),
     Fault("two publishers", _second_publisher, words=("publishers",)),
     Fault("force stands still", _set("force_n", 0.4), frozenset({0, 1, 3, 4, 5, 6})),
-    Fault("stage deaf", _set_lab("is_deaf", True), words=("does not follow", "stands at")),
+    Fault(
+        "stage deaf",
+        _set_lab("is_deaf", True),
+        words=("does not follow", "does not arrive", "stands at"),
+    ),
     Fault("stage silent", _set_lab("is_silent", True), words=("silent",)),
     Fault("target moved", _move_target, words=("was moved",)),
     Fault("stop called", _call_stop, frozenset({130}), words=("stop was called",)),

@@ -93,14 +93,13 @@ def _start(value: object) -> tuple[Any, float]:
     "--columns",
     metavar="NAME|X,Y,Z",
     help="The columns of the tip's position: what their names begin with (AuroraTip), or three "
-    "names or numbers.  [default: x_mm, y_mm, z_mm and the like; without names, three columns]",
+    "names or numbers; of a bag, the topic.  [default: x_mm, y_mm, z_mm and the like; without "
+    "names, three columns; of a bag, /sensor/tip]",
 )
 @click.option(
     "--unit",
     type=click.Choice(["mm", "cm", "m", "um"]),
-    default="mm",
-    show_default=True,
-    help="The unit of positions whose columns do not name one.",
+    help="The unit of positions whose columns do not name one.  [default: mm; in a bag, m]",
 )
 @output_option(
     "FILE.png|pdf|svg",
@@ -118,7 +117,7 @@ def command(
     until_mm: float | None,
     predict: bool,
     columns: str | None,
-    unit: str,
+    unit: str | None,
     output: Path | None,
     as_json: bool,
     include: tuple[Path, ...],
@@ -128,13 +127,15 @@ def command(
     Finds the pushes, the rolls and the start of the environment's needle whose path is nearest to
     each trace, and prints the least, mean and greatest distance of the trace from it, in mm. Where
     the regions lie does not matter. A trace is a table (CSV, columns with blanks or semicolons, or
-    a table of an NDI tracker) or the log of a run (MCAP); a jump backwards of more than 5 mm ends
-    it. See docs/matching.md.
+    a table of an NDI tracker), the log of a run (MCAP), or a bag of ROS 2 (MCAP or SQLite, a
+    folder or a file; pip install 'ntagen[bags]'); a jump backwards of more than 5 mm ends it. See
+    docs/matching.md.
 
     \b
     Examples:
       ntagen match examples/traces/bench.nsl examples/traces/two_rolls.csv -o match.png
       ntagen match bench.nsl trial*.csv --radius fit --predict --columns AuroraTip
+      ntagen match bench.nsl rosbag2_2026_11_26/ --columns /sensor/tip --unit mm
     """  # noqa: D301  click wants the control character
     from ntagen.traces.matching import Options
     from ntagen.traces.reading import Columns

@@ -339,7 +339,7 @@ def test_a_bag_of_ros_is_told_with_its_topics(tmp_path: Path) -> None:
     for start, says in ((b"SQLite format 3\0", "bags of ROS 2"), (b"#ROSBAG V2.0\n", "ROS 1")):
         path.write_bytes(start + bytes(100))
         check_is_no_log(path, says, "`ntagen match`")
-        with pytest.raises(InputError, match=says):
+        with pytest.raises(InputError, match="bag of ROS"):
             read_samples(path.rename(tmp_path / "bag.db3"))
 
 
