@@ -122,7 +122,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "plugins": {"errors", "drive", "needle", "tracking"},
     "testing": {"errors", "drive", "needle", "plugins"},
     "lab": BASE | {"needle", "grbl", "plan", "drive", "openigtlink", "tracking"},
-    "ros": BASE | {"files", "needle", "plan", "drive", "openigtlink", "tracking", "lab"},
+    "ros": BASE | {"bags", "drive", "files", "lab", "needle", "openigtlink", "plan", "tracking"},
     "plot": BASE | {"files", "needle", "nsl", "plan", "drive", "traces"} | {"checker.picture"},
     "report": BASE | {"checker", "drive", "files", "plan", "plot", "render", "version"},
     "cluster": {"checker", "checker.queries", "errors", "version"},

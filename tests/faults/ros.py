@@ -7,11 +7,11 @@ DDS on this machine only, in a domain of their own. This module needs ROS 2 (``n
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
 from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -66,7 +67,8 @@ STEP_MM = SPEED_MM_PER_S * 0.6 + 0.5
 _PATIENCE_S = 150.0
 _SETTLE_S = 0.5
 _STILL_MM = 1e-6
-_DOMAINS = itertools.count(os.getpid() % 80)
+_DOMAINS = 100
+_FIRST_PORT = 47_000
 
 Strike = Callable[["Bench", random.Random], None]
 
@@ -74,20 +76,26 @@ Strike = Callable[["Bench", random.Random], None]
 @contextlib.contextmanager
 def own_domain() -> Iterator[dict[str, str]]:
     """A domain of DDS that nobody else uses, until the end of the block; the environment for it."""
-    own = {
-        "ROS_DOMAIN_ID": str(1 + next(_DOMAINS) % 100),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    }
-    before = {name: os.environ.get(name) for name in own}
-    os.environ.update(own)
-    try:
+    with _reserved() as domain, pytest.MonkeyPatch.context() as patch:
+        own = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        for name, value in own.items():
+            patch.setenv(name, value)
         yield own
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+
+
+@contextlib.contextmanager
+def _reserved() -> Iterator[int]:
+    """The number of a domain, which no other process of these tests uses meanwhile."""
+    numbers = random.SystemRandom().sample(range(1, _DOMAINS), _DOMAINS - 1)
+    for number in numbers:
+        with socket.socket() as one:
+            try:
+                one.bind(("127.0.0.1", _FIRST_PORT + number))
+            except OSError:
+                continue
+            yield number
+            return
+    raise RuntimeError("all domains are in use")
 
 
 @dataclass(frozen=True)
