@@ -29,6 +29,7 @@ NOT_HERE = {
     ),
     "what another page made": r"demo/\{",
     "runs until Ctrl-C": r"device simulate",
+    "ROS 2": r"\bntagen ros\b|rosbag2_",
     "takes minutes": r"--runs 200|real\.toml",
 }
 """Why a command cannot be run by a test, with a pattern of such commands."""
