@@ -21,7 +21,7 @@ from ntagen.ros.topics import Topics, parameters, topics_of
 
 _S_PER_NS: Final = 1e-9
 _TURN_S: Final = 0.1
-_JOIN_S: Final = 2.0
+_JOIN_S: Final = 10.0
 
 Answer = tuple[bool, str]
 """Whether a service has done what was asked, and its message."""
@@ -115,7 +115,7 @@ class Bridge:
         """Who publishes a topic."""
         return tuple(
             Publisher(
-                f"{one.node_namespace.rstrip('/')}/{one.node_name}",
+                _named(one.node_namespace, one.node_name),
                 one.topic_type,
                 one.qos_profile.reliability != ReliabilityPolicy.BEST_EFFORT,
             )
@@ -136,6 +136,11 @@ class Bridge:
                 self._fail(f"internal error: {type(error).__name__}: {error}")
 
         return call
+
+
+def _named(namespace: str, name: str) -> str:
+    """The name of a node; one that was found just now has none yet."""
+    return "a new node" if "UNKNOWN" in name else f"{namespace.rstrip('/')}/{name}"
 
 
 @contextlib.contextmanager

@@ -140,15 +140,14 @@ def command(
       ntagen ros task.nsl --needle grbl:/dev/ttyACM0 --topics lab.toml
     """  # noqa: D301  click wants the control character
     from ntagen.ros.loading import require_ros
+    from ntagen.ros.topics import read_topics
 
     arguments = ros_arguments()
     task = load_task(environment, include)
     steered = _steered(environment, task, needle, known, given, log_path)
     transform = _transform(registration)
-    require_ros()
-    from ntagen.ros.topics import read_topics
-
     topics = read_topics(topics_path)
+    require_ros()
     steered = replace(steered, speaks=not as_json)
     opening = _opened(steered, topics, transform, arguments)
     with signalled_operator() as operator, opening as (work, services):
