@@ -66,6 +66,9 @@ class Work(Protocol):
     def drive(self, listen: Callable[[], None]) -> Ended:
         """Steers the needle."""
 
+    def halt(self) -> None:
+        """Lets nothing move on, at once and from any thread; who listens ends the work."""
+
     def retract(self, listen: Callable[[], None]) -> None:
         """Pulls the needle back to the entry.
 
@@ -116,6 +119,8 @@ class Session:
             if self._phase is Phase.ARMED:
                 # What stood ready must be made ready again by somebody who wants it.
                 self._phase = Phase.IDLE
+        if moves:
+            self._work.halt()
         return True, "stopping" if moves else "nothing moves"
 
     def run(self, listen: Callable[[], None], *, at_once: bool = False) -> None:

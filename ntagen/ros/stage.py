@@ -164,11 +164,19 @@ class StageActuator:
         Raises:
             DeviceError: It is silent, or does not stand.
         """
+        self.hold()
+        self._at = self._stand()
+
+    def hold(self) -> None:
+        """Tells the stage to stay where it is, from any thread, and does not wait.
+
+        Raises:
+            DeviceError: It is silent.
+        """
         with self._lock:
             # From here on, nobody tells it anything that belongs to a motion.
             self._stops += 1
             self._link.tell(self._link.where())
-        self._at = self._stand()
 
     def _stand(self) -> Place:
         """Waits until the stage stands; where it does."""
@@ -215,9 +223,13 @@ class StageActuator:
             passed_s = self.now_s() - began_s
             asked = start.at(goal, min(1.0, passed_s / seconds))
             with self._lock:
-                if self._stops != stops:
-                    raise DeviceError("the motion was stopped")
-                self._link.tell(asked)
+                is_stopped = self._stops != stops
+                if not is_stopped:
+                    self._link.tell(asked)
+            if is_stopped:
+                # Who stopped it may have said why.
+                self.watch()
+                raise DeviceError("the motion was stopped")
             here = self._link.where()
             is_over = passed_s >= seconds
             if is_over and here.is_near(goal, self._tolerance_mm, _TOLERANCE_RAD):

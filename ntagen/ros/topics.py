@@ -49,6 +49,7 @@ NAMES: Final = (
 """The topics by the names that labs of needle steering use."""
 
 _MOST_BYTES: Final = 2**20
+_HINT: Final = "\nhint: docs/ros.md says what each parameter may be"
 _FREE: Final = frozenset({"names"})
 
 
@@ -151,10 +152,10 @@ def topics_of(values: dict[str, Any], place: str) -> Topics:
     try:
         found = msgspec.convert(values, Topics)
     except msgspec.ValidationError as error:
-        raise InputError(f"{place}: {error}") from error
+        raise InputError(f"{place}: {error}{_HINT}") from error
     problem = _problem(found)
     if problem:
-        raise InputError(f"{place}: {problem}")
+        raise InputError(f"{place}: {problem}" + ("" if "hint:" in problem else _HINT))
     return found
 
 

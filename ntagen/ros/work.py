@@ -191,6 +191,14 @@ class NodeWork:
         yield [topic]
         topic.finish()
 
+    def halt(self) -> None:
+        """See `ntagen.ros.session.Work.halt`; other devices look every 10 ms whether to stop."""
+        actuator = None if self._devices is None else self._devices[0]
+        if isinstance(actuator, StageActuator):
+            # A stage that is silent was told nothing more.
+            with contextlib.suppress(DeviceError):
+                actuator.hold()
+
     def retract(self, listen: Callable[[], None]) -> None:
         """See `ntagen.ros.session.Work.retract`."""
         if self._run is None:

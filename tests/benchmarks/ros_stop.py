@@ -2,8 +2,9 @@
 
     python tests/benchmarks/ros_stop.py --stops 20
 
-The time is from the call to the first word to the stage that leads no deeper, by the clock of one
-process that does both: it has the way of the service and that of the topic. ROS 2 must be there.
+The time is from the call to the last word to the stage that leads deeper, by the clock of one
+process that does both: it has the way of the service and that of the topic. It is 0 where nothing
+moved at the moment. ROS 2 must be there.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _SMALL_M = 1e-6
 
 
 def one(seed: int, folder: Path) -> tuple[float, float]:
-    """A stop in the middle of a run: ms until the last word, and mm that the stage went on."""
+    """A stop in the middle of a run: ms until the last word deeper, and mm that the stage went."""
     told: list[tuple[float, float]] = []
     with Bench("virtual", seed, folder) as bench:
         bench.peer.hear(
@@ -46,10 +47,12 @@ def one(seed: int, folder: Path) -> tuple[float, float]:
         asked_s, there_mm = time.monotonic(), bench.depth_mm()
         bench.stop()
         bench.finish()
-        after = [(at_s, depth) for at_s, depth in told if at_s >= asked_s]
-        deepest = max([depth for at_s, depth in told if at_s < asked_s] + [d for _, d in after])
-        held = next((at for at, depth in after if depth < deepest - _SMALL_M), asked_s)
-        return 1e3 * (held - asked_s), bench.depth_mm() - there_mm
+        last_s = asked_s
+        deepest = max(depth for at_s, depth in told if at_s < asked_s)
+        for at_s, depth in told:
+            if at_s >= asked_s and depth > deepest + _SMALL_M:
+                last_s, deepest = at_s, depth
+        return 1e3 * (last_s - asked_s), bench.depth_mm() - there_mm
 
 
 def main() -> None:

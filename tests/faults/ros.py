@@ -142,6 +142,7 @@ class Bench:
         folder: Where files may be written.
         arguments: Arguments of ROS for the driver.
         has_clock: Whether the driver takes its time from ``/clock``.
+        task: Another task than `TASK`.
     """
 
     def __init__(
@@ -152,9 +153,11 @@ class Bench:
         arguments: tuple[str, ...] = (),
         *,
         has_clock: bool = False,
+        task: Path | None = None,
     ) -> None:
-        self.path = folder / "fast.nsl"
-        self.path.write_text(TASK)
+        self.path = task or folder / "fast.nsl"
+        if task is None:
+            self.path.write_text(TASK)
         self.statuses: list[str] = []
         self.clock_shift_s = 0.0
         self.clock_stands = False
@@ -188,8 +191,9 @@ class Bench:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if hasattr(self, "process") and self.process.poll() is None:
+        if hasattr(self, "process") and self.process.returncode is None:
             self.process.kill()
+            self.process.communicate()
         self._stack.close()
 
     def start(self, *, at_once: bool = True, options: tuple[str, ...] = ()) -> None:

@@ -8,6 +8,8 @@ What it publishes is recorded in a bag by its bytes, and read again by rosbags, 
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +29,8 @@ from ntagen.drive.replay import replay
 from ntagen.drive.simulate import synthesiser_for
 from ntagen.ros.bridge import quality
 from ntagen.ros.topics import MARKERS, POSE, PREDICTED, STATUS, TIP
-from tests.faults.ros import FAULTS, Bench, Fault, run
+from tests.faults.ros import FAULTS, ROOT, Bench, Fault, run
+from tests.tutorials import steps_of
 
 STORE = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
 RECORDED = {
@@ -130,6 +133,22 @@ def check_bag(found: dict[str, list[Any]]) -> None:
     assert all(0.0 < one.color.a <= 1.0 for one in markers.values())
     said = [message.data for message in found[STATUS]]
     assert any(one.startswith("armed: the tip is seen at") for one in said)
+    assert "target reached: the tip is in the last target" in said
+
+
+@pytest.mark.slow
+def test_the_script_of_the_tutorial_steers_and_pulls_back(tmp_path: Path) -> None:
+    tutorial = (ROOT / "docs" / "tutorials" / "ros.md").read_text("utf-8")
+    for step in steps_of(tutorial.replace("save this as", "Save this as")):
+        if step.kind == "file":
+            (tmp_path / step.name).write_text(step.text)
+    with Bench("phantom", 2, tmp_path, task=tmp_path / "fast.nsl") as bench:
+        bench.start(at_once=False)
+        script = [sys.executable, str(tmp_path / "steer.py")]
+        done = subprocess.run(script, capture_output=True, text=True, timeout=150.0)
+        assert bench.depth_mm() == pytest.approx(0.0, abs=0.1)
+    said = done.stdout.splitlines()
+    assert said[-1] == "pulled back: the needle is at the entry", done.stderr
     assert "target reached: the tip is in the last target" in said
 
 

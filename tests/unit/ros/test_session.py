@@ -17,6 +17,7 @@ class Work:
 
     def __init__(self) -> None:
         self.trouble = ""
+        self.halts = 0
         self.begun = threading.Event()
         self.told: list[tuple[str, str]] = []
         self.goes_on = threading.Event()
@@ -30,6 +31,9 @@ class Work:
         reason = self._until(listen)
         outcome = "interrupted" if reason else "target reached"
         return Ended(1.0, outcome, reason or "the tip is in the last target", 1.0, 0, 1)
+
+    def halt(self) -> None:
+        self.halts += 1
 
     def retract(self, listen: Callable[[], None]) -> None:
         reason = self._until(listen)
@@ -109,6 +113,7 @@ def test_stop_ends_what_moves_from_any_thread() -> None:
         bench.session.start()
         bench.work.begun.wait(5.0)
         assert bench.session.stop() == (True, "stopping")
+        assert bench.work.halts == 1
         bench.wait_for("interrupted")
         assert bench.work.told[-1][1] == "the service stop was called"
         assert bench.session.pull_back()[0]

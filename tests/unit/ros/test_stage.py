@@ -118,6 +118,22 @@ def test_a_stop_from_another_thread_ends_the_motion(wire: Wire) -> None:
     assert wire.at.depth_mm == stopped[0]
 
 
+def test_who_holds_the_stage_may_say_why(wire: Wire) -> None:
+    moved = actuator(wire)
+    held: list[bool] = []
+
+    def watch() -> None:
+        if held:
+            raise KeyboardInterrupt("the service stop was called")
+        if wire.at.depth_mm > 3.0:
+            held.append(True)
+            moved.hold()
+
+    moved.watch = watch
+    with pytest.raises(KeyboardInterrupt, match="the service stop"):
+        moved.push(4.0)
+
+
 def test_a_stage_that_does_not_follow_is_a_fault(wire: Wire) -> None:
     moved = actuator(wire)
     wire.is_blocked = True
