@@ -71,6 +71,9 @@ from ntagen.scene import Pose, Scene
 _SMALL_MM: Final = 1e-9
 _NO_REGION_MM: Final = 1e9
 
+_RETRACTED_MM: Final = 1.0
+"""The pieces in which a needle is pulled back after a run; ours."""
+
 _ENOUGH_BEHIND_MM: Final = 1.5
 """With this reserve, a plan from behind the tip is good enough: each mm farther back costs time."""
 
@@ -161,12 +164,15 @@ class Controller:
     def retract(self) -> None:
         """Pulls the needle back to the entry after the run: in its channel, its rolls undone.
 
+        It goes in short pieces: one that is stopped counts as made, and the next call goes on.
+
         Raises:
             DeviceError: The needle cannot be moved or seen.
             KeyboardInterrupt: Somebody wants it to end.
         """
         try:
-            self._needle.pull_back_to(0.0)
+            while self._needle.depth_mm > _SMALL_MM:
+                self._needle.pull_back_to(max(0.0, self._needle.depth_mm - _RETRACTED_MM))
         finally:
             self._needle.stop_at_once()
 

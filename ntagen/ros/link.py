@@ -55,7 +55,8 @@ class TopicLink:
             DeviceError: Nobody hears the commands, or others command it, too.
         """
         with self._lock:
-            self._trouble = ""
+            # The clock may have begun anew: what was heard before says nothing about now.
+            self._trouble, self._newest = "", None
         self._wait_for_first()
         state, command = (self._topics.name(one) for one in (STAGE_STATE, STAGE_COMMAND))
         trouble = two_publishers(self._bridge.resolved(state), self._bridge.publishers(state))

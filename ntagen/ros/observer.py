@@ -132,10 +132,16 @@ class Observer:
     def _command(self, record: Command) -> None:
         if record.kind == "roll":
             self._roll_rad += record.value
-        if not self._commands or record.kind not in ("push", "pull"):
+        if record.kind not in ("push", "pull"):
             return
-        way_mm = record.value if record.kind == "push" else -record.value
-        position_mm, _ = self._needle.at_guide(self._depth_mm + way_mm, self._roll_rad)
+        goal_mm = self._depth_mm + (record.value if record.kind == "push" else -record.value)
+        if record.kind == "pull":
+            # On the way back nothing is measured.
+            self._depth_mm = goal_mm
+            self._publish_pose()
+        if not self._commands:
+            return
+        position_mm, _ = self._needle.at_guide(goal_mm, self._roll_rad)
         head = messages.header(self._bridge.stamp(), self._topics.stage_frame)
         self._publish(COMMAND, messages.stamped_point(head, position_mm, self._topics.mm_per_unit))
 

@@ -116,11 +116,14 @@ class Session:
         self._operator.end(why)
         with self._lock:
             moves = self._phase in (Phase.DRIVING, Phase.PULLING)
-            if self._phase is Phase.ARMED:
+            was_armed = self._phase is Phase.ARMED
+            if was_armed:
                 # What stood ready must be made ready again by somebody who wants it.
                 self._phase = Phase.IDLE
         if moves:
             self._work.halt()
+        if was_armed:
+            self._tell("idle", why)
         return True, "stopping" if moves else "nothing moves"
 
     def run(self, listen: Callable[[], None], *, at_once: bool = False) -> None:

@@ -6,7 +6,6 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
-from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -17,8 +16,8 @@ from ntagen.drive.real import RealRun, require_overrun
 from ntagen.drive.records import Ended, Journal, Journals
 from ntagen.drive.settings import Settings
 from ntagen.drive.steppers import speeds_for
-from ntagen.errors import DeviceError, InputError, ModelError, NtagenError
-from ntagen.needle.vectors import distance, subtract
+from ntagen.errors import DeviceError, ModelError, NtagenError
+from ntagen.needle.vectors import distance
 from ntagen.plan.synthesise import Synthesiser
 from ntagen.ros.bridge import Bridge
 from ntagen.ros.clock import Clock
@@ -28,15 +27,14 @@ from ntagen.ros.link import TopicLink
 from ntagen.ros.log_topic import LogTopic
 from ntagen.ros.observer import Observer
 from ntagen.ros.stage import StageActuator
+from ntagen.ros.subject import scene_for
 from ntagen.ros.topics import ENTRY, LOG, TARGET, Topics
-from ntagen.ros.tracker import tracker_of, unit_error
-from ntagen.scene import Scene, Vector
-from ntagen.shapes import UPRIGHT
+from ntagen.ros.tracker import tracker_of
+from ntagen.scene import Scene
 from ntagen.tracking.frames import IDENTITY, Transform
 from ntagen.tracking.live import ANY_FRAME
-from ntagen.tracking.plausible import FARTHEST_MM
+from ntagen.tracking.plausible import DEEPEST_MM
 
-_SAME_MM: Final = 1e-3
 _CLOCK_S: Final = 3.0
 
 
@@ -201,15 +199,22 @@ class NodeWork:
 
     def retract(self, listen: Callable[[], None]) -> None:
         """See `ntagen.ros.session.Work.retract`."""
-        if self._run is None:
+        if self._run is None or self._devices is None:
             raise AssertionError("a needle that was not steered is not pulled back")
         self._listen = listen
         # What ended the run may be over; whether it is, the next samples show.
         self._hearing.inbox.forget()
         self._hearing.require_one_each()
-        if self._devices is not None:
-            self._devices[1].measure()
+        sensor = self._devices[1]
+        sensor.measure()
         self._run.retract()
+        entry_mm = self._armed.scene.needle.tip.position_mm
+        away_mm = distance(sensor.measure().position_mm, entry_mm)
+        if away_mm > DEEPEST_MM:
+            raise DeviceError(
+                f"by the commands the needle is at the entry, and the tip is seen {away_mm:.1f} mm "
+                "from it\nhint: pull it back by hand"
+            )
 
     def _hear(self) -> None:
         self._listen()
@@ -271,49 +276,6 @@ class NodeWork:
             DeviceError: The entry or the target cannot be meant.
             InputError: There is no way to such a target.
         """
-        scene = self._task.scene
         entry_mm, target_mm = (self._hearing.told_mm(one) for one in (ENTRY, TARGET))
-        if entry_mm is not None:
-            self._require_entry(entry_mm, scene.needle.tip.position_mm)
-        if target_mm is None:
-            return self._task
-        last = scene.targets[-1]
-        self._require_unit(TARGET, target_mm, last.center_mm)
-        if distance(target_mm, last.center_mm) <= _SAME_MM:
-            return self._task
-        return self._task.with_scene(_with_target(scene, target_mm, self._topics.name(TARGET)))
-
-    def _require_entry(self, told_mm: Vector, entry_mm: Vector) -> None:
-        self._require_unit(ENTRY, told_mm, entry_mm)
-        away_mm = distance(told_mm, entry_mm)
-        if away_mm > FARTHEST_MM:
-            raise DeviceError(
-                f"{self._topics.name(ENTRY)} is {away_mm:.1f} mm from the entry of the task; "
-                f"{FARTHEST_MM:g} mm is allowed\n"
-                "hint: write the tip of the task where the needle is, or remap the topic"
-            )
-
-    def _require_unit(self, usual: str, told_mm: Vector, wanted_mm: Vector) -> None:
-        topics = self._topics
-        trouble = unit_error(told_mm, wanted_mm, 0.0, topics.name(usual), topics.units)
-        if trouble:
-            raise DeviceError(
-                trouble.replace("the tip is", "it is").replace("sensor_units", "units")
-            )
-
-
-def _with_target(scene: Scene, target_mm: Vector, topic: str) -> Scene:
-    """A scene whose last target is elsewhere.
-
-    Raises:
-        InputError: The new place lies in a region that must not be entered.
-    """
-    last = scene.targets[-1]
-    moved = replace(last, shape=last.shape.placed(UPRIGHT, subtract(target_mm, last.center_mm)))
-    for region in scene.avoided:
-        if region.distance_mm(target_mm) <= 0.0:
-            raise InputError(
-                f"{topic} is in the {region.kind} region '{region.name}'\n"
-                "hint: choose another target, or move the regions of the task"
-            )
-    return scene.with_targets([*scene.targets[:-1], moved])
+        scene = scene_for(self._task.scene, self._topics, entry_mm, target_mm)
+        return self._task if scene is self._task.scene else self._task.with_scene(scene)
