@@ -301,11 +301,18 @@ def _opened(path: Path) -> IO[bytes]:
     Raises:
         InputError: It cannot be read.
     """
-    data = log_in(path) if is_bag(path) else None
-    if data is not None:
-        return io.BytesIO(data)
-    if path.is_dir() and is_bag(path):
-        raise no_log_in_bag(path)
+    if is_bag(path):
+        try:
+            data = log_in(path)
+        except InputError:
+            # Of a file, more is said by what can be read of it.
+            if path.is_dir():
+                raise
+            data = None
+        if data is not None:
+            return io.BytesIO(data)
+        if path.is_dir():
+            raise no_log_in_bag(path)
     try:
         return open_file(path, MAX_LOG_BYTES)
     except OSError as error:
