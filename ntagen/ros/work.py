@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Protocol
 
 from ntagen.drive.device import LiveSensor, WatchedActuator
 from ntagen.drive.fitting import overrun_mm
@@ -23,6 +23,7 @@ from ntagen.ros.bridge import Bridge
 from ntagen.ros.clock import Clock
 from ntagen.ros.frames import NeedleFrame
 from ntagen.ros.hearing import Hearing
+from ntagen.ros.inbox import DISCOVERY_S
 from ntagen.ros.link import TopicLink
 from ntagen.ros.log_topic import LogTopic
 from ntagen.ros.observer import Observer
@@ -34,8 +35,6 @@ from ntagen.scene import Scene
 from ntagen.tracking.frames import IDENTITY, Transform
 from ntagen.tracking.live import ANY_FRAME
 from ntagen.tracking.plausible import DEEPEST_MM
-
-_CLOCK_S: Final = 3.0
 
 
 class Task(Protocol):
@@ -227,7 +226,7 @@ class NodeWork:
         """
         if not self.clock.is_simulated:
             return
-        end_s = time.monotonic() + _CLOCK_S
+        end_s = time.monotonic() + DISCOVERY_S
         while self.bridge.time_s() == 0.0:
             if time.monotonic() > end_s:
                 raise DeviceError(
