@@ -8,12 +8,13 @@ towards the bevel. Everything is in mm; messages are turned into mm before they 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from ntagen.drive.viewing import quaternion
 from ntagen.errors import DeviceError
 from ntagen.needle.vectors import cross, dot, rotate, subtract
-from ntagen.openigtlink.messages import Columns, Position, turned
+from ntagen.openigtlink.messages import Columns, Points, Position, turned
 from ntagen.openigtlink.messages import Transform as Matrix
 from ntagen.scene import Pose, Vector
 from ntagen.units import deg_from_rad
@@ -133,3 +134,15 @@ def content_of(
             return Position(needle.to_stage(position_mm))
         return needle.measured(position_mm, rotation)
     return Position(position_mm, rotation if any(rotation) else None)
+
+
+def shape_of(places_mm: Sequence[Vector], needle: NeedleFrame | None) -> Points:
+    """A measured shape for `ntagen.tracking.live`.
+
+    Args:
+        places_mm: Places along the needle, from its base to its tip.
+        needle: The frame of the needle if they are in it; None if they are in another one.
+    """
+    if needle is None:
+        return Points(tuple(places_mm))
+    return Points(tuple(needle.to_stage(place) for place in places_mm))

@@ -15,7 +15,7 @@ from ntagen.openigtlink.messages import NEWTON
 from ntagen.openigtlink.messages import Sensor as Readings
 from ntagen.ros.bridge import Bridge, quality
 from ntagen.ros.clock import Clock
-from ntagen.ros.frames import NeedleFrame, content_of
+from ntagen.ros.frames import NeedleFrame, content_of, shape_of
 from ntagen.ros.inbox import Inbox, Wanted, two_publishers
 from ntagen.ros.messages import place_of, rotation_of, stamp_of
 from ntagen.ros.topics import ENTRY, FORCE, TARGET, Topics
@@ -115,19 +115,31 @@ class Hearing:
         self._take(message.header, message.pose)
 
     def _take_shape(self, message: Any) -> None:  # noqa: ANN401  no types
-        if message.poses:
-            # From the base to the tip.
-            self._take(message.header, message.poses[-1])
+        # Without poses, the needle is not seen.
+        if message.poses and self._knows(message.header):
+            per_unit = self._topics.sensor_mm_per_unit
+            places_mm = [place_of(pose.position, per_unit) for pose in message.poses]
+            shape = shape_of(places_mm, self._needle_of(message.header))
+            self.inbox.take_pose(shape, stamp_of(message.header))
 
     def _take(self, head: Any, pose: Any) -> None:  # noqa: ANN401  no types
-        place_mm = place_of(pose.position, self._topics.sensor_mm_per_unit)
-        frame, is_needles = head.frame_id, head.frame_id == self._topics.needle_frame
-        if not is_needles and self._tip_frames and frame not in self._tip_frames:
-            self.inbox.fail(self._wrong_frame(self._topics.tip, frame, self._tip_frames))
-            return
-        needle = self._needle if is_needles else None
-        content = content_of(place_mm, rotation_of(pose.orientation), needle)
-        self.inbox.take_pose(content, stamp_of(head))
+        if self._knows(head):
+            place_mm = place_of(pose.position, self._topics.sensor_mm_per_unit)
+            rotation = rotation_of(pose.orientation)
+            content = content_of(place_mm, rotation, self._needle_of(head))
+            self.inbox.take_pose(content, stamp_of(head))
+
+    def _knows(self, head: Any) -> bool:  # noqa: ANN401  no types
+        """Whether the tip may come in a frame; else the needle must stop."""
+        frame, frames = head.frame_id, self._tip_frames
+        if not frames or frame in (*frames, self._topics.needle_frame):
+            return True
+        self.inbox.fail(self._wrong_frame(self._topics.tip, frame, frames))
+        return False
+
+    def _needle_of(self, head: Any) -> NeedleFrame | None:  # noqa: ANN401  no types
+        """The frame of the needle, if a message is in it."""
+        return self._needle if head.frame_id == self._topics.needle_frame else None
 
     def _take_force(self, message: Any) -> None:  # noqa: ANN401  no types
         force_n = getattr(message.wrench.force, self._topics.force_axis)

@@ -63,9 +63,10 @@ class Topics:
         stage_frame: The frame in which the task is written.
         needle_frame: The frame at the entry whose z axis is the direction of insertion and whose
             x axis is the bevel direction there.
-        tip_from: What measures the tip: ``tip`` (a pose) or ``shape`` (the last of several poses).
+        tip_from: What measures the tip: ``tip`` (a pose) or ``shape`` (poses along the needle).
         axis: The axis of the measured pose that points in the direction of insertion.
-        bevel: Its axis in the bevel direction; empty if the sensor does not see the roll.
+        bevel: Its axis in the bevel direction; empty if the sensor does not see the roll, as a
+            shape does not.
         force_axis: The component of the force that counts.
         reliability: What is asked of publishers of sensors: ``best_effort`` takes any.
         depth: How many samples may wait.
@@ -168,20 +169,32 @@ def _problem(found: Topics) -> str:
             return f"`{name}` is {value:g}, and it must be greater than 0"
     if not 0.0 <= found.latency_s < math.inf:
         return f"`latency_s` is {found.latency_s:g}, and it must not be negative"
-    for name, value in (("axis", found.axis), ("bevel", found.bevel or "+x")):
-        if value not in AXES:
-            return f"`{name}` is '{value}', and must be one of {', '.join(AXES)}"
-    if found.bevel and found.axis[1] == found.bevel[1]:
-        return f"`axis` {found.axis} and `bevel` {found.bevel} are on one line"
     if not found.stage_frame or not found.needle_frame:
         return "a frame needs a name"
     if found.stage_frame == found.needle_frame:
         return f"`stage_frame` and `needle_frame` are both '{found.stage_frame}'"
+    if problem := _problem_of_sensor(found):
+        return problem
     for usual, name in found.names.items():
         if usual not in NAMES:
             return f"there is no topic {usual}\nhint: there are {', '.join(NAMES)}"
         if not name:
             return f"the new name of {usual} is empty"
+    return ""
+
+
+def _problem_of_sensor(found: Topics) -> str:
+    """What is wrong with how the tip is measured; empty if nothing."""
+    for name, value in (("axis", found.axis), ("bevel", found.bevel or "+x")):
+        if value not in AXES:
+            return f"`{name}` is '{value}', and must be one of {', '.join(AXES)}"
+    if found.bevel and found.axis[1] == found.bevel[1]:
+        return f"`axis` {found.axis} and `bevel` {found.bevel} are on one line"
+    if found.tip_from == "shape" and found.bevel:
+        return (
+            f"`tip_from` is shape, and places along a needle say nothing of its `bevel` "
+            f"{found.bevel}\nhint: leave out one of both"
+        )
     return ""
 
 

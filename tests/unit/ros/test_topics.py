@@ -45,6 +45,7 @@ def test_a_file_changes_names_and_units(tmp_path: Path) -> None:
         ("latency_s = -1.0", "must not be negative"),
         ("axis = 'z'", "must be one of"),
         ("axis = '+x'\nbevel = '-x'", "on one line"),
+        ("tip_from = 'shape'\nbevel = '+x'", "say nothing of its `bevel` +x"),
         ("reliability = 'good'", "good"),
         ("needle_frame = 'stage'", "both 'stage'"),
         ("[names]\n'/tip' = '/em/tip'", "there is no topic /tip"),

@@ -8,7 +8,7 @@ import pytest
 
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.messages import NEWTON, Sensor
-from ntagen.ros.frames import axes_of, content_of, quaternion_of
+from ntagen.ros.frames import NeedleFrame, axes_of, content_of, quaternion_of, shape_of
 from ntagen.ros.inbox import Inbox, Wanted
 from ntagen.ros.topics import Topics
 from ntagen.ros.tracker import tracker_of, unit_error
@@ -50,13 +50,13 @@ def test_a_unit_error_is_told(
 class Bench:
     """A tracker behind an inbox."""
 
-    def __init__(self) -> None:
+    def __init__(self, topics: Topics | None = None) -> None:
         self.now_s = 10.0
         tip, force = Wanted("/sensor/tip", "", False), Wanted("/sensor/force", "", False)
         self.inbox = Inbox(tip, force, 0.5, lambda: self.now_s, lambda _: ())
         self.sensor = tracker_of(
             self.inbox,
-            Topics(bevel="+x"),
+            topics or Topics(bevel="+x"),
             IDENTITY,
             ENTRY,
             lambda: self.now_s,
@@ -112,4 +112,30 @@ def test_a_jump_and_a_stale_sample_are_faults() -> None:
         bench.sensor.newest()
     bench.now_s += 1.0
     with pytest.raises(DeviceError, match="stale"):
+        bench.sensor.newest()
+
+
+@pytest.mark.parametrize("is_needles", [False, True])
+def test_poses_along_the_needle_are_a_shape(is_needles: bool) -> None:
+    bench, needle = Bench(Topics(tip_from="shape")), NeedleFrame(ENTRY)
+    # Of a straight needle whose tip is at the entry.
+    own = [(0.0, 0.0, -20.0 + 1.0 * number) for number in range(21)]
+    in_stage = [needle.to_stage(place) for place in own]
+    shape = shape_of(own, needle) if is_needles else shape_of(in_stage, None)
+    bench.inbox.take_force(Sensor((0.25,), NEWTON), None)
+    bench.inbox.take_pose(shape, None)
+    found = bench.sensor.newest()
+    assert found.position_mm == pytest.approx(ENTRY.position_mm)
+    assert len(found.shape) == 21
+    assert found.shape[0] == pytest.approx((40.0, 40.0, 30.0))
+    assert found.shape[15] == pytest.approx((40.0, 25.0, 30.0))
+
+
+def test_what_is_no_shape_of_a_needle_is_refused() -> None:
+    bench = Bench(Topics(tip_from="shape"))
+    bench.inbox.take_force(Sensor((0.25,), NEWTON), None)
+    bench.inbox.take_pose(
+        shape_of([(40.0, 20.0, 30.0 + 40.0 * one) for one in range(3)], None), None
+    )
+    with pytest.raises(DeviceError, match="the shape jumps by 40"):
         bench.sensor.newest()
