@@ -64,6 +64,9 @@ _KEPT_BYTES: Final = 800
 """The memory of what is kept of a record of the file, besides its own bytes; real ones take less,
 also as rows."""
 
+_READ_BYTES: Final = 64
+"""What a record counts that is read and not kept, besides its own bytes: reading takes time."""
+
 _PIECE_BYTES: Final = 2**16
 
 _HEAD_BYTES: Final = 2**18
@@ -441,7 +444,9 @@ class _Unpacking:
                 zstd = zstandard.ZstdDecompressor(max_window_size=_LARGEST_WINDOW_BYTES)
                 self._stream = cast("IO[bytes]", zstd.stream_reader(chunk.data))
             case "lz4":
-                self._stream = lz4.frame.LZ4FrameFile(io.BytesIO(chunk.data))
+                lz4_file = lz4.frame.LZ4FrameFile(io.BytesIO(chunk.data))
+                # Records are read in pieces of a few bytes.
+                self._stream = io.BufferedReader(lz4_file, _PIECE_BYTES)
             case _:
                 self._stream = io.BytesIO(chunk.data)
 
@@ -472,6 +477,7 @@ def _unpacked(chunk: Chunk, budget: _Budget) -> Iterator[McapRecord]:
     unpacking = _Unpacking(chunk, budget)
     stream = ReadDataStream(cast("io.BytesIO", unpacking))
     while head := unpacking.read(HEAD.size):
+        budget.take(_READ_BYTES)
         opcode, length = HEAD.unpack(head)
         match opcode:
             case Opcode.SCHEMA:
