@@ -216,6 +216,7 @@ class GrblActuator:
         """Waits until two reports say that the axes stand at one place."""
         end_s = self.now_s() + _STOP_S
         last: tuple[float, ...] | None = None
+        state = "not known"
         while self.now_s() < end_s:
             try:
                 status = self._link.look()
@@ -225,8 +226,8 @@ class GrblActuator:
             if status.stands and position_of(status) == last:
                 self._rest(status)
                 return
-            last = position_of(status) if status.stands else None
-        raise self._not_standing("it still moves")
+            last, state = position_of(status) if status.stands else None, str(status)
+        raise self._not_standing(f"its state is {state}")
 
     def _rest(self, status: Status) -> None:
         """Notes where the machine stands, and lets it forget what it has not done.

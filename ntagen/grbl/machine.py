@@ -66,7 +66,7 @@ class Machine:
         self._state, self._sub = "Idle", 0
         self._needs_reset = False
         self._cancels_jog = False
-        self._line_waits = False
+        self._line_waits = self._hangs = False
         self._then: Callable[[], None] | None = None
         self._alarm_when_still = 0
         self._latch = 0
@@ -100,6 +100,7 @@ class Machine:
         return (
             self._state in ("Hold", "Door", "Home", "Sleep")
             or self._needs_reset
+            or self._hangs
             or self._line_waits
             or self.dwell_end_s > self._wire.now_s
             or self.planner.block_count >= self._dialect.planner_blocks
@@ -119,7 +120,7 @@ class Machine:
         elif self._then is not None and not self.planner.block_count:
             then, self._then = self._then, None
             then()
-        elif self._state in ("Run", "Jog"):
+        elif self._state in ("Run", "Jog") and not self._hangs:
             self._state = "Idle"
         if self._line_waits and self._state == "Idle" and self.dwell_end_s <= self._wire.now_s:
             self._line_waits = False
@@ -131,24 +132,32 @@ class Machine:
         self._program = list(self.planner.position)
 
     def hold(self) -> None:
-        """`!`: slows down and holds; a jog is ended."""
+        """`!`: slows down and holds; a jog is ended by GRBL, and goes on with grblHAL."""
         if self._state == "Jog":
-            self.cancel_jog()
+            if not self._dialect.is_hal:
+                self.cancel_jog()
         elif self._state in ("Idle", "Run"):
             self._state, self._sub = "Hold", 1 if self.planner.is_moving else 0
             self.planner.hold()
 
     def cancel_jog(self) -> None:
         """0x85: ends a jog; does nothing to other motions."""
-        if self._state == "Jog":
+        if self._state == "Jog" and not self._hangs:
             self._cancels_jog = True
             self.planner.hold()
 
     def open_door(self) -> None:
-        """0x84: slows down and waits, as when the safety door is opened."""
+        """0x84: slows down and waits, as when the safety door is opened.
+
+        grblHAL stands still in a jog, says that it jogs, and heeds only `~` and a reset.
+        """
         if self._state in ("Alarm", "Check", "Sleep", "Home"):
             return
         self._wire.say("[MSG:Check Door]")
+        if self._dialect.is_hal and self._state == "Jog":
+            self._hangs = True
+            self.planner.hold()
+            return
         self._cancels_jog = self._cancels_jog or self._state == "Jog"
         self._state, self._sub = "Door", 2 if self.planner.is_moving else 0
         if self._sub == 0:
@@ -157,8 +166,10 @@ class Machine:
 
     def resume(self) -> None:
         """`~`: goes on after a hold, once the axes stand."""
-        if self._state not in ("Hold", "Door") or self._sub != 0:
+        is_held = self._state in ("Hold", "Door") and self._sub == 0
+        if not is_held and not self._hangs:
             return
+        self._hangs = False
         if self._dialect.is_hal and self._state == "Hold":
             self._wire.say("[MSG:]")
         self.planner.resume()
@@ -166,7 +177,7 @@ class Machine:
 
     def reset(self) -> None:
         """0x18: a reset in motion loses the position, so it is an alarm."""
-        was_moving = self.planner.is_moving
+        was_moving = self.planner.is_moving or self._hangs
         self._settle()
         self._needs_reset = False
         if was_moving:
@@ -182,7 +193,7 @@ class Machine:
         """Forgets all but settings, position and alarm, and says the banner after some time."""
         self._wire.forget(deaf_s=seconds)
         self._modal, self._latch, self._then, self._alarm_when_still = Modal(), 0, None, 0
-        self._line_waits = self._cancels_jog = self._needs_reset = False
+        self._line_waits = self._cancels_jog = self._needs_reset = self._hangs = False
         self.dwell_end_s = -math.inf
         self._program = list(self.planner.position)
         self._status.reset()

@@ -243,7 +243,7 @@ FAULTS: Final = (
         "door",
         _controller(lambda r: r.emulator.feed(b"\x84")),
         _FAULTED,
-        "Door|door|did not answer",
+        "Door|door|did not answer|is stuck",
     ),
     Fault("hold button", _controller(lambda r: r.emulator.feed(b"!"))),
     Fault("slow axes", _controller(lambda r: setattr(r.emulator.faults, "pace", 0.2))),

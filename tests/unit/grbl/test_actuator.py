@@ -232,8 +232,7 @@ FAULTS: dict[str, tuple[Callable[[Bench], None], str]] = {
     "reset": (lambda b: b.let_go("\x18", 0.0), r"ALARM:3|was reset"),
     "power cut": (lambda b: b.emulator.power_on(), "the controller was reset"),
     "cable pulled": (lambda b: pull_cable(b.port), "connection to the controller is broken"),
-    "hold button": (lambda b: b.let_go("!", 0.0), "ended too early|was interrupted|not idle"),
-    "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|not idle"),
+    "door": (lambda b: b.let_go("\x84", 0.0), "was interrupted|not idle|is stuck"),
 }
 
 
@@ -259,6 +258,39 @@ def test_after_a_fault_nothing_moves_any_more(dialect: Dialect, name: str, secon
             move(1.0)
     bench.let_go("~", 10.0)
     assert bench.plant.sums["X"] == moved_mm
+
+
+def test_a_hold_button_ends_a_push() -> None:
+    bench = Bench(GRBL_11H)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.let_go("!", 0.0))
+    with pytest.raises(DeviceError, match="ended too early"):
+        actuator.push(5.0)
+    assert bench.plant.sums["X"] < 5.0
+
+
+def test_a_hold_button_of_grblhal_ends_no_push_but_the_next_one_does_not_begin() -> None:
+    bench = Bench(GRBLHAL)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.let_go("!", 0.0))
+    actuator.push(5.0)
+    actuator.watch = lambda: None
+    bench.let_go("!", 0.0)
+    with pytest.raises(DeviceError, match="in the state Hold:0, not idle"):
+        actuator.push(1.0)
+    assert bench.plant.sums["X"] == pytest.approx(5.0)
+
+
+def test_a_door_of_grblhal_ends_a_push_and_its_resume_button_does_not_go_on_with_it() -> None:
+    bench = Bench(GRBLHAL)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.let_go("\x84", 0.0))
+    with pytest.raises(DeviceError, match=r"is stuck(.|\n)*its state is Jog"):
+        actuator.push(5.0)
+    there_mm = bench.plant.sums["X"]
+    assert 0.5 < there_mm < 2.0
+    bench.let_go("~", 10.0)
+    assert bench.plant.sums["X"] == there_mm
 
 
 @BOTH

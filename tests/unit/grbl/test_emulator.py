@@ -101,9 +101,10 @@ def test_a_hold_overruns_by_the_computed_motion_and_the_braking(dialect: Dialect
 
 
 @BOTH
-def test_a_jog_ends_on_cancel_and_on_hold_and_the_rest_is_forgotten(dialect: Dialect) -> None:
+def test_a_jog_ends_on_cancel_and_the_rest_is_forgotten(dialect: Dialect) -> None:
     bench = Bench(dialect)
-    for byte in "\x85!":
+    # A hold ends a jog of GRBL, too; grblHAL goes on (`docs/firmware.md`).
+    for byte in "\x85" if dialect.is_hal else "\x85!":
         bench.say("$J=G91G21X20F300\n")
         bench.wait(1.0)
         bench.say(byte)
@@ -111,6 +112,35 @@ def test_a_jog_ends_on_cancel_and_on_hold_and_the_rest_is_forgotten(dialect: Dia
         bench.seconds_until_it_stands()
         assert str(bench.status()) == "Idle"
     assert 4.0 < bench.plant.sums["X"] < 20.0
+
+
+def test_grblhal_does_not_hear_a_hold_in_a_jog() -> None:
+    bench = Bench(GRBLHAL)
+    bench.say("$J=G91G21X20F300\n")
+    bench.wait(1.0)
+    bench.say("!")
+    bench.seconds_until_it_stands()
+    assert bench.plant.sums["X"] == pytest.approx(20.0)
+
+
+def test_grblhal_stands_in_a_jog_for_ever_when_the_door_is_opened() -> None:
+    bench = Bench(GRBLHAL)
+    bench.say("$J=G91G21X20F300\n")
+    bench.wait(1.0)
+    assert bench.say("\x84") == ["[MSG:Check Door]"]
+    bench.wait(5.0)
+    there_mm = bench.plant.sums["X"]
+    bench.say("\x85")
+    assert str(bench.status()) == "Jog"
+    assert bench.plant.sums["X"] == there_mm
+    bench.say("~")
+    bench.seconds_until_it_stands()
+    assert bench.plant.sums["X"] == pytest.approx(20.0)
+    bench.say("$J=G91G21X-20F300\n")
+    bench.wait(1.0)
+    bench.say("\x84")
+    bench.wait(1.0)
+    assert bench.say("\x18") == ["ALARM:3"]
 
 
 @BOTH
