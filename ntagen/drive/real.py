@@ -43,23 +43,8 @@ def require_overrun(settings: Settings, needs_mm: float) -> None:
         )
 
 
-def drive(
-    scene: Scene,
-    actuator: WatchedActuator,
-    sensor: LiveSensor,
-    synthesise: Synthesiser,
-    settings: Settings,
-    journal: Journal,
-    *,
-    known: str = "all",
-    listen: Callable[[], None] = lambda: None,
-    agree: Callable[[str], None] = lambda _: None,
-    course: Course | None = None,
-    policy: Policy | None = None,
-    legs: Sequence[Leg] = (),
-    ask: Ask = lambda _: False,
-) -> Driven:
-    """Drives a real needle through the scene.
+class RealRun:
+    """A run with a real needle, which can be pulled back after it.
 
     Args:
         scene: The scene.
@@ -75,28 +60,7 @@ def drive(
         policy: As in `Controller`.
         legs: The runs from which this one goes on (`ntagen.drive.past`).
         ask: As in `Controller`.
-
-    Raises:
-        InputError: Those runs are decided otherwise now.
     """
-    return RealRun(
-        scene,
-        actuator,
-        sensor,
-        synthesise,
-        settings,
-        journal,
-        known=known,
-        listen=listen,
-        agree=agree,
-        course=course,
-        policy=policy,
-        ask=ask,
-    ).drive(legs)
-
-
-class RealRun:
-    """A run with a real needle, which can be pulled back after it; the arguments are of `drive`."""
 
     def __init__(
         self,
@@ -112,10 +76,12 @@ class RealRun:
         agree: Callable[[str], None] = lambda _: None,
         course: Course | None = None,
         policy: Policy | None = None,
-        ask: Callable[[str], bool] = lambda _: False,
+        legs: Sequence[Leg] = (),
+        ask: Ask = lambda _: False,
     ) -> None:
         supervisor = Supervisor(sensor, listen)
         actuator.watch = supervisor.watch
+        self._legs = legs
         self._counter = SynthesisCounter()
         device = Assembly(steered(actuator, scene, settings.compensated_lag_rad), sensor)
         self._relay = Relay(device, Journals(journal, self._counter), listen, agree, ask)
@@ -133,16 +99,13 @@ class RealRun:
             self._relay.ask,
         )
 
-    def drive(self, legs: Sequence[Leg] = ()) -> Driven:
+    def drive(self) -> Driven:
         """Drives until the run ends.
 
-        Args:
-            legs: The runs from which this one goes on (`ntagen.drive.past`).
-
         Raises:
-            InputError: Those runs are decided otherwise now.
+            InputError: The runs before it are decided otherwise now.
         """
-        ended, counter = go_on(self._controller, self._relay, legs), self._counter
+        ended, counter = go_on(self._controller, self._relay, self._legs), self._counter
         return Driven(ended, tuple(counter.syntheses), counter.guaranteed, counter.promised)
 
     def retract(self) -> None:

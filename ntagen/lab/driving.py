@@ -17,7 +17,7 @@ from typing import Final
 
 from ntagen.drive.device import LiveSensor, Watch, WatchedActuator, can_screw, screw_on
 from ntagen.drive.outcome import Driven
-from ntagen.drive.real import drive
+from ntagen.drive.real import RealRun
 from ntagen.drive.records import Journal, Journals
 from ntagen.drive.settings import Settings
 from ntagen.drive.simulate import Witness
@@ -98,7 +98,7 @@ def drive_in(
             force_varies=settings.force_sensing and settings.force_noise_n > 0.0,
         ) as sensor,
     ):
-        driven = drive(
+        driven = RealRun(
             scene,
             _Hurried(actuator, clock),
             _Looking(sensor, clock),
@@ -106,7 +106,7 @@ def drive_in(
             settings,
             Journals(journal, Witness(lab, journal)),
             known=known,
-        )
+        ).drive()
         return InLab(driven, lab.truth())
 
 

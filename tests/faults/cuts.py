@@ -20,7 +20,7 @@ from ntagen.drive.operator import Operator
 from ntagen.drive.past import depth_mm, legs_of
 from ntagen.drive.plant import simulated_axes
 from ntagen.drive.reading import read_log
-from ntagen.drive.real import drive
+from ntagen.drive.real import RealRun
 from ntagen.drive.records import Answered, Ended, Found, Journals, Record
 from ntagen.drive.replay import replay
 from ntagen.drive.shells import sensing_margin_mm
@@ -211,7 +211,7 @@ class Driver:
             metadata[RESUMES] = {"file": log_before.path.name, "sha256": log_before.sha256}
             attachments[EARLIER] = log_before.path.read_bytes()
         with Log(self.path, metadata_of(metadata), attachments) as log:
-            driven = drive(
+            driven = RealRun(
                 patient.scene,
                 actuator,
                 sensor,
@@ -222,7 +222,7 @@ class Driver:
                 listen=self.operator.listen,
                 legs=legs,
                 ask=ask,
-            )
+            ).drive()
         return driven.ended
 
     def die(self) -> None:

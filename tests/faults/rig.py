@@ -17,7 +17,7 @@ from ntagen.drive.device import Sensor
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.operator import Operator
 from ntagen.drive.outcome import Driven
-from ntagen.drive.real import drive
+from ntagen.drive.real import RealRun
 from ntagen.drive.records import Ended, Journal, Journals
 from ntagen.drive.shells import sensing_margin_mm
 from ntagen.drive.simulate import Simulated, simulate, synthesiser_for
@@ -164,7 +164,7 @@ class Rig:
         )
         device = self._make(self.scene.needle, obstacles, self.seed)
         prepare(self)
-        return drive(
+        return RealRun(
             self.scene,
             device.actuator,
             self._sensor(LivePlausible, device),
@@ -173,7 +173,7 @@ class Rig:
             journal,
             known=self.known,
             listen=self.operator.listen,
-        )
+        ).drive()
 
     def _sensor(self, kind: type[Checked], needle: Sensor) -> Checked:
         varies = self.configuration.needle.parameters is not None

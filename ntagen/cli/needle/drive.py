@@ -7,7 +7,7 @@ import functools
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -368,14 +368,17 @@ def _drive(
     operator: SignalledOperator,
 ) -> Driven:
     """Drives a real or a simulated needle."""
-    from ntagen.drive.real import drive
+    from ntagen.drive.real import RealRun
     from ntagen.drive.simulate import simulate
 
     configuration, settings, scene = run.configuration, run.configuration.settings, run.scene
     steer: Callable[..., Driven]
     with contextlib.ExitStack() as stack:
         if configuration.needle.is_real:
-            steer = functools.partial(drive, scene, *stack.enter_context(_real_needle(run)))
+            devices = stack.enter_context(_real_needle(run))
+
+            def steer(*given: Any, **named: Any) -> Driven:  # noqa: ANN401  as for `simulate`
+                return RealRun(scene, *devices, *given, **named).drive()
         else:
             watches_force = settings.force_sensing
             sensing = opened(run.tracking, scene.needle.tip, watches_force=watches_force)

@@ -14,7 +14,7 @@ from ntagen.drive.fitting import overrun_mm
 from ntagen.drive.log import Log, metadata_of
 from ntagen.drive.outcome import Driven
 from ntagen.drive.reading import read_log
-from ntagen.drive.real import drive, require_overrun
+from ntagen.drive.real import RealRun, require_overrun
 from ntagen.drive.records import Command, CutShort, Ended, Journals, Measured, Transition
 from ntagen.drive.replay import replay
 from ntagen.drive.settings import Settings
@@ -131,11 +131,15 @@ def run(
     diary = Diary()
     synthesise = synthesiser_for(settings)
     if log is None:
-        made = drive(SCENE, stepped.actuator, live, synthesise, settings, diary, listen=listen)
+        made = RealRun(
+            SCENE, stepped.actuator, live, synthesise, settings, diary, listen=listen
+        ).drive()
         return made, diary
     with Log(log, metadata_of({"settings": settings.to_json()}), {}) as its_log:
         journal = Journals(its_log, diary)
-        made = drive(SCENE, stepped.actuator, live, synthesise, settings, journal, listen=listen)
+        made = RealRun(
+            SCENE, stepped.actuator, live, synthesise, settings, journal, listen=listen
+        ).drive()
     return made, diary
 
 
@@ -269,7 +273,7 @@ def test_who_does_not_agree_ends_the_run_before_anything_moves() -> None:
 
     diary = Diary()
     synthesise = synthesiser_for(SETTINGS)
-    made = drive(SCENE, stepped.actuator, live, synthesise, SETTINGS, diary, agree=agree)
+    made = RealRun(SCENE, stepped.actuator, live, synthesise, SETTINGS, diary, agree=agree).drive()
     assert made.ended.outcome == State.INTERRUPTED.value
     assert asked[0].startswith("follow the plan ")
     assert stepped.emulator.position[0] == 0.0
