@@ -17,6 +17,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Final
 
+from ntagen.drive.states import ENDS, State
 from ntagen.files import write_files
 from ntagen.needle.vectors import cross
 from ntagen.plot.colours import (
@@ -111,6 +112,8 @@ def data_of(picture: Picture) -> dict[str, Any]:
         "right": right,
         "away": away,
         "gap": GAP_MM,
+        "ends": sorted(state.value for state in ENDS),
+        "goal": State.TARGET_REACHED.value,
         "clock": round(picture.clock_s, 3),
         "regions": [
             region_data(region, _note(region, picture), picture.appears_s.get(region.name))
