@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,16 +12,12 @@ import pytest
 
 from ntagen.serve.jobs import Limits
 from ntagen.serve.server import Server
+from tests.browsers import NEEDS_BROWSER
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "examples" / "models"
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-BROWSER = next((path for name in BROWSERS if (path := shutil.which(name))), None)
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(BROWSER is None, reason=f"needs a browser: {', '.join(BROWSERS)}"),
-]
+pytestmark = NEEDS_BROWSER
 
 
 ENDLESS = """
@@ -42,16 +37,6 @@ def server() -> Iterator[Server]:
     yield server
     server.close()
     thread.join(10)
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    with playwright.sync_playwright() as driver:
-        # In a container, the browser cannot make its own sandbox.
-        found = driver.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield found
-        found.close()
 
 
 @pytest.fixture
