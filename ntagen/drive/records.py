@@ -8,6 +8,7 @@ decisions alone; a replay compares those. Times are seconds on the device's cloc
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import ClassVar, Final, Protocol
 
 from ntagen.errors import DeviceError
@@ -339,6 +340,12 @@ class Foreseen(Record):
     y_mm: tuple[float, ...]
     z_mm: tuple[float, ...]
     confidence: float
+
+    def tube(self, accept: float) -> list[tuple[Vector, float]]:
+        """The places, and how far the tip may be from each in mm at a confidence."""
+        sigmas = max(0.0, NormalDist().inv_cdf(accept))
+        places = zip(self.x_mm, self.y_mm, self.z_mm, self.std_mm, strict=False)
+        return [((x, y, z), sigmas * std_mm) for x, y, z, std_mm in places]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from statistics import NormalDist
 from typing import Any, Final
 
 from ntagen.drive.reading import RunLog
@@ -196,10 +195,7 @@ def planned(time_s: float, plan: Plan | None, needle: Needle) -> Planned:
 
 def tube_of(foreseen: Foreseen, accept: float) -> Planned:
     """How far the tip is expected from its plan, at a confidence."""
-    sigmas = max(0.0, NormalDist().inv_cdf(accept))
-    places = zip(foreseen.x_mm, foreseen.y_mm, foreseen.z_mm, foreseen.std_mm, strict=False)
-    tube = tuple(((x, y, z), sigmas * std_mm) for x, y, z, std_mm in places)
-    return Planned(foreseen.time_s, tube=tube)
+    return Planned(foreseen.time_s, tube=foreseen.tube(accept))
 
 
 def tube_label(accept: float) -> str:

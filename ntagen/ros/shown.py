@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from statistics import NormalDist
 from typing import Any, Final, Literal
 
 from ntagen.drive.records import Foreseen
@@ -97,11 +96,10 @@ def tube_of(record: Foreseen, accept: float) -> Marker:
         record: Where it is expected, and how well that is known.
         accept: The confidence.
     """
-    sigmas = max(0.0, NormalDist().inv_cdf(accept))
-    places = list(zip(record.x_mm, record.y_mm, record.z_mm, strict=True))
-    radii = [sigmas * std_mm for std_mm in record.std_mm]
-    if len(places) < 2:
+    tube = record.tube(accept)
+    if len(tube) < 2:
         return Marker(_TUBE, "nothing")
+    places, radii = zip(*tube, strict=True)
     points_mm = tuple(_mantle(list(_rings(places, radii))))
     return Marker(_TUBE, "triangles", colour=_TUBE_COLOUR, points_mm=points_mm)
 
