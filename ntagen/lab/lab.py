@@ -54,6 +54,19 @@ class Truth:
     time_s: float
     has_moved: bool
 
+    @staticmethod
+    def of(scene: Scene, placed: Placed, time_s: float, *, has_moved: bool) -> Truth:
+        """What a needle knows that was placed in a scene."""
+        tip, target = placed.needle.true_tip, scene.targets[-1]
+        return Truth(
+            tip=tip,
+            target=target.name,
+            target_distance_mm=target.distance_mm(tip.position_mm),
+            clearance_mm=placed.needle.true_clearance_mm(),
+            time_s=time_s,
+            has_moved=has_moved,
+        )
+
 
 class Lab:
     """A lab in this process, in threads of its own; use it as a context manager.
@@ -141,16 +154,8 @@ class Lab:
         """What has really happened until now."""
         with self.lock:
             self._settle()
-            tip = self._placed.needle.true_tip
-            target = self._scene.targets[-1]
-            return Truth(
-                tip=tip,
-                target=target.name,
-                target_distance_mm=target.distance_mm(tip.position_mm),
-                clearance_mm=self._placed.needle.true_clearance_mm(),
-                time_s=self.emulator.now_s,
-                has_moved=self._moved_s is not None,
-            )
+            has_moved = self._moved_s is not None
+            return Truth.of(self._scene, self._placed, self.emulator.now_s, has_moved=has_moved)
 
     @property
     def true_tip(self) -> Pose:

@@ -16,7 +16,7 @@ from ntagen.lab.lab import Truth
 from ntagen.lab.needles import Placed
 from ntagen.needle.phantom_sensor import Frame
 from ntagen.ros.stage import Place
-from ntagen.scene import Pose, Scene
+from ntagen.scene import Scene
 from ntagen.units import deg_from_rad
 
 _FASTER: Final = 1.5
@@ -80,21 +80,8 @@ class Bench:
         """What has really happened until now."""
         with self._lock:
             self._settle()
-            tip = self._placed.needle.true_tip
-            target = self._scene.targets[-1]
-            return Truth(
-                tip=tip,
-                target=target.name,
-                target_distance_mm=target.distance_mm(tip.position_mm),
-                clearance_mm=self._placed.needle.true_clearance_mm(),
-                time_s=self.now_s(),
-                has_moved=self._moved_s is not None,
-            )
-
-    @property
-    def true_tip(self) -> Pose:
-        """The true pose of the tip."""
-        return self.truth().tip
+            has_moved = self._moved_s is not None
+            return Truth.of(self._scene, self._placed, self.now_s(), has_moved=has_moved)
 
     def _settle(self) -> None:
         """Lets the needle come to where the stage is now."""
