@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -18,7 +19,7 @@ from ntagen.drive.states import Event
 from ntagen.drive.steering import Steering
 from ntagen.drive.torsion import Lag
 from ntagen.drive.tube import Tube
-from ntagen.errors import LimitError
+from ntagen.errors import LimitError, ModelError, NtagenError
 from ntagen.needle.estimate import Estimate, Priors
 from ntagen.needle.kinematics import Arc
 from ntagen.plan.actions import Plan, Push, Roll
@@ -308,3 +309,17 @@ def timed(synthesis: Synthesis, work: Callable[[Synthesis], Synthesis]) -> Synth
     done = work(synthesis)
     seconds = synthesis.loop_seconds + time.perf_counter() - start_s
     return replace(done, loop_seconds=seconds)
+
+
+@contextlib.contextmanager
+def mistakes_of_models() -> Iterator[None]:
+    """Lets a mistake in a model end as one of this program.
+
+    Raises:
+        NtagenError: There was one. The model is ours: its exit code would say that no strategy
+            holds.
+    """
+    try:
+        yield
+    except ModelError as error:
+        raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error

@@ -12,11 +12,12 @@ from typing import Protocol
 from ntagen.drive.device import LiveSensor, WatchedActuator
 from ntagen.drive.fitting import overrun_mm
 from ntagen.drive.outcome import Driven
+from ntagen.drive.planning import mistakes_of_models
 from ntagen.drive.real import RealRun, require_overrun
 from ntagen.drive.records import Ended, Journal, Journals
 from ntagen.drive.settings import Settings
 from ntagen.drive.steppers import speeds_for
-from ntagen.errors import DeviceError, ModelError, NtagenError
+from ntagen.errors import DeviceError
 from ntagen.needle.vectors import distance
 from ntagen.plan.synthesise import Synthesiser
 from ntagen.ros.bridge import Bridge
@@ -169,12 +170,8 @@ class NodeWork:
                 known=task.known,
                 listen=self._hear,
             )
-            try:
+            with mistakes_of_models():
                 self.driven = self._run.drive()
-            except ModelError as error:
-                raise NtagenError(
-                    f"the planner failed, and the needle is stopped: {error}"
-                ) from error
             return self.driven.ended
 
     @contextlib.contextmanager

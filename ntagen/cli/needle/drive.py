@@ -52,7 +52,7 @@ from ntagen.cli.options import include_option, path_argument, path_option
 from ntagen.cli.signals import TERMINATED
 from ntagen.cli.terminal import echo, given_options, say, say_idle
 from ntagen.drive.states import State
-from ntagen.errors import InputError, ModelError, NtagenError
+from ntagen.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -412,6 +412,7 @@ def _around(
     run: Run, log: list[Journal], terminal: _Terminal, operator: SignalledOperator
 ) -> Iterator[tuple[Synthesiser, Journal, Callable[[str], None]]]:
     """What a run needs besides the needle: what finds plans, what records, and who agrees."""
+    from ntagen.drive.planning import mistakes_of_models
     from ntagen.drive.records import Journals
     from ntagen.drive.simulate import synthesiser_for
 
@@ -426,11 +427,8 @@ def _around(
             journals.append(stack.enter_context(told))
         elif run.resumed is not None:
             journals.append(FoundTeller())
-        try:
+        with mistakes_of_models():
             yield synthesise, Journals(*journals), agree
-        except ModelError as error:
-            # The model is ours: its exit code would say that no strategy holds.
-            raise NtagenError(f"the planner failed, and the needle is stopped: {error}") from error
 
 
 @contextlib.contextmanager
