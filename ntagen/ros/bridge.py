@@ -17,14 +17,12 @@ from std_srvs.srv import Trigger
 
 from ntagen.errors import InputError
 from ntagen.ros.inbox import Publisher
+from ntagen.ros.session import Answer
 from ntagen.ros.topics import Topics, parameters, topics_of
 
 _S_PER_NS: Final = 1e-9
 _TURN_S: Final = 0.1
 _JOIN_S: Final = 10.0
-
-Answer = tuple[bool, str]
-"""Whether a service has done what was asked, and its message."""
 
 
 def quality(*, is_reliable: bool = True, depth: int = 10, is_kept: bool = False) -> QoSProfile:

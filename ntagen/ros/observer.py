@@ -18,7 +18,8 @@ from ntagen.drive.records import (
     Transition,
 )
 from ntagen.drive.states import ENDS, State
-from ntagen.drive.viewing import ROUTINE, Shaft, Shown, show_plan, show_record, show_scene
+from ntagen.drive.viewers import Viewers
+from ntagen.drive.viewing import ROUTINE, Shown
 from ntagen.plan.synthesise import Synthesis
 from ntagen.ros import messages
 from ntagen.ros.bridge import Bridge, quality
@@ -77,7 +78,7 @@ class Observer:
         self._commands = commands
         self._lock = threading.Lock()
         self._board = Board()
-        self._shaft: Shaft | None = None
+        self._viewers = Viewers(None)
         self._depth_mm = self._roll_rad = self._force_n = 0.0
         self._state, self._reason = "idle", "call the service arm"
         kinds = {POSE: PoseStamped, TIP_POSE: PoseStamped, PREDICTED: PoseArray}
@@ -100,22 +101,19 @@ class Observer:
 
     def started(self, scene: Scene) -> None:
         """Shows the scene."""
-        self._shaft = Shaft(scene.needle.tip.position_mm)
         self._depth_mm = self._roll_rad = 0.0
-        self._show(show_scene(scene))
+        self._show(self._viewers.started(scene))
 
     def synthesised(self, number: int, synthesis: Synthesis) -> None:
         """Shows the plan."""
-        self._show(show_plan(synthesis, 0.0))
+        self._show(self._viewers.synthesised(synthesis, 0.0))
         poses = plan_poses(synthesis, self._needle)
         head = messages.header(self._bridge.stamp(), self._topics.needle_frame)
         self._publish(PREDICTED, messages.pose_array(head, poses, self._topics.mm_per_unit))
 
     def record(self, record: Record) -> None:
         """Publishes what a record tells."""
-        self._show(show_record(record))
-        if self._shaft is not None:
-            self._show(self._shaft.show(record))
+        self._show(self._viewers.recorded(record))
         match record:
             case Transition() if record.event not in ROUTINE and record.following not in _ENDS:
                 self.tell(record.following, record.event)
