@@ -228,7 +228,8 @@ def _alone(shown: _Shown, needle: Needle) -> tuple[float, float, float]:
 def _joined(shown: Sequence[_Shown]) -> tuple[_Array, _Array, float]:
     """Bevel, logarithm of the curvature and lag; their covariance; and the scatter.
 
-    The spread of the friction grows with the lag itself, so the lag is looked for twice.
+    The spread of the friction grows with the lag itself, so all three are looked for again with the
+    lag that was found.
     """
     theta: _Array = np.zeros(3)
     for _ in range(3):
