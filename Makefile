@@ -70,12 +70,23 @@ quick-rust: $(RUST)
 quick-python: $(INSTALLED)
 	$(BIN)/python -m pytest tests/unit tests/test_*.py -m 'not slow' --hypothesis-profile=quick --numprocesses=auto --dist=worksteal
 
+# The tests of the engine, built and not run: a second core builds them beside the installed engine.
+.PHONY: build-tests
+build-tests: $(RUST)
+	source $(RUST) && cd checker && cargo test --locked --quiet --no-run
+
 .PHONY: lint
-lint: $(INSTALLED) ## Check formats, lints and types
+lint: lint-rust lint-python ## Check formats, lints and types
+
+.PHONY: lint-python
+lint-python: $(INSTALLED)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest ntagen._checker
+
+.PHONY: lint-rust
+lint-rust: $(RUST)
 	source $(RUST) && cd checker && cargo fmt --check
 	source $(RUST) && cd checker && cargo clippy --locked --all-targets --features python --quiet -- -D warnings
 
