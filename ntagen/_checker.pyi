@@ -30,6 +30,7 @@ __all__ = [
     "form_of_query",
     "load",
     "simulate",
+    "survey",
     "walk_exactly",
 ]
 
@@ -281,4 +282,10 @@ def follow(
 ) -> list[str]: ...
 def form_of_query(text: str) -> tuple[str, str | None, str | None, bool] | None: ...
 def explanations() -> list[tuple[str, str, str, str]]: ...
+def survey(
+    path: str,
+    text: bytes,
+    queries: tuple[str, bytes] | None,
+    allow_external: Sequence[Path],
+) -> str: ...
 def load(path: str, pieces: Iterable[bytes], allow_external: Sequence[Path]) -> Model: ...

@@ -9,6 +9,8 @@ pub mod diagnostics;
 
 mod builtins;
 pub mod syntax;
+
+pub mod names;
 pub mod tuning;
 
 pub mod ir;

@@ -21,8 +21,9 @@ use pyo3::types::PyBytes;
 
 use crate::diagnostics::Severity;
 use crate::engine::LoadedModel;
-use crate::engine::format::explain;
+use crate::engine::format::{explain, survey_json};
 use crate::engine::query_form;
+use crate::engine::survey::survey_of;
 use crate::exec::Libraries;
 use crate::tuning::PARTS;
 
@@ -49,6 +50,29 @@ fn load(
     let path = path.to_owned();
     let load = move || LoadedModel::load_with(&path, bytes, &libraries);
     Ok(Model::new(until_signal_apart(py, load)?.map_err(rejected)?))
+}
+
+/// What is wrong with a model and with a file of queries, if there is one, and what their names
+/// stand for, as JSON. The model may be wrong. Libraries may come from these files and folders.
+#[pyfunction]
+fn survey(
+    py: Python<'_>,
+    path: String,
+    text: Vec<u8>,
+    queries: Option<(String, Vec<u8>)>,
+    allow_external: Vec<PathBuf>,
+) -> PyResult<String> {
+    let libraries = Libraries::new(allow_external);
+    let look = move || {
+        let listed = queries
+            .as_ref()
+            .map(|(path, text)| (path.as_str(), &text[..]));
+        let found = survey_of((&path, &text), listed, &libraries);
+        let mut paths = vec![path.as_str()];
+        paths.extend(listed.map(|(path, _)| path));
+        survey_json::survey(&found, &paths).to_string()
+    };
+    until_signal_apart(py, look)
 }
 
 /// For each code: the code, its name, its severity ("error" or "warning"), and its page in
@@ -102,5 +126,6 @@ fn _checker(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(follow, module)?)?;
     module.add_function(wrap_pyfunction!(form_of_query, module)?)?;
     module.add_function(wrap_pyfunction!(load, module)?)?;
+    module.add_function(wrap_pyfunction!(survey, module)?)?;
     module.add_function(wrap_pyfunction!(explanations, module)?)
 }

@@ -19,8 +19,8 @@ use crate::learning::{LearnedStrategy, SeeingPolicy};
 use crate::semantics::{self, FIRST_POOL, Reading};
 use crate::shield::Shield;
 use crate::syntax::{
-    self,
-    ast::{QueryKind, QueryText, Template},
+    self, Parsed,
+    ast::{Declaration, QueryKind, QueryText, Template},
 };
 use crate::tuning::Tuning;
 
@@ -75,6 +75,20 @@ impl LoadedModel {
         let mut sources = SourceMap::default();
         let prelude = syntax::prelude(&mut sources);
         let parsed = syntax::read_model(path, bytes, &mut sources);
+        let (mut model, found) = LoadedModel::accept(path, parsed, &prelude, sources, libraries)?;
+        model.warnings = Rejection::new(found, &model.sources).rendered;
+        model.load_seconds = start.elapsed().as_secs_f64();
+        Ok(model)
+    }
+
+    /// Checks a model that was read: the model and its warnings.
+    pub(super) fn accept(
+        path: &str,
+        parsed: Parsed,
+        prelude: &[Declaration],
+        sources: SourceMap,
+        libraries: &Libraries,
+    ) -> Result<(LoadedModel, Vec<Diagnostic>), Rejection> {
         let mut diagnostics = parsed.diagnostics;
         if diagnostics.iter().any(Diagnostic::is_error) {
             return Err(Rejection::new(diagnostics, &sources));
@@ -82,7 +96,7 @@ impl LoadedModel {
         let analysed = |reading| {
             semantics::analyse(
                 &parsed.document,
-                &prelude,
+                prelude,
                 &sources,
                 reading,
                 libraries,
@@ -113,10 +127,7 @@ impl LoadedModel {
             diagnostics.push(statistical_only(&errors[0], &sources));
             symbolic_refusal = Some(Rejection::new(errors, &sources));
         }
-        let warnings = Rejection::new(diagnostics, &sources).rendered;
-        let queries = parsed.document.queries;
-        let load_seconds = start.elapsed().as_secs_f64();
-        Ok(LoadedModel {
+        let model = LoadedModel {
             symbolic: CompiledModel::new(model),
             stochastic: None,
             sources,
@@ -128,14 +139,15 @@ impl LoadedModel {
                 .map(Path::to_owned)
                 .unwrap_or_default(),
             strategies: Vec::new(),
-            queries,
+            queries: parsed.document.queries,
             listed: Vec::new(),
-            warnings,
-            load_seconds,
+            warnings: Vec::new(),
+            load_seconds: 0.0,
             symbolic_refusal,
             libraries: libraries.clone(),
             pool: FIRST_POOL,
-        })
+        };
+        Ok((model, diagnostics))
     }
 
     /// The same model with other values of some of its constants: see [`constants::replaced`].
@@ -257,6 +269,17 @@ impl LoadedModel {
         span: Span,
         strategies: &[String],
     ) -> Result<(Query, Vec<String>), Rejection> {
+        let (query, warnings) = self.compile_found(reading, span, strategies)?;
+        Ok((query, Rejection::new(warnings, &self.sources).rendered))
+    }
+
+    /// The same with the warnings as values.
+    pub(super) fn compile_found(
+        &mut self,
+        reading: Reading,
+        span: Span,
+        strategies: &[String],
+    ) -> Result<(Query, Vec<Diagnostic>), Rejection> {
         let (parsed, mut diagnostics) = syntax::parse_query(span, &self.sources);
         if let Some(parsed) = parsed {
             let compiled = match reading {
@@ -273,7 +296,7 @@ impl LoadedModel {
             let (query, more) = model.compile_query(&parsed, &self.sources, strategies);
             diagnostics.extend(more);
             if let Some(query) = query {
-                return Ok((query, Rejection::new(diagnostics, &self.sources).rendered));
+                return Ok((query, diagnostics));
             }
         }
         Err(Rejection::new(diagnostics, &self.sources))

@@ -18,6 +18,7 @@ pub mod query_form;
 mod rejection;
 pub mod session;
 pub mod stored_state;
+pub mod survey;
 mod unsupported;
 
 pub use crate::search::reachability::report::MOST_THREADS;

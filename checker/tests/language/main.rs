@@ -8,6 +8,7 @@ mod checks;
 #[allow(dead_code, reason = "this program reads some of the files only")]
 mod corpus;
 mod explanations;
+mod names;
 mod semantics;
 mod syntax;
 mod tables;

@@ -18,5 +18,6 @@ pub mod shield_json;
 pub mod strategy_c;
 pub mod strategy_json;
 pub mod strategy_text;
+pub mod survey_json;
 pub mod text;
 pub mod trajectory_json;

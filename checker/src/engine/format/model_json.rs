@@ -464,15 +464,20 @@ pub fn queries(model: &LoadedModel, queries: &[QueryText]) -> Vec<Json> {
     queries.iter().map(one).collect()
 }
 
-fn query(query: &QueryText, sources: &SourceMap) -> Json {
-    let expect = query.expect.as_ref().map(|expect| match expect {
+/// The verdict that a file states for a query.
+pub(super) fn expected(expectation: &Expectation) -> Json {
+    match expectation {
         Expectation::True => json!("satisfied"),
         Expectation::False => json!("not satisfied"),
         Expectation::MaybeTrue => json!("maybe satisfied"),
         Expectation::MaybeFalse => json!("maybe not satisfied"),
         Expectation::Error => json!("error"),
         Expectation::Number(value) => json!(value),
-    });
+    }
+}
+
+fn query(query: &QueryText, sources: &SourceMap) -> Json {
+    let expect = query.expect.as_ref().map(expected);
     let place = sources.position(query.span);
     let options = query.options.iter();
     let options: serde_json::Map<String, Json> = options
