@@ -17,7 +17,7 @@ pub use declared::{Area, Names, Symbol, SymbolKind, Use};
 
 use crate::diagnostics::SourceMap;
 use crate::syntax::ast;
-use resolver::Resolver;
+use resolver::{Reach, Resolver};
 
 /// The names of a model and of queries about it, which are asked in this order.
 pub fn names_of(
@@ -28,6 +28,7 @@ pub fn names_of(
 ) -> Names {
     let mut resolver = Resolver::new(sources);
     resolver.declarations(prelude);
+    resolver.enter(Reach::Walked);
     resolver.document(document);
     for query in queries {
         resolver.query(query);

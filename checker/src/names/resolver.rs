@@ -29,6 +29,9 @@ pub(super) enum Reach {
     Pieces,
 }
 
+/// The scopes of the language and of the model's global declarations, which are never left.
+const EVERYWHERE: usize = 2;
+
 #[derive(Debug)]
 struct Open {
     names: FxHashMap<String, usize>,
@@ -68,8 +71,7 @@ impl<'a> Resolver<'a> {
             names: Names::default(),
             shapes: Vec::new(),
             types: FxHashMap::default(),
-            // What the language declares, and what the model does.
-            open: vec![Open::new(Reach::Walked), Open::new(Reach::Walked)],
+            open: vec![Open::new(Reach::Walked)],
             used: FxHashSet::default(),
         }
     }
@@ -206,9 +208,9 @@ impl<'a> Resolver<'a> {
         self.shapes[symbol]
     }
 
-    /// The symbols that were found; the scopes that are still open reach to their ends.
+    /// The symbols that were found; the scopes that are still open end here.
     pub(super) fn into_names(mut self) -> Names {
-        while self.open.len() > 2 {
+        while self.open.len() > EVERYWHERE {
             self.leave();
         }
         for scope in &mut self.open {

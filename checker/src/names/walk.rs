@@ -16,12 +16,13 @@ const SHOWN_BYTES: usize = 60;
 impl Resolver<'_> {
     /// A whole model. The scope of the system section stays open, for queries.
     pub(super) fn document(&mut self, document: &Document) {
-        self.declarations(&document.declarations);
+        // Declarations of dynamic templates stand before the templates.
         let symbols: Vec<usize> = document
             .templates
             .iter()
             .map(|one| self.template_name(one))
             .collect();
+        self.declarations(&document.declarations);
         for (template, symbol) in document.templates.iter().zip(symbols) {
             self.template(template, symbol);
         }
@@ -59,8 +60,8 @@ impl Resolver<'_> {
             let texts = [&location.invariant, &location.exponential_rate];
             self.values(texts.into_iter().flatten());
         }
-        if let Some(initial) = &template.initial {
-            self.location_use(initial);
+        for name in template.initial.iter().chain(&template.marked) {
+            self.location_use(name);
         }
         for edge in &template.edges {
             self.edge(edge);

@@ -472,6 +472,8 @@ pub struct Template {
     pub branchpoints: Vec<Branchpoint>,
     /// The identifier of the initial location; `None` was reported.
     pub initial: Option<Name>,
+    /// The names of locations behind `commit` and `urgent`, in textual models.
+    pub marked: Vec<Name>,
     /// Its edges and the legs of its branch points, in file order.
     pub edges: Vec<Edge>,
 }

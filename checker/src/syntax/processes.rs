@@ -274,7 +274,8 @@ impl Parser<'_> {
             }
         }
         self.expect(TokenKind::RightBrace, "at the end of the process");
-        self.set_marks(marks, &mut template.locations);
+        self.set_marks(&marks, &mut template.locations);
+        template.marked = marks.into_iter().map(|(_, name)| name).collect();
         if template.initial.is_none() {
             let message = format!("process `{}` has no initial location", template.name.text);
             self.report_earlier(
@@ -401,7 +402,7 @@ impl Parser<'_> {
     }
 
     /// Sets the marks once all locations are known.
-    fn set_marks(&mut self, marks: Vec<(Mark, Name)>, locations: &mut [Location]) {
+    fn set_marks(&mut self, marks: &[(Mark, Name)], locations: &mut [Location]) {
         let index: HashMap<String, usize> = locations
             .iter()
             .enumerate()
