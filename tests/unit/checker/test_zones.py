@@ -11,8 +11,9 @@ import pytest
 from matplotlib.patches import Patch
 
 from ntagen import checker
+from ntagen.checker.picture.halves import Axes, Half, clipped
 from ntagen.checker.picture.page import WAIT, Svg
-from ntagen.checker.picture.zones import Area, Axes, Half, clipped, zones_picture
+from ntagen.checker.picture.zones import Area, zones_picture
 from ntagen.checker.strategy import Strategy
 from ntagen.checker.winning import zones_chart
 from ntagen.cli import main
