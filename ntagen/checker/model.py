@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         Variable,
     )
     from ntagen.checker.policy import Follower, Policy
-    from ntagen.checker.runs import Choose, Run
+    from ntagen.checker.runs import Choose, Run, Walk
     from ntagen.checker.state_space import StateSpace
     from ntagen.checker.states import Simulation, SymbolicState
     from ntagen.checker.stepwise import StepwiseRuns
@@ -597,7 +597,7 @@ class Model:
                 raise InputError("the strategy does not belong to this model")
             return strategy.simulate(steps, seed)
         with failing():
-            return simulated(_checker.walk_exactly(self._raw), steps, seed, choose)
+            return simulated(self.walk_exactly(), steps, seed, choose)
 
     def states(
         self,
@@ -691,12 +691,23 @@ class Model:
             engine: What runs the code of the model; states do not depend on it.
 
         Raises:
+            RejectedError: The model has a meaning in random runs only.
             ModelError: The initial state cannot be computed.
         """
         from ntagen.checker.states import Simulation
 
-        with failing():
+        with rejecting(), failing():
             return Simulation(_checker.simulate(self._raw, engine), self._edges)
+
+    def walk_exactly(self) -> Walk:
+        """Starts a walk with exact times through the model from its initial state.
+
+        Raises:
+            RejectedError: The model has a meaning in random runs only.
+            ModelError: The initial state cannot be computed.
+        """
+        with rejecting(), failing():
+            return _checker.walk_exactly(self._raw)
 
 
 def load(text: str, path: str = "", *, allow_external: Sequence[str | Path] = ()) -> Model:

@@ -103,6 +103,17 @@ class Simulation:
         with failing():
             return tuple(step_of(self._edges, step) for step in self._raw.moves())
 
+    def numbered_moves(self) -> list[list[tuple[int, int, int, list[int]]]]:
+        """The moves in the same order: process, edge, leg and select values of each edge.
+
+        The numbers are those of ``Model.network_json``.
+
+        Raises:
+            ModelError: The model fails in computing one.
+        """
+        with failing():
+            return self._raw.moves()
+
     def take(self, index: int) -> None:
         """Takes the move with this index.
 

@@ -76,32 +76,66 @@ def draw_all(diagrams: Sequence[Diagram]) -> Svg:
     )
 
 
+def drawn_in_parts(diagram: Diagram) -> str:
+    """Draws a template for a page that lights single parts of it, without heading and paper.
+
+    Returns:
+        An SVG document, as in `draw`. Locations, edges and labels have these words as classes, and
+        what belongs to a location or an edge is in a group whose ``data-number`` is its place in
+        the list of the diagram.
+    """
+    drawn = placed(diagram)
+    left, top, right, bottom = (round(one) for one in _bounds(drawn))
+    box = (left - MARGIN, top - MARGIN, right - left + 2 * MARGIN, bottom - top + 2 * MARGIN)
+    size = f'width="{box[2]}" height="{box[3]}" viewBox="{" ".join(map(str, box))}"'
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-size="{_FONT_SIZE}">',
+        *_body(drawn, grouped=True),
+        "</svg>",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def _heading(diagram: Diagram) -> str:
     if not diagram.parameters:
         return diagram.name
     return f"{diagram.name}({', '.join(diagram.parameters)})"
 
 
-def _body(diagram: Diagram) -> Iterator[str]:
-    """Draws edges first, then locations, then labels on a light background."""
+def _body(diagram: Diagram, *, grouped: bool = False) -> Iterator[str]:
+    """Draws edges first, then locations, then labels on a light background.
+
+    With `grouped`, parts are in groups as `drawn_in_parts` says, and backgrounds are the page's.
+    """
     positions = positions_of(diagram)
     radii = {one.id: _radius(one) for one in diagram.locations}
     radii |= {one.id: float(BRANCH_POINT_RADIUS) for one in diagram.branch_points}
     branch_ids = {one.id for one in diagram.branch_points}
-    for edge in diagram.edges:
+    for number, edge in enumerate(diagram.edges):
         if edge.source in positions and edge.target in positions:
             path = [positions[edge.source], *edge.nails, positions[edge.target]]
             dashed = not edge.controllable or edge.source in branch_ids
-            yield from _arrow(edge, path, radii[edge.source], radii[edge.target], dashed=dashed)
+            arrow = _arrow(edge, path, radii[edge.source], radii[edge.target], dashed=dashed)
+            yield from _group("edge", number, arrow) if grouped else arrow
     for point in diagram.branch_points:
         yield from _branch_point(point)
-    for location in diagram.locations:
-        yield from _circle(location)
-    labels = [(corner, text, _COLORS[kind]) for corner, kind, text in drawn_labels(diagram)]
-    yield '<g stroke="#ffffff" stroke-width="3" stroke-linejoin="round">'
-    yield from (_text(corner, text, "#ffffff") for corner, text, _ in labels)
+    for number, location in enumerate(diagram.locations):
+        circle = _circle(location)
+        yield from _group("location", number, circle) if grouped else circle
+    labels = list(drawn_labels(diagram))
+    if not grouped:
+        yield '<g stroke="#ffffff" stroke-width="3" stroke-linejoin="round">'
+        yield from (_text(corner, text, "#ffffff") for corner, _, text in labels)
+        yield "</g>"
+    for corner, kind, text in labels:
+        label = _text(corner, text, _COLORS[kind])
+        yield f'<g class="label {kind}">{label}</g>' if grouped else label
+
+
+def _group(kind: str, number: int, parts: Iterator[str]) -> Iterator[str]:
+    yield f'<g class="{kind}" data-number="{number}">'
+    yield from parts
     yield "</g>"
-    yield from (_text(*label) for label in labels)
 
 
 def _radius(location: Location) -> float:
