@@ -95,6 +95,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "build": {"errors", "files", "checker", "checker.picture"},
     "verifyta": {"errors", "files", "checker"},
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
+    "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}
+    | {"checker.picture", "checker.play", "checker.queries", "checker.runs", "checker.strategy"},
     "serve": {"errors"},
     "watch": {"drive", "errors", "plan", "plot", "scene", "serve", "shapes"},
     "editor": {"nsl", "parameters", "values", "version"},
@@ -167,7 +169,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "version",
     }
     | {"checker.picture", "report", "system"}
-    | {"editor", "serve", "verifyta", "watch"}
+    | {"editor", "serve", "simulator", "verifyta", "watch"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
@@ -260,7 +262,7 @@ ONLY_IN: dict[str, set[str]] = {
     "datetime": {"drive", "cli"},
     # What must not happen by itself: random numbers have a seed, and are drawn by the simulation
     # and for random tasks.
-    "random": {"needle", "drive", "experiment", "checker.runs", "checker.play"},
+    "random": {"needle", "drive", "experiment", "checker.runs", "checker.play", "simulator"},
 }
 """By library: the rooms that may import it. Libraries that are not listed may be used anywhere."""
 

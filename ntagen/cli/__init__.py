@@ -60,6 +60,9 @@ COMMANDS: Final = {
 }
 """The commands in the order of the help, each with its module below here and its line there."""
 
+HIDDEN: Final = {"simulate": "models.simulate"}
+"""The commands that only other parts of this program run, each with its module."""
+
 INTERNAL_ERROR: Final = 70
 PIPE_CLOSED: Final = 141
 """The code that a shell gives a program that SIGPIPE ends."""
@@ -84,11 +87,10 @@ class _CommandTable(click.Group):
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
+        module = COMMANDS[cmd_name][0] if cmd_name in COMMANDS else HIDDEN.get(cmd_name)
+        if module is None:
             return None
-        command: click.Command = importlib.import_module(
-            f"{__name__}.{COMMANDS[cmd_name][0]}"
-        ).command
+        command: click.Command = importlib.import_module(f"{__name__}.{module}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -74,7 +74,7 @@ def command(
       ntagen serve model.xml
       ntagen serve --port 8080 --timeout 10min --memory 4GiB
     """  # noqa: D301  click wants the control character
-    from ntagen.serve.jobs import Limits
+    from ntagen.serve.processes import Limits
     from ntagen.serve.server import Server
 
     limits = Limits(

@@ -10,12 +10,9 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 import secrets
 import shutil
-import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -24,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from ntagen.serve.loopback import Refusal
-from ntagen.values import dataclass
+from ntagen.serve.processes import Limits, ended, started
 
 MODELS: Final = (".xml", ".xta", ".ta")
 ENDINGS: Final = (*MODELS, ".nsl", ".mcap")
@@ -45,34 +42,11 @@ _LATE: Final = 0.1
 """A worker ends by itself when its time is over. One that has not even then is killed this much
 later, in seconds or in parts of its time, whichever is more."""
 
-_MEMORY_BESIDE: Final = 4 << 30
-"""A worker may have so much address space beside the memory of its search."""
-
-_FILE_BYTES: Final = 256 << 20
 _TEXT_BYTES: Final = 4 << 20
 """So much of what a worker says is passed on."""
 
 _JOBS_KEPT: Final = 50
 _NAME_CHARACTERS: Final = 80
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """What one server allows.
-
-    Attributes:
-        timeout_s: A worker ends after this time; one that does not is killed a little later.
-        memory_bytes: A worker ends when it takes this much.
-        upload_bytes: The greatest size of a file.
-        jobs: At most so many workers at a time.
-        files: At most so many files are kept; the oldest goes first.
-    """
-
-    timeout_s: float = 60.0
-    memory_bytes: int = 1 << 30
-    upload_bytes: int = 32 << 20
-    jobs: int = 2
-    files: int = 20
 
 
 class File:
@@ -101,17 +75,7 @@ class Job:
         self._is_cancelled = False
         self._is_late = False
         with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err:
-            self._process = subprocess.Popen(
-                # -P: a file in this folder is no module of Python.
-                [sys.executable, "-P", "-m", "ntagen", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=err,
-                cwd=folder,
-                env={**os.environ, "NO_COLOR": "1", "PYTHONPATH": _import_path()},
-                start_new_session=True,
-            )
-        _restrict(self._process.pid, limits)
+            self._process = started(arguments, folder, limits, subprocess.DEVNULL, out, err)
         late_s = max(_LATE_S, _LATE * limits.timeout_s)
         self._timer = threading.Timer(limits.timeout_s + late_s, self._kill_late)
         self._timer.daemon = True
@@ -131,7 +95,7 @@ class Job:
         """Ends the worker, if it runs."""
         if self.is_running:
             self._is_cancelled = True
-            self._kill()
+            ended(self._process)
 
     def report(self) -> dict[str, Any]:
         """How far it is, and what it found."""
@@ -147,9 +111,9 @@ class Job:
         elif code < 0:
             message = f"{message}the worker was ended by signal {-code}; it may lack memory\n"
         found |= {"exit": code, "message": message.strip(), "answers": self._answers()}
-        for name in ("trace", "strategy"):
-            if (self._folder / name).is_file():
-                found[name] = self._said(name)
+        for name, file in (("trace", "trace"), ("strategy", "strategy"), ("steps", "trace.json")):
+            if (self._folder / file).is_file():
+                found[name] = self._said(file)
         found["picture"] = self.picture() is not None
         return found
 
@@ -172,15 +136,7 @@ class Job:
     def _kill_late(self) -> None:
         if self.is_running:
             self._is_late = True
-            self._kill()
-
-    def _kill(self) -> None:
-        with contextlib.suppress(OSError):
-            if hasattr(os, "killpg"):
-                os.killpg(self._process.pid, signal.SIGKILL)
-            else:
-                self._process.kill()
-        self._process.wait()
+            ended(self._process)
 
 
 class Workshop:
@@ -297,7 +253,9 @@ def arguments_for(file: File, wish: dict[str, Any], limits: Limits) -> list[str]
         evidence = []
         if query is not None:
             is_game = "control" in query and "E<> control:" not in query
-            evidence = ["--strategy", "strategy"] if is_game else ["--trace", "trace"]
+            # Steps are for the simulator.
+            trace = "trace.json" if wish.get("steps") else "trace"
+            evidence = ["--strategy", "strategy"] if is_game else ["--trace", trace]
         return ["check", path, "--format", "json", *asked, *limited, *evidence]
     if action == "plot":
         picture = wish.get("picture")
@@ -317,21 +275,3 @@ def _can_be(picture: str, file: File) -> bool:
     if picture == "scene":
         return file.kind != "model"
     return file.kind != "run"
-
-
-def _import_path() -> str:
-    """Where a worker finds this package, also if it is not installed but used in place."""
-    here = str(Path(__file__).parents[2])
-    return os.pathsep.join(dict.fromkeys([here, *filter(None, [os.environ.get("PYTHONPATH")])]))
-
-
-def _restrict(process: int, limits: Limits) -> None:
-    """Limits what a worker may take, where the system can."""
-    if sys.platform != "linux":
-        return
-    import resource
-
-    most = limits.memory_bytes + _MEMORY_BESIDE
-    with contextlib.suppress(OSError):
-        resource.prlimit(process, resource.RLIMIT_AS, (most, most))
-        resource.prlimit(process, resource.RLIMIT_FSIZE, (_FILE_BYTES, _FILE_BYTES))

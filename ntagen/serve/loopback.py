@@ -126,7 +126,9 @@ class Request(BaseHTTPRequestHandler):
             else:
                 self.json({"error": refusal.message}, refusal.status)
 
+    # Methods that nobody needs are refused in words, like all else, and only to the user.
     do_HEAD = do_POST = do_DELETE = do_GET  # noqa: N815  the names of the standard library
+    do_OPTIONS = do_PUT = do_PATCH = do_TRACE = do_GET  # noqa: N815
 
     def log_message(self, format: str, *args: object) -> None:
         """Says nothing: the address has the token."""

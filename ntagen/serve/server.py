@@ -6,21 +6,17 @@ The page loads nothing from elsewhere, and the work is done by processes of thei
 from __future__ import annotations
 
 import json
-import secrets
-from importlib import resources
 from typing import Any, Final
 
 from ntagen.errors import InputError
-from ntagen.serve.jobs import ENDINGS, File, Job, Limits, Workshop
-from ntagen.serve.loopback import STYLED, Listener, Refusal, Request
+from ntagen.serve.jobs import File, Workshop
+from ntagen.serve.loopback import Listener, Refusal, Request
+from ntagen.serve.pages import send_page, send_part, send_picture, send_simulator
+from ntagen.serve.processes import Limits
+from ntagen.serve.simulations import Simulations
 
 _WISH_BYTES: Final = 1 << 18
 _DISCARDED_BYTES: Final = 4 << 30
-_TYPES: Final = {".svg": "image/svg+xml", ".html": "text/html; charset=utf-8"}
-_PAGE: Final = (
-    "default-src 'none'; style-src 'nonce-{0}'; script-src 'nonce-{0}'; connect-src 'self'; "
-    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
 
 
 class Server:
@@ -46,6 +42,7 @@ class Server:
         self.token, self.address = self._http.token, self._http.address
         self.port: int = self._http.server_port
         self.shop = Workshop(limits)
+        self.simulations = Simulations(limits)
         self._first: list[str] = []
 
     def open(self, name: str, data: bytes) -> None:
@@ -78,6 +75,7 @@ class Server:
     def end(self) -> None:
         """The same once `serve` has ended."""
         self._http.server_close()
+        self.simulations.close()
         self.shop.close()
 
     def route(self, request: Request, method: str, path: list[str], values: dict[str, str]) -> None:
@@ -89,7 +87,7 @@ class Server:
         shop = self.shop
         match method, path:
             case "GET", []:
-                _send_page(request)
+                send_page(request)
             case "GET", ["api", "files"]:
                 request.json({"files": self.first})
             case "POST", ["api", "files"]:
@@ -97,6 +95,8 @@ class Server:
                     values.get("name", ""), _body(request, shop.limits, shop.limits.upload_bytes)
                 )
                 request.json(told(number, shop.file(number)), 201)
+            case "GET", ["api", "files", number]:
+                request.json(told(number, shop.file(number)))
             case "POST", ["api", "files", number, "jobs"]:
                 request.json({"job": shop.start(number, _wish(request, shop.limits))}, 201)
             case "GET", ["api", "jobs", identity]:
@@ -105,37 +105,40 @@ class Server:
                 shop.job(identity).cancel()
                 request.json(shop.job(identity).report())
             case "GET", ["api", "jobs", identity, "picture"]:
-                _send_picture(request, shop.job(identity), is_file="file" in values)
+                send_picture(request, shop.job(identity), is_file="file" in values)
             case _:
-                raise Refusal(404, "there is nothing here")
+                self._route_simulations(request, method, path)
+
+    def _route_simulations(self, request: Request, method: str, path: list[str]) -> None:
+        """Answers a request of the page of simulations."""
+        simulations, limits = self.simulations, self.shop.limits
+        match method, path:
+            case "GET", ["simulator"]:
+                send_simulator(request, self.token)
+            case "GET", ["simulator", name]:
+                send_part(request, name)
+            case "POST", ["api", "files", number, "simulations"]:
+                request.json({"simulation": simulations.add(self.shop.file(number))}, 201)
+            case "POST", ["api", "simulations", identity]:
+                wish = _wish(request, limits, limits.upload_bytes)
+                request.json(simulations.ask(identity, wish))
+            case "GET", ["api", "simulations", identity]:
+                request.json({"name": simulations.get(identity).file.name})
+            case "DELETE", ["api", "simulations", identity]:
+                simulations.get(identity).end()
+                request.json({})
+            case _:
+                raise Refusal(_status(method), "there is nothing here")
+
+
+def _status(method: str) -> int:
+    """The status for what is not there; methods without any use are not allowed."""
+    return 404 if method in ("GET", "POST", "DELETE") else 405
 
 
 def told(number: str, file: File) -> dict[str, str]:
     """What the page knows of a file."""
     return {"file": number, "name": file.name, "kind": file.kind}
-
-
-def _send_page(request: Request) -> None:
-    nonce = secrets.token_urlsafe(16)
-    text = resources.files("ntagen.serve").joinpath("page.html").read_text("utf-8")
-    text = text.replace("NONCE", nonce).replace("ENDINGS", ", ".join(ENDINGS))
-    request.send(200, "text/html; charset=utf-8", text.encode(), _PAGE.format(nonce))
-
-
-def _send_picture(request: Request, job: Job, *, is_file: bool) -> None:
-    path = job.picture()
-    if path is None:
-        raise Refusal(404, "there is no picture")
-    data, kind = path.read_bytes(), _TYPES[path.suffix]
-    if is_file:
-        request.send(200, kind, data)
-    elif path.suffix == ".html":
-        # The page of a scene is a program of its own; its frame keeps it apart from this page.
-        request.send(200, kind, data, f"{STYLED}; script-src 'unsafe-inline'")
-    else:
-        # On a page of its own, a browser would make a large picture too small to read.
-        around = b"<!DOCTYPE html><meta charset=utf-8><title>picture</title>"
-        request.send(200, _TYPES[".html"], around + data)
 
 
 def _body(request: Request, limits: Limits, most: int) -> bytes:
@@ -154,10 +157,10 @@ def _body(request: Request, limits: Limits, most: int) -> bytes:
     return data
 
 
-def _wish(request: Request, limits: Limits) -> dict[str, Any]:
+def _wish(request: Request, limits: Limits, most: int = _WISH_BYTES) -> dict[str, Any]:
     try:
-        wish = json.loads(_body(request, limits, _WISH_BYTES))
-    except ValueError:
+        wish = json.loads(_body(request, limits, most))
+    except (ValueError, RecursionError):
         wish = None
     if not isinstance(wish, dict):
         raise Refusal(400, "the request is no object of JSON")

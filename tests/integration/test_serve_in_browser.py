@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from ntagen.serve.jobs import Limits
+from ntagen.serve.processes import Limits
 from ntagen.serve.server import Server
 from tests.browsers import NEEDS_BROWSER
 

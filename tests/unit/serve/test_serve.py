@@ -23,8 +23,9 @@ import pytest
 from ntagen.cli import main
 from ntagen.errors import InputError
 from ntagen.serve import jobs
-from ntagen.serve.jobs import File, Limits, Workshop, arguments_for
+from ntagen.serve.jobs import File, Workshop, arguments_for
 from ntagen.serve.loopback import Refusal
+from ntagen.serve.processes import Limits
 from ntagen.serve.server import Server
 
 ROOT = Path(__file__).parents[3]

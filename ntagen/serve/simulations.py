@@ -1,0 +1,267 @@
+"""The simulations of `ntagen serve`: each has a process, which answers in lines of JSON.
+
+What a simulation needs to be taken up again (its choices, and where the page stands) is kept here.
+So a process may end at any time, by a limit or because others need the room: the next request
+starts another one, which makes the same choices again, and nothing is lost.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import queue
+import secrets
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any, Final
+
+from ntagen.serve.jobs import File
+from ntagen.serve.loopback import Refusal
+from ntagen.serve.processes import Limits, ended, started
+
+_LATE: Final = 1.1
+"""A process that answers no sooner than after its time, and this part of it more, is killed."""
+
+_LEAST_S: Final = 3.0
+"""It has at least this much time for an answer, in which it also loads the model."""
+
+_RECORDS: Final = 500
+"""So many simulations are kept; those that were not used for the longest time go first."""
+
+_KEPT: Final = ("mode", "game", "advised", "note", "position")
+
+
+class _Gone(Exception):  # noqa: N818  it reports an event, not an error
+    """The process ended without an answer; the text says why."""
+
+
+class _Worker:
+    """The process of a simulation."""
+
+    def __init__(self, file: File, limits: Limits) -> None:
+        # One part of the time is for the process to end by itself.
+        self._wait_s = max(_LEAST_S, _LATE * limits.timeout_s)
+        options = [f"--timeout={limits.timeout_s}s", f"--memory={limits.memory_bytes}B"]
+        # Warnings about the model are told by the page of queries.
+        pipes = subprocess.PIPE, subprocess.PIPE, subprocess.DEVNULL
+        self._process = started(
+            ["simulate", str(file.path), *options], file.path.parent, limits, *pipes
+        )
+        self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        threading.Thread(target=self._read, daemon=True).start()
+        self.is_cancelled = False
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
+        """What it answers.
+
+        Raises:
+            _Gone: It does not.
+        """
+        stdin = self._process.stdin
+        if stdin is not None:
+            # If it has ended, the answer says so.
+            with contextlib.suppress(OSError):
+                stdin.write(json.dumps(request).encode() + b"\n")
+                stdin.flush()
+        try:
+            line = self._answers.get(timeout=self._wait_s)
+        except queue.Empty:
+            self.end()
+            raise _Gone(f"it did not answer within {self._wait_s:g} s") from None
+        if not line:
+            self.end()
+            if self.is_cancelled:
+                raise _Gone("it was cancelled")
+            code = self._process.returncode
+            raise _Gone(f"it ended with {code}; it may lack memory")
+        answer: dict[str, Any] = json.loads(line)
+        return answer
+
+    def end(self) -> None:
+        """Kills it."""
+        ended(self._process)
+        with contextlib.suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+
+    def _read(self) -> None:
+        out = self._process.stdout
+        if out is not None:
+            with out:
+                for line in out:
+                    self._answers.put(line)
+        # An empty line says that no more come.
+        self._answers.put(b"")
+
+
+class Simulation:
+    """A simulation, with or without a process.
+
+    Attributes:
+        file: The model.
+        lock: Whoever asks holds it.
+        worker: Its process, if it has one.
+        used: When it was last asked.
+    """
+
+    def __init__(self, file: File) -> None:
+        self.file = file
+        self.lock = threading.Lock()
+        self.worker: _Worker | None = None
+        self.used = time.monotonic()
+        self._kept: dict[str, Any] = {}
+
+    def keep(self, news: dict[str, Any]) -> None:
+        """Keeps what a view says about taking the simulation up again."""
+        choices = self._kept.get("choices", [])[: news["known"]] + news["choices"]
+        self._kept = {name: news[name] for name in _KEPT} | {"choices": choices}
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """The request that takes it up again; empty if it is at its start."""
+        return {"do": "restore", **self._kept} if self._kept else {}
+
+    def end(self) -> None:
+        """Ends its process."""
+        if self.worker is not None:
+            self.worker.is_cancelled = True
+            self.worker.end()
+
+
+class Simulations:
+    """The simulations of a server."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._all: dict[str, Simulation] = {}
+        self._lock = threading.Lock()
+
+    def close(self) -> None:
+        """Ends all processes."""
+        with self._lock:
+            for one in self._all.values():
+                one.end()
+
+    def add(self, file: File) -> str:
+        """Makes a simulation of a model; returns its id.
+
+        Raises:
+            Refusal: The file is no model.
+        """
+        if file.kind == "run":
+            raise Refusal(400, f"{file.name} is a run, and only models are simulated")
+        identity = secrets.token_hex(8)
+        with self._lock:
+            for old in sorted(self._all, key=lambda one: self._all[one].used)[:-_RECORDS]:
+                self._all.pop(old).end()
+            self._all[identity] = Simulation(file)
+        return identity
+
+    def get(self, identity: str) -> Simulation:
+        """A simulation by its id.
+
+        Raises:
+            Refusal: There is none.
+        """
+        found = self._all.get(identity)
+        if found is None:
+            raise Refusal(
+                404,
+                "this simulation is not kept any more\nhint: open the model again, and Simulate",
+            )
+        return found
+
+    def ask(self, identity: str, request: dict[str, Any]) -> dict[str, Any]:
+        """What a simulation answers; ``resumed`` says that it has another process than before.
+
+        Raises:
+            Refusal: There is no such simulation, the request is refused, or no process answers.
+        """
+        one = self.get(identity)
+        with one.lock:
+            one.used = time.monotonic()
+            try:
+                worker, is_resumed = self._worker_of(one)
+                answer = _told(worker.ask(request))
+            except _Gone as why:
+                one.worker = None
+                raise Refusal(
+                    503,
+                    f"the process of this simulation has ended: {why}\n"
+                    "hint: the way until here is kept; take another step, or start the server "
+                    "with greater limits: ntagen serve --timeout 5min --memory 4GiB",
+                ) from None
+            finally:
+                one.used = time.monotonic()
+            view = answer.get("view", answer)
+            if "keep" in view:
+                one.keep(view.pop("keep"))
+        return answer | ({"resumed": True} if is_resumed else {})
+
+    def _worker_of(self, one: Simulation) -> tuple[_Worker, bool]:
+        """The process of a simulation, and whether it has just taken up what was kept.
+
+        Raises:
+            Refusal: Too many others compute, or what was kept is not possible.
+            _Gone: The process does not answer.
+        """
+        if one.worker is not None and one.worker.is_running:
+            return one.worker, False
+        self._make_room()
+        one.worker = _Worker(one.file, self._limits)
+        if one.kept:
+            try:
+                _told(one.worker.ask(one.kept))
+            except Refusal:
+                # A process that is not where the page is must answer nothing else.
+                one.worker.end()
+                one.worker = None
+                raise
+        return one.worker, bool(one.kept)
+
+    def _make_room(self) -> None:
+        """Ends the process that was not used for the longest time, if there are too many."""
+        with self._lock:
+            running = [one for one in self._all.values() if one.worker is not None]
+            running.sort(key=lambda one: one.used)
+            excess = len(running) + 1 - self._limits.simulations
+            for one in running:
+                if excess <= 0:
+                    return
+                with _held(one.lock) as is_idle:
+                    if is_idle and one.worker is not None:
+                        one.worker.end()
+                        one.worker = None
+                        excess -= 1
+        if excess > 0:
+            raise Refusal(
+                429,
+                f"{self._limits.simulations} simulations compute already\n"
+                "hint: wait for one, and try again",
+            )
+
+
+@contextlib.contextmanager
+def _held(lock: threading.Lock) -> Iterator[bool]:
+    """Holds a lock if nobody else does; gives whether it does."""
+    is_held = lock.acquire(blocking=False)
+    try:
+        yield is_held
+    finally:
+        if is_held:
+            lock.release()
+
+
+def _told(answer: dict[str, Any]) -> dict[str, Any]:
+    """What a process says, or its message as a refusal."""
+    if "ok" not in answer:
+        raise Refusal(400, str(answer.get("error", "there is no answer")))
+    found: dict[str, Any] = answer["ok"]
+    return found

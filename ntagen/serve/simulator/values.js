@@ -1,0 +1,71 @@
+// Variables, clocks and the constraints of a zone.
+import { $, made, say } from "dom.js";
+import { recalled, remember } from "store.js";
+
+const MOST_ROWS = 400;
+
+let drawnNames = new Set(), changed = null, rows = new Map(), clockRows = new Map(), before = {};
+
+export function begin(changing) {
+  changed = changing;
+  drawnNames = new Set(recalled("drawn", []));
+  $("find-value").oninput = filter;
+}
+
+export const chosen = () => [...drawnNames];
+
+export function show(view) {
+  const { variables, clocks, zone } = view.state;
+  fill($("variables").tBodies[0], rows, variables, true);
+  $("clocks").hidden = !clocks;
+  $("constraints").hidden = !zone;
+  say($("clocks-title"), zone ? "Zone" : "Clocks");
+  if (clocks) fill($("clocks").tBodies[0], clockRows, clocks, false);
+  if (zone) {
+    const texts = zone.length ? zone : ["every clock has any value"];
+    $("constraints").replaceChildren(...texts.map((text) => made("li", {}, text)));
+  }
+  before = { ...variables, ...clocks };
+}
+
+// Only what changes is written.
+function fill(body, known, values, canDraw) {
+  const names = Object.keys(values);
+  if (names.length !== known.size || names.some((name) => !known.has(name))) {
+    known.clear();
+    body.replaceChildren(...names.map((name) => rowOf(known, name, canDraw)));
+    filter();
+  }
+  for (const name of names) {
+    const { row, cell } = known.get(name), text = String(values[name]);
+    say(cell, text);
+    row.classList.toggle("changed", canDraw && name in before && String(before[name]) !== text);
+  }
+}
+
+function rowOf(known, name, canDraw) {
+  const cell = made("td"), row = made("tr");
+  if (canDraw) {
+    const box = made("input", { type: "checkbox", "aria-label": `draw ${name} over time` });
+    box.checked = drawnNames.has(name);
+    box.onchange = () => {
+      if (box.checked) drawnNames.add(name);
+      else drawnNames.delete(name);
+      remember("drawn", chosen());
+      changed();
+    };
+    row.append(made("td", {}, box));
+  }
+  row.append(made("td", {}, name), cell);
+  known.set(name, { row, cell });
+  return row;
+}
+
+function filter() {
+  const wanted = $("find-value").value.trim().toLowerCase();
+  let shown = 0;
+  for (const [name, { row }] of rows) {
+    row.hidden = !name.toLowerCase().includes(wanted) || shown >= MOST_ROWS;
+    if (!row.hidden) shown += 1;
+  }
+}
