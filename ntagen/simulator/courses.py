@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Final, Protocol
+from zlib import compress, decompress
 
 from ntagen.checker import Model
 from ntagen.checker.errors import failing
@@ -23,7 +24,7 @@ from ntagen.values import dataclass
 _DELAY: Final = re.compile(r" *-?[0-9]{1,18}([./][0-9]{1,18})? *")
 
 State = dict[str, Any]
-"""A state for the page: ``locations`` by number, ``variables``, and ``clocks`` or ``zone``."""
+"""A state: ``locations`` by number, ``variables``, and ``clocks``; or ``zone``, which is packed."""
 
 Choice = dict[str, Any]
 """What is done in a state: ``move`` is the index of a move, ``delay`` a text such as ``3/2``."""
@@ -116,7 +117,7 @@ class SymbolicCourse:
         return {
             "locations": self._network.located(self._walk.locations),
             "variables": self._walk.variables,
-            "zone": list(self._walk.zone),
+            "zone": compress("\n".join(self._walk.zone).encode(), 1),
         }
 
     def offer(self) -> Offer:
@@ -232,6 +233,15 @@ def _strict(before: Window, after: Window) -> Window:
     if before.last is not None and after.last is not None and after.last != before.last:
         found = replace(found, last=2 * after.last - before.last, before_last=True)
     return found
+
+
+def zone_of(state: State) -> list[str] | None:
+    """The constraints of a symbolic state; ``None`` for exact clock values.
+
+    With a hundred clocks they are thousands, so a history keeps them packed.
+    """
+    packed = state.get("zone")
+    return None if packed is None else decompress(packed).decode().splitlines()
 
 
 def index_of(choice: Choice) -> int:

@@ -16,7 +16,7 @@ from ntagen.checker.queries import form_of
 from ntagen.checker.strategy import Strategy
 from ntagen.errors import InputError, NtagenError
 from ntagen.simulator import drawings, random_runs, traces
-from ntagen.simulator.courses import Course, ExactCourse, SymbolicCourse
+from ntagen.simulator.courses import Course, ExactCourse, SymbolicCourse, zone_of
 from ntagen.simulator.following import Timed, followed, merged, timed
 from ntagen.simulator.games import Adviser, GameCourse
 from ntagen.simulator.history import History
@@ -251,7 +251,7 @@ class Session:
         return self._view(0)
 
     def _zone(self, request: Request) -> Answer:
-        zone = self._history.here.state.get("zone")
+        zone = zone_of(self._history.here.state)
         if zone is None:
             raise InputError("a state with exact clock values has no zone")
         x, y = str(request.get("x")), str(request.get("y"))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from ntagen.checker.play import Window
 from ntagen.errors import ModelError
-from ntagen.simulator.courses import Move, Offer
+from ntagen.simulator.courses import Move, Offer, State, zone_of
 from ntagen.simulator.games import Adviser
 from ntagen.simulator.history import Entry, History
+
+MOST_CONSTRAINTS: Final = 200
+"""At most so many constraints of a zone are listed; nobody reads more."""
 
 
 def view(history: History, known: int, adviser: Adviser | None) -> dict[str, Any]:
@@ -33,7 +36,7 @@ def view(history: History, known: int, adviser: Adviser | None) -> dict[str, Any
         "position": history.position,
         "known": known,
         "steps": [_step(one) for one in new],
-        "state": here.state,
+        "state": _state(here.state),
         "time": str(here.time),
         "moves": [_move(one) for one in offer.moves],
         "end": offer.end,
@@ -47,6 +50,13 @@ def view(history: History, known: int, adviser: Adviser | None) -> dict[str, Any
             "choices": [one.done.choice for one in new if one.done is not None],
         },
     }
+
+
+def _state(state: State) -> dict[str, Any]:
+    zone = zone_of(state)
+    if zone is None:
+        return state
+    return state | {"zone": zone[:MOST_CONSTRAINTS], "more": len(zone[MOST_CONSTRAINTS:])}
 
 
 def _move(move: Move) -> dict[str, Any]:

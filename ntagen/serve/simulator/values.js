@@ -15,7 +15,7 @@ export function begin(changing) {
 export const chosen = () => [...drawnNames];
 
 export function show(view) {
-  const { variables, clocks, zone } = view.state;
+  const { variables, clocks, zone, more } = view.state;
   fill($("variables").tBodies[0], rows, variables, true);
   $("clocks").hidden = !clocks;
   $("constraints").hidden = !zone;
@@ -23,7 +23,7 @@ export function show(view) {
   if (clocks) fill($("clocks").tBodies[0], clockRows, clocks, false);
   if (zone) {
     const texts = zone.length ? zone : ["every clock has any value"];
-    $("constraints").replaceChildren(...texts.map((text) => made("li", {}, text)));
+    $("constraints").replaceChildren(...texts.map((text) => made("li", {}, text)), more ? made("li", { class: "note" }, `… and ${more} more; the picture shows any two clocks`) : "");
   }
   before = { ...variables, ...clocks };
 }
