@@ -31,6 +31,9 @@ def block(
         ModelError: The model fails in a run.
     """
     form = form_of(query)
+    if form is None and query.strip():
+        # It is no query at all; the engine says where it goes wrong.
+        model.check(query, timeout_s=timeout_s)
     if form is None or form.kind != "simulate":
         raise InputError(
             f"{query.strip() or 'this'} shows no runs\n"

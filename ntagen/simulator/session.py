@@ -219,6 +219,9 @@ class Session:
         """The winner's strategy of a game."""
         if query not in self._strategies:
             form = form_of(query)
+            if form is None and query.strip():
+                # It is no query at all; the engine says where it goes wrong.
+                self._model.check(query, timeout_s=self._timeout_s)
             if form is None or not form.is_game:
                 raise InputError(
                     f"{query.strip() or 'this'} is no game\n"

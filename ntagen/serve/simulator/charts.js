@@ -1,7 +1,7 @@
 // What stands below the processes: tabs, the charts of the history, and values over time.
 import { $, made, parsed } from "dom.js";
 import { linesPicture } from "lines.js";
-import { attempt, request } from "server.js";
+import { later } from "server.js";
 import { recalled, remember } from "store.js";
 import { chosen } from "values.js";
 import { numberOf } from "words.js";
@@ -42,35 +42,34 @@ export function show(now) {
   redraw();
 }
 
-let isDrawing = false, isStale = false;
-
-// While a picture is made, only one more waits: that of the newest state.
-export async function redraw() {
-  if (!view || !["gantt", "sequence", "series"].includes(selected)) return;
-  if (isDrawing) { isStale = true; return; }
-  isDrawing = true;
-  try { await (selected === "series" ? drawSeries() : drawChart(selected)); } finally { isDrawing = false; }
-  if (isStale) { isStale = false; await redraw(); }
+export function redraw() {
+  if (!view) return;
+  if (selected === "series") drawSeries();
+  else if (["gantt", "sequence"].includes(selected)) drawChart(selected);
 }
 
-async function drawChart(kind) {
-  let found;
-  try { found = parsed((await request({ do: "chart", kind })).svg); } catch (error) { found = made("p", { class: "warning" }, error.message); }
-  if (found.classList && found.localName === "svg") found.classList.add("chart");
+const warning = (error) => made("p", { class: "warning" }, error.message);
+
+function drawChart(kind) {
   const caption = view.mode === "symbolic" ? made("p", { class: "note" }, "Symbolic states have no times, so the steps are counted. Concrete shows a run with times.") : "";
-  $("panel-chart").replaceChildren(caption, found);
+  const put = (one) => $("panel-chart").replaceChildren(caption, one);
+  later("chart", { do: "chart", kind }, ({ svg }) => {
+    const chart = parsed(svg);
+    chart.classList.add("chart");
+    put(chart);
+  }, (error) => put(warning(error)));
 }
 
-async function drawSeries() {
-  const names = chosen();
+function drawSeries() {
+  const names = chosen(), put = (one) => $("panel-series").replaceChildren(one);
   if (!names.length) {
-    $("panel-series").replaceChildren(made("p", { class: "note" }, "Tick variables in the table at the right; they are drawn here along the steps."));
+    put(made("p", { class: "note" }, "Tick clocks or variables in the tables at the right; they are drawn here along the steps."));
     return;
   }
-  const found = await attempt(() => request({ do: "series", names }));
-  if (!found) return;
-  const curves = names.map((name) => ({ name, points: found.series[name] }));
-  const unit = found.timed ? "time in the model's unit" : "step";
-  const here = found.timed ? numberOf(view.time) : view.position;
-  $("panel-series").replaceChildren(linesPicture(curves, { unit, here, label: `Values over time of ${names.join(", ")}` }));
+  later("series", { do: "series", names }, (found) => {
+    const curves = names.map((name) => ({ name, points: found.series[name] }));
+    const unit = found.timed ? "time in the model's unit" : "step";
+    const here = found.timed ? numberOf(view.time) : view.position;
+    put(linesPicture(curves, { unit, here, label: `Values over time of ${names.join(", ")}` }));
+  }, (error) => put(warning(error)));
 }

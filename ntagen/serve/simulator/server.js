@@ -1,8 +1,9 @@
-// Asks the server. One request of this page runs at a time; the others wait in their order.
+// Asks the server. One request of this page runs at a time. Steps come before pictures, of which only
+// the newest of each kind is asked for, and only when no more steps come.
 import { $ } from "dom.js";
 
 const token = new URLSearchParams(location.search).get("token");
-const BUSY_MS = 250;
+const BUSY_MS = 250, QUIET_MS = 60;
 
 // The id of the simulation stands in the address, so that a reload shows the same one.
 export const identity = () => location.hash.slice(1);
@@ -19,27 +20,48 @@ export async function ask(method, path, body) {
   return value;
 }
 
-let last = Promise.resolve(), waiting = 0;
+let last = Promise.resolve(), waiting = 0, timer = null;
+const pictures = new Map();
 
 export const isIdle = () => waiting === 0;
 
 // Asks the simulation something; gives its answer.
 export function request(what) {
-  const own = last.then(() => asked(what));
+  waiting += 1;
+  const own = last.then(() => asked(what)).finally(() => { waiting -= 1; schedule(); });
   last = own.catch(() => {});
   return own;
 }
 
+// Asks for a picture of this kind when there is time; `show` gets the answer, `fail` an error.
+export function later(kind, what, show, fail) {
+  pictures.set(kind, { what, show, fail });
+  schedule();
+}
+
+// Asks for no picture of this kind any more.
+export const forget = (kind) => pictures.delete(kind);
+
+function schedule() {
+  clearTimeout(timer);
+  if (isIdle() && pictures.size) timer = setTimeout(next, QUIET_MS);
+}
+
+function next() {
+  const [[kind, { what, show, fail }]] = pictures;
+  pictures.delete(kind);
+  // If a newer one has come meanwhile, this one is out of date.
+  request(what).then((answer) => { if (!pictures.has(kind)) show(answer); }, fail);
+}
+
 async function asked(what) {
-  waiting += 1;
-  const timer = setTimeout(() => { $("busy").hidden = false; }, BUSY_MS);
+  const busy = setTimeout(() => { $("busy").hidden = false; }, BUSY_MS);
   try {
     const answer = await ask("POST", `/api/simulations/${identity()}`, JSON.stringify(what));
     if (answer.resumed) tell("The process of this simulation had ended. Another one has taken it up; nothing is lost.");
     return answer;
   } finally {
-    waiting -= 1;
-    clearTimeout(timer);
+    clearTimeout(busy);
     $("busy").hidden = true;
   }
 }

@@ -12,15 +12,16 @@ export function begin(changing) {
   $("find-value").oninput = filter;
 }
 
-export const chosen = () => [...drawnNames];
+// What is drawn over time: of the names that the state has.
+export const chosen = () => [...drawnNames].filter((name) => name in before);
 
 export function show(view) {
   const { variables, clocks, zone, more } = view.state;
-  fill($("variables").tBodies[0], rows, variables, true);
+  fill($("variables").tBodies[0], rows, variables);
   $("clocks").hidden = !clocks;
   $("constraints").hidden = !zone;
   say($("clocks-title"), zone ? "Zone" : "Clocks");
-  if (clocks) fill($("clocks").tBodies[0], clockRows, clocks, false);
+  if (clocks) fill($("clocks").tBodies[0], clockRows, clocks);
   if (zone) {
     const texts = zone.length ? zone : ["every clock has any value"];
     $("constraints").replaceChildren(...texts.map((text) => made("li", {}, text)), more ? made("li", { class: "note" }, `… and ${more} more; the picture shows any two clocks`) : "");
@@ -29,33 +30,31 @@ export function show(view) {
 }
 
 // Only what changes is written.
-function fill(body, known, values, canDraw) {
+function fill(body, known, values) {
   const names = Object.keys(values);
   if (names.length !== known.size || names.some((name) => !known.has(name))) {
     known.clear();
-    body.replaceChildren(...names.map((name) => rowOf(known, name, canDraw)));
+    body.replaceChildren(...names.map((name) => rowOf(known, name)));
     filter();
   }
   for (const name of names) {
     const { row, cell } = known.get(name), text = String(values[name]);
     say(cell, text);
-    row.classList.toggle("changed", canDraw && name in before && String(before[name]) !== text);
+    row.classList.toggle("changed", known === rows && name in before && String(before[name]) !== text);
   }
 }
 
-function rowOf(known, name, canDraw) {
+function rowOf(known, name) {
   const cell = made("td"), row = made("tr");
-  if (canDraw) {
-    const box = made("input", { type: "checkbox", "aria-label": `draw ${name} over time` });
-    box.checked = drawnNames.has(name);
-    box.onchange = () => {
-      if (box.checked) drawnNames.add(name);
-      else drawnNames.delete(name);
-      remember("drawn", chosen());
-      changed();
-    };
-    row.append(made("td", {}, box));
-  }
+  const box = made("input", { type: "checkbox", "aria-label": `draw ${name} over time` });
+  box.checked = drawnNames.has(name);
+  box.onchange = () => {
+    if (box.checked) drawnNames.add(name);
+    else drawnNames.delete(name);
+    remember("drawn", chosen());
+    changed();
+  };
+  row.append(made("td", {}, box));
   row.append(made("td", {}, name), cell);
   known.set(name, { row, cell });
   return row;
@@ -63,9 +62,11 @@ function rowOf(known, name, canDraw) {
 
 function filter() {
   const wanted = $("find-value").value.trim().toLowerCase();
-  let shown = 0;
-  for (const [name, { row }] of rows) {
-    row.hidden = !name.toLowerCase().includes(wanted) || shown >= MOST_ROWS;
-    if (!row.hidden) shown += 1;
+  for (const known of [rows, clockRows]) {
+    let shown = 0;
+    for (const [name, { row }] of known) {
+      row.hidden = !name.toLowerCase().includes(wanted) || shown >= MOST_ROWS;
+      if (!row.hidden) shown += 1;
+    }
   }
 }

@@ -1,7 +1,7 @@
 // The zone of a symbolic state over two clocks that the user picks.
 import { $, drawn, made } from "dom.js";
 import { ticksUpTo } from "lines.js";
-import { attempt, request } from "server.js";
+import { forget, later } from "server.js";
 import { recalled, remember } from "store.js";
 
 const SIDE = 190, LEFT = 34, BOTTOM = 24;
@@ -18,8 +18,9 @@ export function begin(model) {
   }
 }
 
-export async function show(view) {
+export function show(view) {
   last = view;
+  forget("zone");
   $("zone").hidden = !view.state.zone || clocks.length < 2;
   if ($("zone").hidden) return;
   const x = $("zone-x").value, y = $("zone-y").value;
@@ -27,8 +28,8 @@ export async function show(view) {
     $("zone-picture").replaceChildren(made("p", { class: "note" }, "Pick two different clocks."));
     return;
   }
-  const found = await attempt(() => request({ do: "zone", x, y }));
-  if (found && last === view) $("zone-picture").replaceChildren(picture(found));
+  const put = (one) => $("zone-picture").replaceChildren(one);
+  later("zone", { do: "zone", x, y }, (zone) => put(picture(zone)), (error) => put(made("p", { class: "warning" }, error.message)));
 }
 
 function picture(zone) {
