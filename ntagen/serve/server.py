@@ -118,12 +118,14 @@ class Server:
             case "GET", ["simulator", name]:
                 send_part(request, name)
             case "POST", ["api", "files", number, "simulations"]:
-                request.json({"simulation": simulations.add(self.shop.file(number))}, 201)
+                file = self.shop.file(number)
+                request.json({"simulation": simulations.add(number, file)}, 201)
             case "POST", ["api", "simulations", identity]:
                 wish = _wish(request, limits, limits.upload_bytes)
                 request.json(simulations.ask(identity, wish))
             case "GET", ["api", "simulations", identity]:
-                request.json({"name": simulations.get(identity).file.name})
+                found = simulations.get(identity)
+                request.json(told(found.number, found.file))
             case "DELETE", ["api", "simulations", identity]:
                 simulations.get(identity).end()
                 request.json({})

@@ -105,13 +105,15 @@ class Simulation:
     """A simulation, with or without a process.
 
     Attributes:
+        number: The id of the file.
         file: The model.
         lock: Whoever asks holds it.
         worker: Its process, if it has one.
         used: When it was last asked.
     """
 
-    def __init__(self, file: File) -> None:
+    def __init__(self, number: str, file: File) -> None:
+        self.number = number
         self.file = file
         self.lock = threading.Lock()
         self.worker: _Worker | None = None
@@ -149,7 +151,7 @@ class Simulations:
             for one in self._all.values():
                 one.end()
 
-    def add(self, file: File) -> str:
+    def add(self, number: str, file: File) -> str:
         """Makes a simulation of a model; returns its id.
 
         Raises:
@@ -161,7 +163,7 @@ class Simulations:
         with self._lock:
             for old in sorted(self._all, key=lambda one: self._all[one].used)[:-_RECORDS]:
                 self._all.pop(old).end()
-            self._all[identity] = Simulation(file)
+            self._all[identity] = Simulation(number, file)
         return identity
 
     def get(self, identity: str) -> Simulation:
@@ -214,6 +216,9 @@ class Simulations:
         """
         if one.worker is not None and one.worker.is_running:
             return one.worker, False
+        if one.worker is not None:
+            one.worker.end()
+            one.worker = None
         self._make_room()
         one.worker = _Worker(one.file, self._limits)
         if one.kept:

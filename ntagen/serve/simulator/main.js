@@ -58,8 +58,9 @@ function spoken(view) {
 
 async function begin() {
   if (!identity()) throw new Error("no model is simulated here\nhint: open the page of queries, and press Simulate");
-  const { name } = await ask("GET", `/api/simulations/${identity()}`);
+  const { name, file } = await ask("GET", `/api/simulations/${identity()}`);
   say($("name"), name);
+  $("queries").hash = file;
   document.title = `${name}: simulate`;
   const { model, view } = await request({ do: "open" });
   words.begin(model);
