@@ -47,7 +47,7 @@ class _Worker:
         # Warnings about the model are told by the page of queries.
         pipes = subprocess.PIPE, subprocess.PIPE, subprocess.DEVNULL
         self._process = started(
-            ["simulate", str(file.path), *options], file.path.parent, limits, *pipes
+            ["simulate", file.path.name, *options], file.path.parent, limits, *pipes
         )
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         threading.Thread(target=self._read, daemon=True).start()
@@ -176,7 +176,7 @@ class Simulations:
         if found is None:
             raise Refusal(
                 404,
-                "this simulation is not kept any more\nhint: open the model again, and Simulate",
+                "this simulation is not kept any more\nhint: open the model, and simulate it again",
             )
         return found
 

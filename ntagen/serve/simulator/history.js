@@ -6,28 +6,36 @@ import { stepInWords } from "words.js";
 const SHOWN = 60;  // So many steps are listed around the one that is shown.
 
 let act = null, view = null, way = [], timer = null;
+let aim = 0;  // The step that was last asked for: keys may be faster than answers.
 
 export function begin(acting) {
   act = acting;
-  const go = (to) => act({ do: "go", position: to });
   $("first").onclick = () => go(0);
-  $("back").onclick = () => go(view.position - 1);
-  $("forward").onclick = () => go(view.position + 1);
+  $("back").onclick = () => go(aim - 1);
+  $("forward").onclick = () => go(aim + 1);
   $("last").onclick = () => go(way.length);
   $("slider").onchange = () => go(Number($("slider").value));
   $("walk").onclick = () => (timer === null ? start() : stop());
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("input, select, textarea, [role=tab]")) return;
-    const to = { ArrowLeft: view?.position - 1, ArrowRight: view?.position + 1, Home: 0, End: way.length }[event.key];
+    const to = { ArrowLeft: aim - 1, ArrowRight: aim + 1, Home: 0, End: way.length }[event.key];
     if (to === undefined || !view) return;
     event.preventDefault();
-    if (isIdle() && to >= 0 && to <= way.length) go(to);
+    // A key that is held down waits for the answers.
+    if (isIdle() || !event.repeat) go(to);
   });
+}
+
+function go(to) {
+  if (to < 0 || to > way.length) return null;
+  aim = to;
+  return act({ do: "go", position: to });
 }
 
 export function show(now, steps) {
   view = now;
   way = steps;
+  aim = now.position;
   $("slider").max = String(way.length);
   $("slider").value = String(view.position);
   $("slider").setAttribute("aria-valuetext", `step ${view.position} of ${way.length}`);
@@ -45,7 +53,7 @@ function list() {
   for (let number = from; number <= to; number += 1) {
     const text = number === 0 ? "start" : `${number}. ${stepInWords(way[number - 1])}`;
     const current = number === view.position ? "step" : null;
-    entries.push(made("li", {}, made("button", { type: "button", "aria-current": current, click: () => act({ do: "go", position: number }) }, text)));
+    entries.push(made("li", {}, made("button", { type: "button", "aria-current": current, click: () => go(number) }, text)));
   }
   $("steps").replaceChildren(...entries);
   const here = $("steps").querySelector("[aria-current]");

@@ -49,7 +49,7 @@ function fold(card, isFolded) {
 // Templates are parsed once; each process has a copy, which is made when it is unfolded.
 function drawIn(card) {
   const number = model.processes[card.number].template;
-  pictures[number] = pictures[number] || parsed(model.templates[number].svg);
+  pictures[number] = pictures[number] || prepared(model.templates[number].svg);
   const svg = pictures[number].cloneNode(true);
   svg.classList.add("template");
   svg.setAttribute("role", "img");
@@ -63,6 +63,17 @@ function drawIn(card) {
   card.body.replaceChildren(svg);
   if (card.location !== null) card.locations[card.location]?.classList.add("current");
   light();
+}
+
+// A picture with a wide line around each edge, which a mouse can hit.
+function prepared(text) {
+  const svg = parsed(text);
+  for (const path of svg.querySelectorAll(".edge path")) {
+    const hit = path.cloneNode();
+    hit.setAttribute("class", "hit");
+    path.after(hit);
+  }
+  return svg;
 }
 
 function clicked(card, event) {
