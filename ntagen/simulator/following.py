@@ -56,18 +56,30 @@ def followed(begin: Begin, network: Network, steps: Sequence[Timed]) -> History:
         ModelError: The model fails in one.
     """
     history = History(begin)
-    for number, (parts, delay) in enumerate(steps, start=1):
-        moves = history.offer().moves
-        found = matching(moves, parts)
+    # Moves may look the same: one of which urgent edges make two parts of time. If the first one
+    # does not lead to the end, another one may.
+    others: list[tuple[int, list[int]]] = []
+    refusal: InputError | None = None
+    number = 0
+    while number < len(steps):
+        parts, delay = steps[number]
+        found = matching(history.offer().moves, parts)
         if not found:
-            raise InputError(
-                f"step {number} is not possible in this model: {network.told(parts)}\n"
+            refusal = refusal or InputError(
+                f"step {number + 1} is not possible in this model: {network.told(parts)}\n"
                 "hint: load a trace of this model, in the version that it was made for"
             )
+            if not others:
+                raise refusal
+            number, found = others.pop()
+            history.go(number)
+        if len(found) > 1:
+            others.append((number, found[1:]))
         try:
             history.do({"move": found[0], "delay": None if delay is None else str(delay)})
         except InputError as error:
-            raise InputError(f"step {number}: {error}") from None
+            raise InputError(f"step {number + 1}: {error}") from None
+        number += 1
     return history
 
 

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from ntagen.checker import Model
-from ntagen.checker.facts import Template
 from ntagen.checker.picture.svg import drawn_in_parts
 from ntagen.checker.runs import Edge
 from ntagen.errors import InputError
+from ntagen.simulator.arrows import drawn_edges
 
 
 class Part(NamedTuple):
@@ -134,48 +134,33 @@ class Network:
         return self.told(self.parts_named(edges))
 
     def described(self) -> dict[str, Any]:
-        """The processes, and the templates that they use, with their pictures."""
+        """The processes, and the templates that they use, with their pictures.
+
+        Processes of one template have different edges if selects have no values in some of them;
+        such a template is there more than once.
+        """
         facts = self._model.facts
-        templates = {one.name: one for one in facts.templates}
-        used = list(dict.fromkeys(one.template for one in facts.processes))
-        first = {one.template: number for number, one in reversed([*enumerate(facts.processes)])}
+        pictures = {one.name: drawn_in_parts(one) for one in facts.templates}
+        templates: dict[str, dict[str, Any]] = {}
+        processes = []
+        for process, raw in zip(facts.processes, self._raw, strict=True):
+            key = json.dumps([process.template, raw["edges"]])
+            if key not in templates:
+                template = self._model.template(process.template)
+                templates[key] = {
+                    "name": process.template,
+                    "svg": pictures[process.template],
+                    "locations": raw["locations"],
+                    "edges": [
+                        edge | {"drawn": drawn}
+                        for edge, drawn in zip(
+                            raw["edges"], drawn_edges(template, raw["edges"]), strict=True
+                        )
+                    ],
+                }
+            processes.append({"name": process.name, "template": list(templates).index(key)})
         return {
-            "processes": [
-                {"name": one.name, "template": used.index(one.template)} for one in facts.processes
-            ],
-            "templates": [
-                {"svg": drawn_in_parts(templates[name]), "name": name}
-                | _numbered(templates[name], self._raw[first[name]])
-                for name in used
-            ],
+            "processes": processes,
+            "templates": list(templates.values()),
             "clocks": self.clocks,
         }
-
-
-def _numbered(template: Template, raw: Mapping[str, Any]) -> dict[str, Any]:
-    """The locations and edges of a template by the numbers of its processes."""
-    edges = zip(raw["edges"], drawn_edges(template), strict=True)
-    return {
-        "locations": [
-            {"name": one["name"], "invariant": one["invariant"], "kind": one["kind"]}
-            for one in raw["locations"]
-        ],
-        "edges": [edge | {"drawn": drawn} for edge, drawn in edges],
-    }
-
-
-def drawn_edges(template: Template) -> list[list[list[int]]]:
-    """Which arrows of the picture show the legs of each edge, by the edge's number.
-
-    The arrow to a branch point and one of those that leave it are a leg together.
-    """
-    points = {one.id for one in template.branch_points}
-    legs: dict[str, list[int]] = {one: [] for one in points}
-    for number, edge in enumerate(template.edges):
-        if edge.source in points:
-            legs[edge.source].append(number)
-    return [
-        [[number, leg] for leg in legs[edge.target]] if edge.target in points else [[number]]
-        for number, edge in enumerate(template.edges)
-        if edge.source not in points
-    ]

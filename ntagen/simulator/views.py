@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any, Final
 
 from ntagen.checker.play import Window
@@ -12,6 +13,10 @@ from ntagen.simulator.history import Entry, History
 
 MOST_CONSTRAINTS: Final = 200
 """At most so many constraints of a zone are listed; nobody reads more."""
+
+
+MOST_VALUES: Final = 5000
+"""At most so many variables are shown; arrays may have millions of parts."""
 
 
 def view(history: History, known: int, adviser: Adviser | None) -> dict[str, Any]:
@@ -53,10 +58,14 @@ def view(history: History, known: int, adviser: Adviser | None) -> dict[str, Any
 
 
 def _state(state: State) -> dict[str, Any]:
-    zone = zone_of(state)
-    if zone is None:
-        return state
-    return state | {"zone": zone[:MOST_CONSTRAINTS], "more": len(zone[MOST_CONSTRAINTS:])}
+    zone, variables = zone_of(state), state["variables"]
+    shown = state
+    if len(variables) > MOST_VALUES:
+        shown = shown | {"variables": dict(islice(variables.items(), MOST_VALUES))}
+    if zone is not None:
+        more = len(zone[MOST_CONSTRAINTS:])
+        shown = shown | {"zone": zone[:MOST_CONSTRAINTS], "more": more}
+    return shown | {"more_values": max(0, len(variables) - MOST_VALUES)}
 
 
 def _move(move: Move) -> dict[str, Any]:

@@ -26,6 +26,8 @@ export function show(view) {
     const texts = zone.length ? zone : ["every clock has any value"];
     $("constraints").replaceChildren(...texts.map((text) => made("li", {}, text)), more ? made("li", { class: "note" }, `… and ${more} more; the picture shows any two clocks`) : "");
   }
+  $("more-values").hidden = !view.state.more_values;
+  say($("more-values"), `… and ${view.state.more_values} more`);
   before = { ...variables, ...clocks };
 }
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from ntagen import checker
 from ntagen.errors import InputError
 from tests.simulated import CROSSING, LAMP, MATCHES, Talk
 
@@ -121,32 +120,3 @@ def test_a_trace_of_another_version_is_refused_at_its_step() -> None:
         other("load", text=trace)
     # What was there before stays.
     assert other("go", position=0)["mode"] == "symbolic"
-
-
-def test_edges_have_the_numbers_of_pictures() -> None:
-    """The arrows of a template are those of the edges that the engine numbers."""
-    from ntagen.simulator.network import drawn_edges
-
-    branching = checker.load(
-        """<nta><template><name>P</name><location id="a"><name>A</name></location>
-        <location id="b"><name>B</name></location><location id="c"><name>C</name></location>
-        <branchpoint id="p"/><init ref="a"/>
-        <transition><source ref="b"/><target ref="a"/></transition>
-        <transition><source ref="p"/><target ref="b"/></transition>
-        <transition><source ref="a"/><target ref="p"/></transition>
-        <transition><source ref="p"/><target ref="c"/></transition>
-        </template><system>system P;</system></nta>"""
-    )
-    for model in (branching, *(checker.load(text) for text in (LAMP, CROSSING, MATCHES))):
-        network = json.loads(model.network_json())
-        for process in model.processes:
-            template = model.template(process.template)
-            names = {one.id: one.name for one in template.locations}
-            raw = next(one for one in network["processes"] if one["name"] == process.name)
-            places = [one["name"] for one in raw["locations"]]
-            assert len(raw["edges"]) == len(drawn_edges(template))
-            for edge, legs in zip(raw["edges"], drawn_edges(template), strict=True):
-                arrows = [[template.edges[number] for number in leg] for leg in legs]
-                assert {names[leg[0].source] for leg in arrows} == {places[edge["source"]]}
-                found = [names[leg[-1].target] for leg in arrows]
-                assert found == [places[number] for number in edge["targets"]]
