@@ -62,11 +62,14 @@ def command(
     memory_bytes: int,
     upload_bytes: int,
 ) -> None:
-    """Show models, environments and runs in the browser: verdicts, traces and pictures.
+    """Show models, environments and runs in the browser: verdicts, traces, pictures, simulations.
 
     It prints an address. Open it, and drop a model (.xml, .xta), an environment (.nsl) or the log
     of a run (.mcap) on the page. FILE is shown at once. Only this computer gets there, and only
     with the token in the address. Each check is a process of its own, which you can cancel.
+
+    "Simulate" walks through a model step by step: symbolic or with exact times, along a trace, at
+    random, or against the strategy of a game.
 
     \b
     Examples:
