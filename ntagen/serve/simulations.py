@@ -144,6 +144,8 @@ class Simulations:
         self._limits = limits
         self._all: dict[str, Simulation] = {}
         self._lock = threading.Lock()
+        self._running: set[Simulation] = set()
+        self._room = threading.Condition()
 
     def close(self) -> None:
         """Ends all processes."""
@@ -187,24 +189,32 @@ class Simulations:
             Refusal: There is no such simulation, the request is refused, or no process answers.
         """
         one = self.get(identity)
-        with one.lock:
+        try:
+            with one.lock:
+                return self._answer(one, request)
+        finally:
+            # It is idle now, and may make room for another one.
+            with self._room:
+                self._room.notify_all()
+
+    def _answer(self, one: Simulation, request: dict[str, Any]) -> dict[str, Any]:
+        one.used = time.monotonic()
+        try:
+            worker, is_resumed = self._worker_of(one)
+            answer = _told(worker.ask(request))
+        except _Gone as why:
+            self._drop(one)
+            raise Refusal(
+                503,
+                f"the process of this simulation has ended: {why}\n"
+                "hint: the way until here is kept; take another step, or start the server "
+                "with greater limits: ntagen serve --timeout 5min --memory 4GiB",
+            ) from None
+        finally:
             one.used = time.monotonic()
-            try:
-                worker, is_resumed = self._worker_of(one)
-                answer = _told(worker.ask(request))
-            except _Gone as why:
-                one.worker = None
-                raise Refusal(
-                    503,
-                    f"the process of this simulation has ended: {why}\n"
-                    "hint: the way until here is kept; take another step, or start the server "
-                    "with greater limits: ntagen serve --timeout 5min --memory 4GiB",
-                ) from None
-            finally:
-                one.used = time.monotonic()
-            view = answer.get("view", answer)
-            if "keep" in view:
-                one.keep(view.pop("keep"))
+        view = answer.get("view", answer)
+        if "keep" in view:
+            one.keep(view.pop("keep"))
         return answer | ({"resumed": True} if is_resumed else {})
 
     def _worker_of(self, one: Simulation) -> tuple[_Worker, bool]:
@@ -216,41 +226,57 @@ class Simulations:
         """
         if one.worker is not None and one.worker.is_running:
             return one.worker, False
+        self._drop(one)
+        self._wait_for_room(one)
+        try:
+            worker = one.worker = _Worker(one.file, self._limits)
+            if one.kept:
+                _told(worker.ask(one.kept))
+        except BaseException:
+            # A process that is not where the page is must answer nothing else.
+            self._drop(one)
+            raise
+        return worker, bool(one.kept)
+
+    def _drop(self, one: Simulation) -> None:
+        """Ends the process of a simulation, if it has one; whoever calls holds its lock."""
         if one.worker is not None:
             one.worker.end()
             one.worker = None
-        self._make_room()
-        one.worker = _Worker(one.file, self._limits)
-        if one.kept:
-            try:
-                _told(one.worker.ask(one.kept))
-            except Refusal:
-                # A process that is not where the page is must answer nothing else.
-                one.worker.end()
-                one.worker = None
-                raise
-        return one.worker, bool(one.kept)
+        with self._room:
+            self._running.discard(one)
+            self._room.notify_all()
 
-    def _make_room(self) -> None:
-        """Ends the process that was not used for the longest time, if there are too many."""
-        with self._lock:
-            running = [one for one in self._all.values() if one.worker is not None]
-            running.sort(key=lambda one: one.used)
-            excess = len(running) + 1 - self._limits.simulations
-            for one in running:
-                if excess <= 0:
-                    return
-                with _held(one.lock) as is_idle:
-                    if is_idle and one.worker is not None:
-                        one.worker.end()
-                        one.worker = None
-                        excess -= 1
-        if excess > 0:
-            raise Refusal(
-                429,
-                f"{self._limits.simulations} simulations compute already\n"
-                "hint: wait for one, and try again",
-            )
+    def _wait_for_room(self, one: Simulation) -> None:
+        """Waits until there may be another process; the oldest idle one ends for it.
+
+        Raises:
+            Refusal: All others compute for too long.
+        """
+        end = time.monotonic() + self._limits.timeout_s
+        with self._room:
+            while len(self._running) >= self._limits.simulations:
+                if self._end_oldest():
+                    continue
+                if not self._room.wait(end - time.monotonic()):
+                    raise Refusal(
+                        429,
+                        f"{self._limits.simulations} simulations compute already\n"
+                        "hint: wait for one, and try again",
+                    )
+            self._running.add(one)
+
+    def _end_oldest(self) -> bool:
+        """Ends the idle process that was not used for the longest time; whether there is one."""
+        for other in sorted(self._running, key=lambda one: one.used):
+            with _held(other.lock) as is_idle:
+                if is_idle:
+                    if other.worker is not None:
+                        other.worker.end()
+                        other.worker = None
+                    self._running.discard(other)
+                    return True
+        return False
 
 
 @contextlib.contextmanager
