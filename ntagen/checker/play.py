@@ -11,17 +11,31 @@ import contextlib
 import json
 import math
 import random
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import ntagen._checker as _checker
 from ntagen.checker.errors import failing
 from ntagen.checker.runs import Edge, Run, State, edges_of, runs_of, state_of
 from ntagen.errors import InputError
 
-__all__ = ["Chance", "Next", "Play", "Reply", "Situation", "Window", "played"]
+__all__ = [
+    "ENDINGS",
+    "Chance",
+    "Next",
+    "Play",
+    "Reply",
+    "Situation",
+    "Window",
+    "delay_from",
+    "forecast",
+    "played",
+]
+
+_DELAY: Final = re.compile(r" *-?[0-9]{0,18}([./][0-9]{1,18})?(e-?[0-9]{1,3})? *")
 
 _OPEN_UNITS = 5
 """In a window without end, a random delay is within this many units of its start."""
@@ -282,6 +296,56 @@ class Play:
                 )
             except OverflowError:
                 raise InputError(f"the delay {exact} is too long or too fine a fraction") from None
+
+
+ENDINGS: Final = {
+    "goal": "the goal holds",
+    "broken": "the condition that the controller must keep does not hold any more",
+    "stopped": "time cannot pass, and nobody moves",
+    "endless": "time passes for ever, and nobody moves",
+}
+"""Why play is over, in words, by `Next.why`."""
+
+
+def forecast(then: Next, owner: str, told: Callable[[Sequence[Edge]], str]) -> str:
+    """Says what happens if the opponent of a strategy only waits.
+
+    Args:
+        then: What happens.
+        owner: Whose strategy it is.
+        told: Says a move in words.
+    """
+    when = "at once" if then.delay == 0 else f"after {then.delay}"
+    if then.kind == "acts":
+        waits = "" if then.delay == 0 else "waits, and "
+        return f"the {owner} {waits}{when} takes {told(then.edges)}"
+    if then.kind == "must":
+        return f"the {owner} waits; you must move before time stops"
+    if then.kind == "fails":
+        return f"{when} the strategy has no next move: {then.why}"
+    outcome = {
+        "goal": f"{when} the goal holds, and the {then.winner} wins",
+        "broken": f"{when} the condition to keep does not hold, and the {then.winner} wins",
+        "stopped": f"{when} time cannot pass; if nobody moves the {then.winner} wins",
+        "endless": f"if nobody ever moves the {then.winner} wins",
+    }[then.why]
+    return f"the {owner} waits; {outcome}"
+
+
+def delay_from(text: str) -> Fraction:
+    """The delay that a user has typed, such as ``2``, ``3/2`` or ``1.5``.
+
+    Raises:
+        InputError: It is no such number, or negative.
+    """
+    try:
+        # A long exponent would make a number that takes for ever.
+        delay = Fraction(text if _DELAY.fullmatch(text) else "")
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"{text} is not a delay: write a number such as 2, 3/2 or 1.5") from None
+    if delay < 0:
+        raise InputError("a delay cannot be negative")
+    return delay
 
 
 def played(play: Play, steps: int, seed: int) -> Run:

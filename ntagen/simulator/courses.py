@@ -6,22 +6,19 @@ A course is at one state. `History` remembers the states on the way.
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
-from typing import Any, Final, Protocol
+from typing import Any, Protocol
 from zlib import compress, decompress
 
 from ntagen.checker import Model
 from ntagen.checker.errors import failing
-from ntagen.checker.play import Window
+from ntagen.checker.play import Window, delay_from
 from ntagen.checker.runs import Walk
 from ntagen.errors import InputError
 from ntagen.simulator.network import Network, Part, Parts
 from ntagen.values import dataclass
-
-_DELAY: Final = re.compile(r" *-?[0-9]{1,18}([./][0-9]{1,18})? *")
 
 State = dict[str, Any]
 """A state: ``locations`` by number, ``variables``, and ``clocks``; or ``zone``, which is packed."""
@@ -265,14 +262,7 @@ def delay_of(choice: Choice) -> Fraction | None:
     text = choice.get("delay")
     if text is None or text == "":
         return None
-    try:
-        # An exponent could make a number of any length.
-        delay = Fraction(str(text) if _DELAY.fullmatch(str(text)) else "")
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f"{text} is not a delay: write a number such as 2, 3/2 or 1.5") from None
-    if delay < 0:
-        raise InputError("a delay cannot be negative")
-    return delay
+    return delay_from(str(text))
 
 
 def matching(moves: Sequence[Move], parts: Parts) -> list[int]:

@@ -8,21 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any, Final
+from typing import Any
 
-from ntagen.checker.play import Chance, Next, Play, Situation
+from ntagen.checker.play import ENDINGS, Chance, Next, Play, Situation, forecast
 from ntagen.checker.runs import State as ExactState
 from ntagen.checker.strategy import Advice, Strategy
 from ntagen.errors import InputError, ModelError, UndecidedError
 from ntagen.simulator.courses import Choice, Done, Move, Offer, State, delay_of, index_of
 from ntagen.simulator.network import Network
-
-_REASONS: Final = {
-    "goal": "the goal holds",
-    "broken": "what the controller must keep does not hold",
-    "stopped": "time cannot pass, and nobody moves",
-    "endless": "time passes for ever, and nobody moves",
-}
 
 
 class GameCourse:
@@ -63,7 +56,7 @@ class GameCourse:
         winner, then = now.winner, now.next
         end = ""
         if winner is not None:
-            end = f"{_REASONS[then.why]}: the {winner} has won"
+            end = f"{ENDINGS[then.why]}: the {winner} has won"
         game = {
             "owner": self._strategy.owner,
             "rival": self.rival,
@@ -142,17 +135,7 @@ class GameCourse:
 
     def _forecast(self, then: Next) -> str:
         """What happens if the user only waits."""
-        owner = self._strategy.owner
-        when = "at once" if then.delay == 0 else f"after {then.delay}"
-        if then.kind == "acts":
-            return f"the {owner} acts {when}: {self._network.told_of(then.edges)}"
-        if then.kind == "must":
-            return f"the {owner} waits; you must move before time stops"
-        if then.kind == "fails":
-            return f"{when} the strategy has no next move: {then.why}"
-        if then.why == "endless":
-            return f"the {owner} waits; if nobody ever moves, the {then.winner} wins"
-        return f"the {owner} waits; {when} {_REASONS[then.why]}, and the {then.winner} wins"
+        return forecast(then, self._strategy.owner, self._network.told_of)
 
 
 class Adviser:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from ntagen.checker.play import ENDINGS, delay_from, forecast
 from ntagen.cli.terminal import Styled, echo
 from ntagen.errors import InputError, NtagenError
 from ntagen.files import write_files
@@ -113,15 +114,12 @@ class Session:
         return self._ending is not None
 
     def _end(self, why: str, winner: str) -> None:
-        reason = {
-            "goal": "The goal holds",
-            "broken": "The condition that the controller must keep does not hold any more",
-            "stopped": "Time cannot pass, and nobody moves",
-            "endless": "Time passes for ever, and nobody moves",
-        }[why]
         self.is_defeated = winner != self._strategy.owner
         whose = "you have won against the strategy" if self.is_defeated else "the strategy has won"
-        self._ending = f"{reason}: the {winner} has won after {self._time}; {whose}."
+        reason = ENDINGS[why]
+        self._ending = (
+            f"{reason[0].upper()}{reason[1:]}: the {winner} has won after {self._time}; {whose}."
+        )
 
     def _fail(self, why: str) -> None:
         self.is_defeated = True
@@ -164,22 +162,7 @@ class Session:
 
     def _forecast(self, situation: Situation) -> str:
         """Says what happens if the user only waits."""
-        then, owner = situation.next, self._strategy.owner
-        when = "at once" if then.delay == 0 else f"after {then.delay}"
-        if then.kind == "acts":
-            waits = "" if then.delay == 0 else "waits, and "
-            return f"the {owner} {waits}{when} takes {_move(then.edges)}"
-        if then.kind == "must":
-            return f"the {owner} waits; you must move before time stops"
-        if then.kind == "fails":
-            return f"{when} the strategy has no next move: {then.why}"
-        outcome = {
-            "goal": f"{when} the goal holds, and the {then.winner} wins",
-            "broken": f"{when} the condition to keep does not hold, and the {then.winner} wins",
-            "stopped": f"{when} time cannot pass; if nobody moves the {then.winner} wins",
-            "endless": f"if nobody ever moves the {then.winner} wins",
-        }[then.why]
-        return f"the {owner} waits; {outcome}"
+        return forecast(situation.next, self._strategy.owner, _move)
 
     def _show_moves(self, situation: Situation, most: int | None) -> None:
         self._list(situation.replies, "", most)
@@ -240,7 +223,7 @@ class Session:
         """Makes the move, or waits, as the user typed."""
         if len(words) > 2:
             raise InputError(f"{' '.join(words)} is not a command; type ? for help")
-        delay = _delay(words[1]) if len(words) == 2 else None
+        delay = delay_from(words[1]) if len(words) == 2 else None
         mark = (len(self._play), self._time)
         if not words or words[0] == "w":
             if delay is None:
@@ -326,16 +309,6 @@ def _words(line: str) -> list[str]:
         return shlex.split(line)
     except ValueError:
         return line.split()
-
-
-def _delay(text: str) -> Fraction:
-    try:
-        delay = Fraction(text)
-    except (ValueError, ZeroDivisionError):
-        raise InputError(f"{text} is not a delay: write a number such as 2, 3/2 or 1.5") from None
-    if delay < 0:
-        raise InputError("a delay cannot be negative")
-    return delay
 
 
 def _changed(every: list[str], changed: list[str], before: State | None) -> list[str]:

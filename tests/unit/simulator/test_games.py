@@ -16,7 +16,9 @@ def test_the_strategy_moves_by_itself() -> None:
     # Nobody else can move at the start, so that the strategy has moved already.
     assert [one["who"] for one in view["steps"]] == ["strategy"]
     assert view["game"]["rival"] == "environment"
-    assert view["game"]["forecast"] == "the controller acts after 1: Keeper.Striking -> Lit"
+    assert (
+        view["game"]["forecast"] == "the controller waits, and after 1 takes Keeper.Striking -> Lit"
+    )
     assert view["moves"][0]["windows"] == ["within 1"]
     view = talk("take", move=0, delay="1/2")
     assert [one["who"] for one in view["steps"]] == ["you", "strategy"]
