@@ -38,7 +38,7 @@ class Limits:
     upload_bytes: int = 32 << 20
     jobs: int = 2
     files: int = 20
-    simulations: int = 24
+    simulations: int = 50
 
 
 def started(

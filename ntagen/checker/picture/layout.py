@@ -5,7 +5,8 @@ after Sugiyama, Tagawa and Toda, "Methods for visual understanding of hierarchic
 structures" (1981). Edges that would close a circle are reversed, and the longest path from the
 start decides the layer. Sweeps over the means of the neighbours improve the order in the layers.
 Each edge gets a place of its own between the layers that it joins, as wide as its label, so that
-labels and parallel edges do not cover each other.
+labels and parallel edges do not cover each other. A template with very many long edges is put in
+rows instead.
 
 Labels without a position are put beside their location or edge. Lengths are in the units of
 UPPAAL's editor. The layout is deterministic. Cost: linear in edges times the layers that they span.
@@ -13,6 +14,7 @@ UPPAAL's editor. The layout is deterministic. Cost: linear in edges times the la
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -40,6 +42,13 @@ _LAYER_GAP: Final = 44
 """The least distance between a location and the labels of the edges above or below it."""
 
 _SWEEPS: Final = 12
+
+_MOST_SPANNED: Final = 3000
+"""If edges span more layers together, layers would take many seconds, and their picture would be
+too large to be read: locations are put in rows."""
+
+_ROW_STEP: Final = 110
+"""The distance of rows."""
 
 _Drawn = TypeVar("_Drawn", Location, Edge)
 
@@ -160,6 +169,8 @@ def _layered(diagram: Diagram) -> Diagram:
     start = next((i for i, one in enumerate(diagram.locations) if one.initial), 0)
     links = [pair for pair in ends if pair is not None and pair[0] != pair[1]]
     ranks = _ranks(len(ids), start, links)
+    if sum(abs(ranks[first] - ranks[second]) for first, second in links) > _MOST_SPANNED:
+        return _in_rows(diagram, ranks)
     boxes = [_location_box(diagram, index, ends) for index in range(len(ids))]
     layers: dict[int, list[int]] = defaultdict(list)
     for index, rank in enumerate(ranks):
@@ -173,6 +184,30 @@ def _layered(diagram: Diagram) -> Diagram:
     _order(rows, boxes)
     _spread(rows, boxes)
     return _with_places(diagram, boxes, chains)
+
+
+def _in_rows(diagram: Diagram, ranks: list[int]) -> Diagram:
+    """The template with its locations in a square, those of the first layers first."""
+    order = sorted(range(len(ranks)), key=lambda node: (ranks[node], node))
+    columns = math.isqrt(len(order) - 1) + 1
+    widths = [_size(labels_of(one))[0] for one in diagram.locations]
+    step = 2 * LOCATION_RADIUS + _LABEL_GAP + 2 * _GAP + round(max(widths, default=0.0))
+    places = {
+        node: (step * (at % columns), _ROW_STEP * (at // columns)) for at, node in enumerate(order)
+    }
+    count = len(diagram.locations)
+    return replace(
+        diagram,
+        locations=tuple(
+            replace(one, position=places[index], labels={})
+            for index, one in enumerate(diagram.locations)
+        ),
+        branch_points=tuple(
+            replace(one, position=places[count + index])
+            for index, one in enumerate(diagram.branch_points)
+        ),
+        edges=tuple(replace(edge, nails=(), labels={}) for edge in diagram.edges),
+    )
 
 
 def _ranks(count: int, start: int, links: list[tuple[int, int]]) -> list[int]:
@@ -295,25 +330,28 @@ def _pull(row: list[int], boxes: list[_Box]) -> None:
 
     Boxes that would overlap move together, to the mean of the positions that they want.
     """
-    groups: list[tuple[list[int], float, float]] = []  # members, the first one's x, sum of wishes
-    for box in row:
+    # Of each group the first member's place in the row, the first one's x, and the sum of wishes.
+    groups: list[tuple[int, float, float]] = []
+    offsets = _offsets(row, boxes)
+    for place, box in enumerate(row):
         near = [boxes[other].x for other in (*boxes[box].above, *boxes[box].below)]
         wish = sum(near) / len(near) if near else boxes[box].x
-        group = ([box], wish, wish)
+        group = (place, wish, wish)
         while groups:
-            members, first, wishes = groups[-1]
-            offsets = _offsets([*members, *group[0]], boxes)
-            if first + offsets[len(members)] <= group[1]:
+            begin, first, wishes = groups[-1]
+            distance = offsets[group[0]] - offsets[begin]
+            if first + distance <= group[1]:
                 break
             groups.pop()
-            joined = [*members, *group[0]]
             # `wishes` is the sum of the positions that the members want for the first one.
-            shift = group[2] - len(group[0]) * offsets[len(members)]
-            group = (joined, (wishes + shift) / len(joined), wishes + shift)
+            count = place + 1 - group[0]
+            wishes += group[2] - count * distance
+            group = (begin, wishes / (place + 1 - begin), wishes)
         groups.append(group)
-    for members, first, _ in groups:
-        for box, offset in zip(members, _offsets(members, boxes), strict=True):
-            boxes[box].x = first + offset
+    ends = [begin for begin, _, _ in groups[1:]] + [len(row)]
+    for (begin, first, _), end in zip(groups, ends, strict=True):
+        for place in range(begin, end):
+            boxes[row[place]].x = first + offsets[place] - offsets[begin]
 
 
 def _offsets(members: list[int], boxes: list[_Box]) -> list[float]:

@@ -25,7 +25,7 @@ export function begin(described, taking) {
   $("unfold").onclick = () => foldAll(false);
   $("smaller").onclick = () => zoomBy(-1);
   $("larger").onclick = () => zoomBy(1);
-  begin_panning($("processes"));
+  beginPanning($("processes"));
 }
 
 function cardOf(process, number, isOpen) {
@@ -167,7 +167,7 @@ function zoomBy(steps) {
   zoomTo(ZOOMS[Math.min(Math.max(at + steps, 0), ZOOMS.length - 1)]);
 }
 
-function begin_panning(area) {
+function beginPanning(area) {
   let from = null;
   area.addEventListener("wheel", (event) => {
     if (!event.ctrlKey) return;

@@ -1,4 +1,4 @@
-"""The colours of the simulator: light and dark, texts and signs stand out enough.
+"""The colours of both pages: light and dark, texts and signs stand out enough.
 
 The ratios are those of WCAG 2.2, level AA: 4.5 for texts (1.4.3), 3 for signs and lines that have a
 meaning (1.4.11). https://www.w3.org/TR/WCAG22/#dfn-contrast-ratio
@@ -13,11 +13,19 @@ import pytest
 
 from ntagen.serve import pages
 
-STYLE = (Path(pages.__file__).parent / "simulator" / "style.css").read_text("utf-8")
-LIGHT, DARK = (
-    dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
-    for block in re.findall(r":root \{(.*?)\}", STYLE, re.DOTALL)
-)
+FOLDER = Path(pages.__file__).parent
+STYLE = (FOLDER / "simulator" / "style.css").read_text("utf-8")
+
+
+def colors_of(style: str) -> list[dict[str, str]]:
+    """The colours of a style by name: the light ones, then the dark ones."""
+    return [
+        dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
+        for block in re.findall(r":root \{(.*?)\}", style, re.DOTALL)
+    ]
+
+
+LIGHT, DARK = colors_of(STYLE)
 
 TEXTS = [
     *((text, page) for text in ("text", "soft", "accent") for page in ("page", "panel", "field")),
@@ -70,6 +78,17 @@ def test_colours_stand_out(colors: dict[str, str]) -> None:
         if contrast(colors[pair[0]], colors[pair[1]]) < least
     }
     assert found == {}
+
+
+def test_colours_of_the_page_of_queries_stand_out() -> None:
+    found = colors_of((FOLDER / "page.html").read_text("utf-8"))
+    assert len(found) == 2
+    for colors in found:
+        for text in ("text", "soft", "accent", "yes", "no", "other"):
+            assert contrast(colors[text], colors["page"]) >= 4.5, text
+        for text, page in (("soft", "panel"), ("text", "panel"), ("soft", "over")):
+            assert contrast(colors[text], colors[page]) >= 4.5, (text, page)
+        assert contrast(colors["line"], colors["page"]) >= 3
 
 
 def test_each_colour_is_known_in_light_and_dark() -> None:

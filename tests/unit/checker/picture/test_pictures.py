@@ -176,3 +176,22 @@ def test_templates_stand_below_each_other(
     total = sum(float(one.attrib["height"]) for one in inner)
     assert float(whole.attrib["height"]) == total
     assert float(whole.attrib["width"]) == max(float(one.attrib["width"]) for one in inner)
+
+
+def test_very_many_long_edges_are_drawn_in_rows() -> None:
+    count = 300
+    states = ", ".join(f"L{number}" for number in range(count))
+    edges = ", ".join(
+        f"L{number} -> L{(number * step + 1) % count} {{ }}"
+        for number in range(count)
+        for step in (1, 7)
+    )
+    model = load(f"process P() {{ state {states}; init L0; trans {edges}; }} system P;")
+    template = model.template("P")
+    check_drawn(template)
+    drawn = placed(template)
+    places = set(positions_of(drawn).values())
+    assert len(places) == count
+    assert len({y for _, y in places}) == 17
+    # The start is at the upper left.
+    assert positions_of(drawn)["L0"] == (0, 0)
