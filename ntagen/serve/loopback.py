@@ -66,6 +66,8 @@ class Listener(ThreadingHTTPServer):
     """
 
     daemon_threads = True
+    request_queue_size = 128
+    """Fifty tabs that ask at once, each by some connections, are not refused."""
 
     def __init__(self, own: Server, port: int) -> None:
         """Begins to listen.

@@ -224,3 +224,17 @@ def test_programs_are_all_sent_and_make_no_markup(server: Server) -> None:
         # Texts of models become text nodes; there is no other way than these.
         assert not re.search(r"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(", text)
         assert len(text.splitlines()) < 300
+
+
+def test_fifty_tabs_are_served_at_once(server: Server) -> None:
+    found: list[int] = []
+
+    def open_tab() -> None:
+        found.append(request(server, "GET", "/simulator")[0])
+
+    tabs = [threading.Thread(target=open_tab) for _ in range(50)]
+    for tab in tabs:
+        tab.start()
+    for tab in tabs:
+        tab.join(30)
+    assert found == [200] * 50
