@@ -19,7 +19,10 @@ from ntagen.simulator.history import History
 from ntagen.simulator.network import Network, Parts
 
 _MOST_STEPS_TRIED: Final = 20_000
-"""The search for times makes at most so many steps."""
+"""The search for times makes at most so many steps; fewer if there are many processes, whose steps
+take longer."""
+
+_FEW_PROCESSES: Final = 5
 
 _MOST_LATE: Final = 3
 """At most so many moves are later than they could be."""
@@ -91,7 +94,8 @@ def timed(begin: Begin, network: Network, moves: Sequence[Parts]) -> list[Fracti
         network: The model's processes.
         moves: The moves.
     """
-    search = _Search(begin, moves)
+    most = _MOST_STEPS_TRIED // (1 + len(network.processes) // _FEW_PROCESSES)
+    search = _Search(begin, moves, most)
     failed = search.tries({})
     for count in range(1, _MOST_LATE + 1):
         if failed is None or search.is_over:
@@ -103,10 +107,10 @@ def timed(begin: Begin, network: Network, moves: Sequence[Parts]) -> list[Fracti
 class _Search:
     """The search; `delays` are those of the last try."""
 
-    def __init__(self, begin: Begin, moves: Sequence[Parts]) -> None:
+    def __init__(self, begin: Begin, moves: Sequence[Parts], most: int) -> None:
         self._begin = begin
         self._moves = moves
-        self._left = _MOST_STEPS_TRIED
+        self._left = most
         self.delays: list[Fraction] = []
 
     @property

@@ -2,7 +2,7 @@
 
 A request is an object with ``do``; `Session.answer` says what comes back. Most answers are views:
 the state that is shown, its moves, and the steps that the page does not have yet. ``keep`` in a
-view is what must be kept to take the simulation up again in another process: see `Session.restore`.
+view is what must be kept to take the simulation up again in another process, by ``restore``.
 """
 
 from __future__ import annotations
