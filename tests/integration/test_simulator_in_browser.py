@@ -48,7 +48,7 @@ def said() -> list[str]:
 @pytest.fixture
 def page(server: Server, browser: Any, said: list[str]) -> Iterator[Page]:  # noqa: ANN401
     page = browser.new_page(viewport={"width": 1300, "height": 1000})
-    page.set_default_timeout(20_000)
+    page.set_default_timeout(60_000)
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.on("console", lambda message: said.append(message.text))
