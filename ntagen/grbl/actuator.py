@@ -219,8 +219,7 @@ class GrblActuator:
         state = "not known"
         while self.now_s() < end_s:
             try:
-                status = self._link.look()
-                self._link.pause(_SOONEST_POLL_S)
+                status = self._look()
             except DeviceError as error:
                 raise self._not_standing(str(error)) from None
             if status.stands and position_of(status) == last:
@@ -228,6 +227,22 @@ class GrblActuator:
                 return
             last, state = position_of(status) if status.stands else None, str(status)
         raise self._not_standing(f"its state is {state}")
+
+    def _look(self) -> Status:
+        """A status report, also after a failure.
+
+        A limit switch has stopped the motors of GRBL 1.1, which is silent then until it is reset.
+        It stays locked.
+        """
+        try:
+            status = self._link.look()
+        except DeviceError:
+            if not self._link.awaits_reset:
+                raise
+            self._link.realtime(RESET)
+            status = self._link.look()
+        self._link.pause(_SOONEST_POLL_S)
+        return status
 
     def _rest(self, status: Status) -> None:
         """Notes where the machine stands, and lets it forget what it has not done.

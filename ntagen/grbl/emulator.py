@@ -111,8 +111,11 @@ class Emulator:
         self._machine.raise_alarm(code)
 
     def press(self, pins: str) -> None:
-        """Sets which input pins are active, for example ``X`` for the limit switch of that axis."""
+        """Sets which input pins are active: ``X`` is the limit of that axis, ``D`` the door."""
+        is_opened = "D" in pins and "D" not in self._machine.pins
         self._machine.pins = pins
+        if is_opened:
+            self._machine.open_door()
 
     def send(self, noise: bytes) -> None:
         """Sends bytes, which need not belong to the protocol."""

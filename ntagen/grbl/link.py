@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from ntagen.errors import DeviceError
+from ntagen.grbl.names import CRITICAL_ALARMS
 from ntagen.grbl.port import Port
 from ntagen.grbl.protocol import (
     MAX_LINE_BYTES,
@@ -79,6 +80,7 @@ class Link:
         self._failure: str | None = None
         self._turn = threading.RLock()
         self._expects_banner = False
+        self._awaits_reset = False
         self._noise: ProtocolError | None = None
         self._form: tuple[bool, int, bool] | None = None
 
@@ -91,6 +93,11 @@ class Link:
     def failure(self) -> str | None:
         """Why nothing is moved any more; `None` while all is well."""
         return self._failure
+
+    @property
+    def awaits_reset(self) -> bool:
+        """Whether the last alarm is one after which the controller obeys nothing but a reset."""
+        return self._awaits_reset
 
     @property
     def turn(self) -> threading.RLock:
@@ -224,7 +231,8 @@ class Link:
             raise self.fail(f"{self.name}: {self._noise}")
         raise self.fail(
             f"{self.name}: nothing answers\n"
-            "hint: check power and cable, that this is the controller's port, and its baud rate"
+            "hint: check power and cable, that this is the controller's port, and its baud rate; "
+            "GRBL 1.1 that a limit switch has stopped answers when it is reset"
         )
 
     def require_whole(self) -> None:
@@ -355,6 +363,10 @@ class Link:
         reply = parse(line)
         if isinstance(reply, Status) and self._form not in (None, reply.form):
             raise nonsense(line)
+        if isinstance(reply, Alarm):
+            self._awaits_reset = reply.code in CRITICAL_ALARMS
+        elif isinstance(reply, Banner):
+            self._awaits_reset = False
         return reply
 
     def _write(self, data: bytes) -> None:

@@ -13,15 +13,13 @@ from typing import Final, Protocol
 from ntagen.grbl.dialects import Dialect
 from ntagen.grbl.gcode import Block, GcodeError, Modal, read, read_jog
 from ntagen.grbl.memory import Memory
+from ntagen.grbl.names import CRITICAL_ALARMS
 from ntagen.grbl.planner import Planner
 from ntagen.grbl.reports import Snapshot, StatusWriter, modal_report, offsets_report
 
 _UNLOCK: Final = "[MSG:'$H'|'$X' to unlock]"
 _LATER: Final = -1
 """A line whose answer comes when the motion is over."""
-
-_CRITICAL_ALARMS: Final = (1, 2)
-"""After these, nothing but a reset is obeyed."""
 
 
 class Wire(Protocol):
@@ -65,7 +63,7 @@ class Machine:
         self._modal = Modal()
         self._state, self._sub = "Idle", 0
         self._needs_reset = False
-        self._cancels_jog = False
+        self._cancels_jog = self._opens_door = False
         self._line_waits = self._hangs = False
         self._then: Callable[[], None] | None = None
         self._alarm_when_still = 0
@@ -86,8 +84,8 @@ class Machine:
         """Stops at once and locks itself."""
         self.planner.move_to(self.planner.position)
         self._state, self._then, self._alarm_when_still = "Alarm", None, 0
-        self._cancels_jog = self._line_waits = False
-        self._needs_reset = code in _CRITICAL_ALARMS
+        self._cancels_jog = self._opens_door = self._line_waits = False
+        self._needs_reset = code in CRITICAL_ALARMS
         self._wire.forget()
         self._wire.say(f"ALARM:{code}")
         if self._needs_reset:
@@ -115,6 +113,9 @@ class Machine:
         if self._cancels_jog:
             self._cancels_jog = False
             self._settle()
+            if self._opens_door:
+                self._opens_door, self._state, self._sub = False, "Door", 0
+                self._status.accessories_changed()
         if self._alarm_when_still:
             self.raise_alarm(self._alarm_when_still)
         elif self._then is not None and not self.planner.block_count:
@@ -147,25 +148,34 @@ class Machine:
             self.planner.hold()
 
     def open_door(self) -> None:
-        """0x84: slows down and waits, as when the safety door is opened.
+        """0x84, or the pin of the safety door: slows down and waits.
 
-        grblHAL stands still in a jog, says that it jogs, and heeds only `~` and a reset.
+        A jog is ended by GRBL, which says that it jogs until the axes stand. grblHAL stands still
+        in a jog, says that it jogs, and heeds only `~` and a reset.
         """
         if self._state in ("Alarm", "Check", "Sleep", "Home"):
             return
         self._wire.say("[MSG:Check Door]")
-        if self._dialect.is_hal and self._state == "Jog":
-            self._hangs = True
+        if self._state == "Jog":
+            if self._dialect.is_hal:
+                self._hangs = True
+            else:
+                self._cancels_jog = self._opens_door = True
             self.planner.hold()
             return
-        self._cancels_jog = self._cancels_jog or self._state == "Jog"
         self._state, self._sub = "Door", 2 if self.planner.is_moving else 0
         if self._sub == 0:
             self._status.accessories_changed()
         self.planner.hold()
 
+    @property
+    def _is_ajar(self) -> bool:
+        return "D" in self.pins
+
     def resume(self) -> None:
-        """`~`: goes on after a hold, once the axes stand."""
+        """`~`: goes on after a hold, once the axes stand and the door is closed."""
+        if self._state == "Door" and self._is_ajar:
+            return
         is_held = self._state in ("Hold", "Door") and self._sub == 0
         if not is_held and not self._hangs:
             return
@@ -193,7 +203,8 @@ class Machine:
         """Forgets all but settings, position and alarm, and says the banner after some time."""
         self._wire.forget(deaf_s=seconds)
         self._modal, self._latch, self._then, self._alarm_when_still = Modal(), 0, None, 0
-        self._line_waits = self._cancels_jog = self._needs_reset = self._hangs = False
+        self._line_waits = self._cancels_jog = self._opens_door = False
+        self._needs_reset = self._hangs = False
         self.dwell_end_s = -math.inf
         self._program = list(self.planner.position)
         self._status.reset()
@@ -206,13 +217,15 @@ class Machine:
             self._wire.say(_UNLOCK)
 
     def report(self) -> None:
-        """`?`: says a status report."""
+        """`?`: says a status report; GRBL says none after an alarm that only a reset ends."""
+        if self._needs_reset and not self._dialect.is_hal:
+            return
         moves = self.planner.is_moving
         self._wire.say(
             self._status.write(
                 Snapshot(
                     state=self._state,
-                    sub=self._sub if self._state in ("Hold", "Door") else None,
+                    sub=self._shown_sub(),
                     position=self._memory.rounded(self.planner.position),
                     speed_per_min=60.0 * self.planner.speed() if moves else 0.0,
                     blocks_free=self._dialect.planner_blocks - self.planner.block_count,
@@ -222,6 +235,12 @@ class Machine:
                 )
             )
         )
+
+    def _shown_sub(self) -> int | None:
+        """The number after the state: of a door, 1 says that the axes stand and it is open."""
+        if self._state == "Door" and self._sub == 0:
+            return int(self._is_ajar)
+        return self._sub if self._state in ("Hold", "Door") else None
 
     # Lines.
 

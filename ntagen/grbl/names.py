@@ -56,6 +56,9 @@ ERRORS: Final[dict[int, str]] = {
     79: "the controller is locked until the alarm is over",
 }
 
+CRITICAL_ALARMS: Final = (1, 2)
+"""After these, a controller obeys nothing but a reset; GRBL 1.1 does not even give its status."""
+
 ALARMS: Final[dict[int, str]] = {
     1: "a limit switch was hit",
     2: "the target is outside the travel of the machine",

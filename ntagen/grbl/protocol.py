@@ -118,7 +118,8 @@ class Status:
 
     Attributes:
         activity: What the controller does.
-        sub: The number after the state; of ``Hold`` and ``Door``, 0 says that the axes stand.
+        sub: The number after the state. Of ``Hold`` and ``Door``, 0 says that the axes stand; so
+            does 1 of ``Door``: it is still open.
         machine: The machine position, unless the controller reports work positions.
         work: The work position, unless the controller reports machine positions.
         offset: The work offset: machine position minus work position. Few reports have it.
@@ -145,8 +146,10 @@ class Status:
     @property
     def stands(self) -> bool:
         """Whether the axes do not move, and do not start by themselves."""
-        if self.activity in (Activity.HOLD, Activity.DOOR):
+        if self.activity is Activity.HOLD:
             return self.sub == 0
+        if self.activity is Activity.DOOR:
+            return self.sub in (0, 1)
         return self.activity in (Activity.IDLE, Activity.ALARM, Activity.SLEEP, Activity.CHECK)
 
     def __str__(self) -> str:

@@ -260,6 +260,32 @@ def test_after_a_fault_nothing_moves_any_more(dialect: Dialect, name: str, secon
     assert bench.plant.sums["X"] == moved_mm
 
 
+@BOTH
+def test_a_limit_switch_stops_the_needle_and_the_driver_learns_where(dialect: Dialect) -> None:
+    bench = Bench(dialect)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.emulator.raise_alarm(1))
+    with pytest.raises(DeviceError) as raised:
+        actuator.push(5.0)
+    assert "ALARM:1" in str(raised.value)
+    assert "does not confirm" not in str(raised.value)
+    assert actuator.position[0] == pytest.approx(bench.plant.sums["X"], abs=0.01)
+    assert 0.5 < actuator.position[0] < 2.0
+
+
+def test_an_open_door_stops_the_needle_and_the_driver_learns_where() -> None:
+    bench = Bench(GRBL_11H)
+    actuator = bench.connect()
+    actuator.watch = At(bench, 1.0, lambda: bench.emulator.press("D"))
+    with pytest.raises(DeviceError, match=r"was interrupted.*state Door") as raised:
+        actuator.push(5.0)
+    assert "does not confirm" not in str(raised.value)
+    assert actuator.position[0] == pytest.approx(bench.plant.sums["X"], abs=0.01)
+    bench.emulator.press("")
+    bench.let_go("~", 10.0)
+    assert actuator.position[0] == pytest.approx(bench.plant.sums["X"], abs=0.01)
+
+
 def test_a_hold_button_ends_a_push() -> None:
     bench = Bench(GRBL_11H)
     actuator = bench.connect()

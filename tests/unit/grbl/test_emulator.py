@@ -143,6 +143,27 @@ def test_grblhal_stands_in_a_jog_for_ever_when_the_door_is_opened() -> None:
     assert bench.say("\x18") == ["ALARM:3"]
 
 
+def test_grbl_ends_a_jog_when_the_door_is_opened_and_is_held_until_it_is_closed() -> None:
+    """As GRBL 1.1h did in simavr (`docs/firmware.md`)."""
+    bench = Bench(GRBL_11H)
+    bench.say("$J=G91G21X20F300\n")
+    bench.wait(1.0)
+    bench.emulator.press("D")
+    assert bench.wait(0.0) == ["[MSG:Check Door]"]
+    assert str(bench.status()) == "Jog"
+    bench.wait(1.0)
+    assert str(bench.status()) == "Door:1"
+    there_mm = bench.plant.sums["X"]
+    bench.say("~")
+    assert str(bench.status()) == "Door:1"
+    bench.emulator.press("")
+    assert str(bench.status()) == "Door:0"
+    bench.say("~")
+    assert str(bench.status()) == "Idle"
+    bench.wait(1.0)
+    assert bench.plant.sums["X"] == there_mm < 10.0
+
+
 @BOTH
 def test_a_reset_in_motion_is_an_alarm_and_at_rest_it_is_not(dialect: Dialect) -> None:
     bench = Bench(dialect)
@@ -216,6 +237,8 @@ def test_soft_limits_refuse_jogs_and_stop_motions(dialect: Dialect) -> None:
     bench.wait(10.0)
     assert bench.say("G91G1X-20F500\n") == ["ALARM:2", "[MSG:Reset to continue]"]
     assert bench.say("$X\n") == []
+    # As GRBL 1.1h in simavr, and grblHAL in its simulator.
+    assert len(bench.say("?")) == (1 if dialect is GRBLHAL else 0)
     bench.say("\x18")
     assert bench.wait(1.0)[-1] == "[MSG:'$H'|'$X' to unlock]"
 
@@ -234,7 +257,10 @@ def test_a_limit_switch_that_is_hit_in_motion_is_an_alarm() -> None:
     bench.wait(1.0)
     bench.emulator.press("X")
     assert "ALARM:1" in bench.wait(0.1)
+    bench.say("\x18")
+    bench.wait(1.0)
     assert bench.status().pins == "X"
+    assert str(bench.status()) == "Alarm"
 
 
 def test_lines_wait_for_dwells_and_for_the_end_of_a_hold() -> None:
