@@ -1,9 +1,8 @@
-"""A needle behind real firmware, in real time: grblHAL's simulator, built by the tester.
+"""A needle behind real firmware, in real time: one of the `tests.faults.controllers`.
 
-`docs/firmware.md` says how it is built. The simulator counts steps and knows no needle: the
-positions in its status reports move a phantom here, which a tracker publishes as in `ntagen.lab`.
-The driver opens a pseudo-terminal, as at hardware. The switches of limit and door are pins of the
-simulator, which it reads from its keyboard.
+The controller counts steps and knows no needle: the positions in its status reports move a phantom
+here, which a tracker publishes as in `ntagen.lab`. The driver opens a pseudo-terminal, as at
+hardware. The switches of limit and door are pins of the controller.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import pty
 import re
 import select
 import socket
-import subprocess
 import threading
 import time
 import tty
@@ -31,11 +29,9 @@ from ntagen.needle.phantom_sensor import Frame
 from ntagen.nsl import load_task
 from ntagen.openigtlink.server import Server
 from ntagen.tracking.simulated import FORCE, NEEDLE
+from tests.faults.controllers import Controller
 
-PROGRAM = "NTAGEN_GRBLHAL_SIM"
-"""The environment variable that names the simulator."""
-
-TASK = """\
+_TASK = """\
 environment firmware {
   needle {
     tip (0, 0, 0) mm  heading -y  bevel +z
@@ -50,7 +46,7 @@ environment firmware {
   target   T1  sphere (0, -28, 0) mm  radius 10 mm
   critical C1  sphere (0, -13, 0) mm  radius 1 mm
 
-  device grbl "/dev/ttyACM0" { insert X 80 steps/mm  roll A 20 steps/deg }
+  device grbl "/dev/ttyACM0" { insert X 80 steps/mm  roll {roll} 20 steps/deg }
 
   tissue static
   safety sampled
@@ -61,16 +57,7 @@ environment firmware {
 PUSH, REST, REFUSED = "in a push", "at rest", "a line is refused"
 """Moments in which something can happen."""
 
-_SETTINGS = ("$1=255", "$100=80", "$103=20", "$110=600", "$113=7200", "$120=100", "$123=1000")
-"""What the task wants of X and A, and how fast they may be."""
-
-SOFT_MM = 12.0
-"""The needle may go so deep where soft limits are on."""
-
-_SOFT_LIMITS = ("$22=43", "$23=1", "$44=0", "$45=0", f"$130={SOFT_MM:g}", "$20=1", "$HX")
-"""X begins where it stands, by hand: limits count for an axis that has been homed."""
-
-_REPORT = re.compile(rb"<(\w+)(?::\d)?\|MPos:([-0-9.]+),[-0-9.]+,[-0-9.]+,([-0-9.]+)[^<>]*>")
+_REPORT = re.compile(rb"<(\w+)(?::\d)?\|MPos:([-0-9.,]+)[^<>]*>")
 _KEPT_BYTES = 4096
 _BEGINS_MM = 0.15
 """A push that has begun, and is not yet over: it has pieces of 0.25 mm or more."""
@@ -80,10 +67,10 @@ _PATIENCE_S = 20.0
 
 
 class Firmware:
-    """The simulator, the needle that its axes move, and the tracker; use it as a context manager.
+    """A controller, the needle that its axes move, and the tracker; use it as a context manager.
 
     Args:
-        program: The simulator.
+        controller: The controller.
         folder: Where it keeps its settings, and where the task is written.
         soft: Whether it has soft limits.
         seed: The seed of the phantom.
@@ -95,19 +82,22 @@ class Firmware:
         tell: Is called with each of the moments `PUSH`, `REST`, `REFUSED`, before the driver knows.
     """
 
-    def __init__(self, program: Path, folder: Path, *, soft: bool = False, seed: int = 1) -> None:
+    def __init__(
+        self, controller: Controller, folder: Path, *, soft: bool = False, seed: int = 1
+    ) -> None:
         self.task = folder / "firmware.nsl"
-        self.task.write_text(TASK)
+        self.task.write_text(_TASK.replace("{roll}", controller.roll))
         task = load_task(self.task)
         settings = configure(task.given, task.scene, "all", "phantom").settings
         self._placed = place("phantom", task.scene, seed, settings.sensing_margin_mm)
         axes = axes_for(described(task, self.task), task.scene.needle, settings)
         self._plant = NeedlePlant(self._placed.needle, axes)
-        self._program, self._folder, self._soft = program, folder, soft
+        self._controller, self._folder, self._soft = controller, folder, soft
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._is_placed = self._has_driver = False
         self._heard = b""
+        self._state = ""
         self._last: tuple[float, float] | None = None
         self.depth_mm = self._stood_mm = 0.0
         self.struck_mm: float | None = None
@@ -126,10 +116,13 @@ class Firmware:
             self._thread.start()
             stack.callback(self._thread.join)
             stack.callback(self._closing.set)
-            self._until(lambda: b"GrblHAL" in self._heard, "the power")
-            for line in (*_SETTINGS, *(_SOFT_LIMITS if self._soft else ())):
+            one = self._controller
+            self._until(lambda: one.banner in self._heard, "the power")
+            # Errors of a blank memory follow the greeting.
+            self._until(self._stands, "the power")
+            for line in (*one.settings, *(one.soft_limits if self._soft else ())):
                 self.command(line)
-            self._ask()
+                self._until(self._stands, "the end of a motion")
             self._is_placed = True
             stack.enter_context(self._publisher)
             self._stack = stack.pop_all()
@@ -206,6 +199,10 @@ class Firmware:
         self.send(b"?")
         self._until(lambda: _REPORT.search(self._heard) is not None, "?")
 
+    def _stands(self) -> bool:
+        self._ask()
+        return self._state == "Idle"
+
     def _until(self, is_so: Callable[[], bool], what: str) -> None:
         end_s = time.monotonic() + _PATIENCE_S
         while not is_so():
@@ -216,21 +213,14 @@ class Firmware:
         with socket.socket() as free:
             free.bind((HOST, 0))
             number = free.getsockname()[1]
-        words = [str(self._program), "-n", "-t", "1", "-e", str(self._folder / "settings.dat")]
-        self._process = subprocess.Popen(
-            [*words, "-p", str(number)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            cwd=self._folder,
-        )
+        self._process = self._controller.start(self._folder, number)
         end_s = time.monotonic() + _PATIENCE_S
         while True:
             try:
                 self._wire = socket.create_connection((HOST, number))
                 return
             except ConnectionRefusedError:
-                assert time.monotonic() < end_s, "the simulator does not listen"
+                assert time.monotonic() < end_s, "the controller does not listen"
                 time.sleep(_LOOK_S)
 
     def _switch_off(self) -> None:
@@ -258,19 +248,21 @@ class Firmware:
         heard = self._heard = self._heard[-_KEPT_BYTES:] + data
         for found in _REPORT.finditer(heard):
             if found.end() > len(heard) - len(data):
-                self._move(found[1].decode(), float(found[2]), float(found[3]))
+                at = dict(zip(self._controller.axes, map(float, found[2].split(b",")), strict=True))
+                self._move(found[1].decode(), at["X"], at[self._controller.roll])
         if b"error:" in data:
             self.tell(REFUSED)
 
-    def _move(self, state: str, x_mm: float, a_deg: float) -> None:
+    def _move(self, state: str, x_mm: float, roll_deg: float) -> None:
         """Moves the needle to where a report says that the axes are."""
-        last_mm, last_deg = self._last or (x_mm, a_deg)
-        self._last = (x_mm, a_deg)
+        last_mm, last_deg = self._last or (x_mm, roll_deg)
+        self._state, self._last = state, (x_mm, roll_deg)
         if not self._is_placed:
             return
         with self._lock:
             self.depth_mm += x_mm - last_mm
-            self._plant.move({"X": x_mm - last_mm, "A": a_deg - last_deg}, _LOOK_S)
+            moved = {"X": x_mm - last_mm, self._controller.roll: roll_deg - last_deg}
+            self._plant.move(moved, _LOOK_S)
         if state == "Idle":
             self._stood_mm = x_mm
             self.tell(REST)

@@ -1,6 +1,7 @@
-"""Whole runs against real firmware in real time: grblHAL's simulator, which the tester has built.
+"""Whole runs against real firmware in real time: grblHAL and GRBL 1.1h, which the tester has built.
 
-NTAGEN_GRBLHAL_SIM names it (`docs/firmware.md`). Each case takes up to a minute.
+NTAGEN_GRBLHAL_SIM and NTAGEN_GRBL_AVR name them (`docs/firmware.md`). Each case takes up to a
+minute.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -26,16 +27,20 @@ from ntagen.nsl import load_task
 
 pty = pytest.importorskip("pty", reason="pseudo terminals are those of Unix")
 
-from tests.faults.firmware import PROGRAM, PUSH, REFUSED, REST, Firmware  # noqa: E402  it needs pseudo-terminals, too
+from tests.faults.controllers import (  # noqa: E402  as the line above
+    CONTROLLERS,
+    GRBL_11H,
+    GRBLHAL,
+    Controller,
+)
+from tests.faults.firmware import PUSH, REFUSED, REST, Firmware  # noqa: E402  it needs pty, too
+
+if TYPE_CHECKING:
+    from _pytest.mark import ParameterSet
 
 ROOT = Path(__file__).resolve().parents[2]
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(
-        PROGRAM not in os.environ, reason=f"{PROGRAM} names no simulator (docs/firmware.md)"
-    ),
-]
+pytestmark = pytest.mark.slow
 
 STRIKES_MM = 8.0
 """Something happens when the needle is so deep, in the middle of a motion."""
@@ -103,8 +108,8 @@ def _release(key: str) -> Act:
     return release
 
 
-CASES = {
-    "feed hold": Case(_sending(b"!"), "state Hold:0, not idle", _unlock, moment=REST),
+_COMMON = {
+    "feed hold at rest": Case(_sending(b"!"), "state Hold:0, not idle", _unlock, moment=REST),
     "alarm": Case(_pressing("x"), "limit switch", _release("x"), hard=True),
     "soft reset": Case(_sending(b"\x18"), "reset|alarm", _unlock),
     "soft limit": Case(
@@ -116,7 +121,6 @@ CASES = {
         moment=REFUSED,
         soft=True,
     ),
-    "door": Case(_pressing("d"), "is stuck.*state Jog", _release("d")),
     "cable": Case(Firmware.pull_cable, "connection to the controller is broken", Firmware.plug_in),
     "power cycle": Case(
         Firmware.lose_power,
@@ -127,9 +131,27 @@ CASES = {
     ),
 }
 
+CASES = {
+    GRBLHAL: _COMMON | {"door": Case(_pressing("d"), "is stuck.*state Jog", _release("d"))},
+    GRBL_11H: _COMMON
+    | {
+        "door": Case(_pressing("d"), "was interrupted.*state Door", _release("d")),
+        "feed hold": Case(_sending(b"!"), "ended too early", _nothing),
+    },
+}
 
-def test_without_a_fault_the_target_is_reached(tmp_path: Path) -> None:
-    with _opened(tmp_path) as firmware:
+
+def _named(controller: Controller, *values: object, name: str = "") -> ParameterSet:
+    """A case of a controller, which is skipped unless the tester has built that."""
+    reason = f"{controller.variable} names no firmware (docs/firmware.md)"
+    skip = pytest.mark.skipif(not controller.is_named, reason=reason)
+    words = f"{controller.name} {name}".strip()
+    return pytest.param(controller, *values, marks=skip, id=words)
+
+
+@pytest.mark.parametrize("controller", [_named(one) for one in CONTROLLERS])
+def test_without_a_fault_the_target_is_reached(controller: Controller, tmp_path: Path) -> None:
+    with Firmware(controller, tmp_path) as firmware:
         code, summary, errors = _drive(firmware, tmp_path / "run.mcap")
         firmware.settle()
         assert (code, summary["outcome"]) == (0, "target reached"), (summary, errors)
@@ -137,8 +159,9 @@ def test_without_a_fault_the_target_is_reached(tmp_path: Path) -> None:
     _check_log(tmp_path / "run.mcap", "target reached")
 
 
-def test_a_feed_hold_in_a_jog_is_not_heard_by_the_firmware(tmp_path: Path) -> None:
-    with _opened(tmp_path) as firmware:
+@pytest.mark.parametrize("controller", [_named(GRBLHAL)])
+def test_a_feed_hold_in_a_jog_is_not_heard(controller: Controller, tmp_path: Path) -> None:
+    with Firmware(controller, tmp_path) as firmware:
         firmware.tell = _striking(firmware, _sending(b"!"), PUSH)
         code, summary, errors = _drive(firmware, tmp_path / "run.mcap")
         firmware.settle()
@@ -146,16 +169,23 @@ def test_a_feed_hold_in_a_jog_is_not_heard_by_the_firmware(tmp_path: Path) -> No
         assert (code, summary["outcome"]) == (0, "target reached"), (summary, errors)
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_a_fault_ends_a_run_that_can_be_resumed(name: str, tmp_path: Path) -> None:
-    case, log = CASES[name], tmp_path / "run.mcap"
-    with _opened(tmp_path, soft=case.soft) as firmware:
+@pytest.mark.parametrize(
+    ("controller", "name"),
+    [_named(one, name, name=name) for one in CONTROLLERS for name in CASES[one]],
+)
+def test_a_fault_ends_a_run_that_can_be_resumed(
+    controller: Controller, name: str, tmp_path: Path
+) -> None:
+    case, log = CASES[controller][name], tmp_path / "run.mcap"
+    with Firmware(controller, tmp_path, soft=case.soft) as firmware:
         if case.hard:
             firmware.command("$21=1")
         firmware.tell = _striking(firmware, case.strike, case.moment)
         code, summary, errors = _drive(firmware, log)
-        firmware.settle()
         assert firmware.struck_mm is not None, f"over before anything happened: {summary} {errors}"
+        case.mend(firmware)
+        # What is put right must not move the needle, either.
+        firmware.settle()
         deeper_mm = firmware.depth_mm - firmware.struck_mm
         print(f"{name}: deeper by {deeper_mm:.2f} mm, exit code {code}: {summary.get('reason')}")
         assert (code, summary["outcome"]) == (5, "device fault"), errors
@@ -163,7 +193,6 @@ def test_a_fault_ends_a_run_that_can_be_resumed(name: str, tmp_path: Path) -> No
         assert deeper_mm <= DEEPER_MM
         _check_log(log, "device fault")
 
-        case.mend(firmware)
         words = ["--resume", str(log), *_devices(firmware)]
         code, summary, errors = _run(*words, answers=case.answers)
         print(f"{name}: resumed, exit code {code}: {summary.get('reason')}\n{errors}")
@@ -171,10 +200,6 @@ def test_a_fault_ends_a_run_that_can_be_resumed(name: str, tmp_path: Path) -> No
         assert (summary["outcome"], code) == case.resumed, errors
         assert firmware.true_clearance_mm > 0.0
         _check_log(tmp_path / "run-resumed.mcap", case.resumed[0])
-
-
-def _opened(folder: Path, *, soft: bool = False) -> Firmware:
-    return Firmware(Path(os.environ[PROGRAM]), folder, soft=soft)
 
 
 def _striking(firmware: Firmware, strike: Act, when: str) -> Callable[[str], None]:
