@@ -65,6 +65,8 @@ class Controller:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             cwd=folder,
+            # So that Linux gives it a share of its own, whatever the driver computes.
+            start_new_session=True,
         )
 
 
@@ -89,7 +91,7 @@ GRBLHAL = Controller(
     banner=b"GrblHAL",
     axes="XYZA",
     roll="A",
-    settings=("$1=255", "$100=80", "$103=20", "$110=600", "$113=7200", "$120=100", "$123=1000"),
+    settings=("$1=255", "$100=80", "$103=5", "$110=600", "$113=7200", "$120=100", "$123=1000"),
     # X begins where it stands, by hand: limits count for an axis that has been homed.
     soft_limits=("$22=43", "$23=1", "$44=0", "$45=0", f"$130={SOFT_MM:g}", "$20=1", "$HX"),
 )
@@ -101,7 +103,7 @@ GRBL_11H = Controller(
     banner=b"Grbl 1.1h",
     axes="XYZ",
     roll="Y",
-    settings=("$1=255", "$100=80", "$101=20", "$110=600", "$111=7200", "$120=100", "$121=1000"),
+    settings=("$1=255", "$100=80", "$101=5", "$110=600", "$111=7200", "$120=100", "$121=1000"),
     # All axes end at 0, and each must be able to turn both ways: so they first go back from there.
     soft_limits=(f"$J=G91 X-{SOFT_MM:g} Y-720 F7200", "$22=1", "$131=2000", "$20=1"),
 )

@@ -46,7 +46,7 @@ environment firmware {
   target   T1  sphere (0, -28, 0) mm  radius 10 mm
   critical C1  sphere (0, -13, 0) mm  radius 1 mm
 
-  device grbl "/dev/ttyACM0" { insert X 80 steps/mm  roll {roll} 20 steps/deg }
+  device grbl "/dev/ttyACM0" { insert X 80 steps/mm  roll {roll} 5 steps/deg }
 
   tissue static
   safety sampled

@@ -20,10 +20,10 @@
 #include <simavr/sim_avr.h>
 #include <simavr/sim_elf.h>
 
-#define HZ 8000000ull
+#define HZ 4000000ull
 #define BYTE_CYCLES (HZ * 10 / 115200)
 #define SLICE_CYCLES (HZ / 1000)
-#define LATE_CYCLES (HZ / 20) /* What is later than that is not caught up: it would be haste. */
+#define LATE_CYCLES HZ /* A computer that was busy for longer has lost time for good. */
 #define EEPROM_BYTES 1024
 #define OCR1AH 0x89
 
