@@ -188,10 +188,11 @@ int main(int argc, char **argv)
     zero = wall_cycles();
     for (;;) {
         due = wall_cycles() - zero;
-        if (due > avr->cycle + LATE_CYCLES) {
-            zero += due - avr->cycle - SLICE_CYCLES;
+        if (due > avr->cycle + LATE_CYCLES)
+            zero += due - avr->cycle - LATE_CYCLES;
+        /* What comes is looked at after each slice, also when there is much to make up for. */
+        if (due > avr->cycle + SLICE_CYCLES)
             due = avr->cycle + SLICE_CYCLES;
-        }
         run_until(due, in, count);
         keep_eeprom(argv[2]);
         if (out_count && write(line, out, out_count) != (ssize_t)out_count)
