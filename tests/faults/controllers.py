@@ -71,8 +71,14 @@ class Controller:
 
 
 def _simulator(program: Path, folder: Path, port: int) -> list[str]:
+    """The simulator on one core, as a microcontroller has one.
+
+    Its firmware and its interrupts are two threads without a lock, so that side by side they lose
+    what the other one says: the end of a motion, or an alarm.
+    """
+    one_core = ["taskset", "--cpu-list", str(max(os.sched_getaffinity(0)))]
     memory = str(folder / "settings.dat")
-    return [str(program), "-n", "-t", "1", "-e", memory, "-p", str(port)]
+    return [*one_core, str(program), "-n", "-t", "1", "-e", memory, "-p", str(port)]
 
 
 def _in_simavr(firmware: Path, folder: Path, port: int) -> list[str]:
