@@ -48,7 +48,7 @@ STRIKES_MM = 8.0
 DEEPER_MM = 1.0
 """The needle must not go deeper than this afterwards: at 1 mm/s it goes on for 0.15 mm."""
 
-_PATIENCE_S = 120.0
+_PATIENCE_S = 300.0
 
 Act = Callable[[Firmware], None]
 
