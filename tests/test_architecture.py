@@ -93,6 +93,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
+    "convert": {"build", "checker", "checker.facts", "checker.picture", "checker.queries", "errors"},
     "verifyta": {"errors", "files", "checker"},
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}
@@ -171,7 +172,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.picture", "report", "system"}
     | {"editor", "serve", "simulator", "verifyta", "watch"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
-    | {"checker.agents"},
+    | {"checker.agents", "convert"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},
 }

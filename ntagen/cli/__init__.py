@@ -40,6 +40,7 @@ COMMANDS: Final = {
     "plan": ("needle.plan", "Find the best plans of a task within a budget of time."),
     "verify": ("models.verify", "Check a trace, certificate or strategy independently."),
     "play": ("models.play", "Play a timed game against a strategy."),
+    "convert": ("models.convert", "Turn a model into the format of another tool."),
     "info": ("models.info", "Show what is in a model or an environment."),
     "explain": ("explain", "Explain a diagnostic: what it means and how to fix it."),
     "plot": ("plot", "Draw a scene, its plans, a run or a model."),
