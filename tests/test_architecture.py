@@ -93,7 +93,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "explanations": {"nsl", "checker"},
     "loading": BASE | {"nsl", "render", "checker", "checker.strategy"},
     "build": {"errors", "files", "checker", "checker.picture"},
-    "convert": {"build", "checker", "checker.facts", "checker.picture", "checker.queries", "errors"},
+    "convert": {"build", "errors", "checker"}
+    | {"checker.facts", "checker.picture", "checker.queries"},
     "verifyta": {"errors", "files", "checker"},
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}

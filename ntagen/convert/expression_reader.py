@@ -34,7 +34,7 @@ class UnknownExpression(ValueError):  # noqa: N818  it says what an expression i
 _TOKEN: Final = re.compile(
     r"\s*(?://[^\n]*\n?|/\*.*?\*/)?\s*(?:"
     r"(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|"
-    r"(?P<sign><<=|>>=|\*\*|:=|\+\+|--|->|<<|>>|<\?|>\?|<=|>=|==|!=|&&|\|\||"
+    r"(?P<sign><<=|>>=|\*\*|:=|\+\+|--|->|<<|>>|<\?|>\?|<=|=<|>=|==|!=|&&|\|\||"
     r"[-+*/%&|^]=|[-+*/%<>=!?:()\[\],.&|^'{};]))",
     re.DOTALL,
 )
@@ -42,7 +42,8 @@ _TOKEN: Final = re.compile(
 _TCK_NAME: Final = re.compile(r"\s*(?P<name>[A-Za-z_][\w.]*)")
 """Names of TChecker may have dots."""
 
-_WORDS: Final = {"and": "&&", "or": "||", "not": "!"}
+_WORDS: Final = {"and": "&&", "or": "||", "not": "!", "=<": "<="}
+"""Other words for signs; ``=<`` is one of the old syntax."""
 
 _QUANTIFIERS: Final = ("forall", "exists", "sum")
 _COMPOUND: Final = ("+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "<<=", ">>=")
@@ -136,6 +137,10 @@ class _Reader:
     def whole(self) -> Expr:
         """All of the text as one expression."""
         found = self.expression()
+        while self.token == "," and not self._tck:
+            # The old syntax has lists of conditions.
+            self.take()
+            found = Binary("&&", found, self.expression())
         if self.token in ("=", ":=", "++", "--", *_COMPOUND):
             raise UnknownExpression("an assignment inside an expression")
         if self.token:

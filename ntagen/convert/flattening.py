@@ -25,6 +25,7 @@ from ntagen.convert.expressions import (
     Binary,
     Call,
     Expr,
+    Index,
     Name,
     Number,
     Quantified,
@@ -252,9 +253,18 @@ class _ProcessMaker:
         process = self._scope.process
 
         def change(one: Expr) -> Expr | None:
-            if isinstance(one, Number) or not names(one) or not self._is_constant(one):
+            if not names(one):
                 return None
-            return Number(self._questions.value(process, shown(one).replace("@", "")))
+            if self._is_constant(one):
+                return Number(self._questions.value(process, shown(one).replace("@", "")))
+            if isinstance(one, Index) and self._is_constant(one.base):
+                refuse(
+                    where,
+                    f"`{shown(one.base).replace('@', '')}` in `{shown(expr)}` is a table of "
+                    "constants whose index changes",
+                    "declare the table as a variable: without `const`",
+                )
+            return None
 
         found = mapped(self._resolved(expr, values), change)
         for one in parts(found):
@@ -263,13 +273,6 @@ class _ProcessMaker:
                     where,
                     f"the function `{one.function}` in `{shown(expr)}` has no counterpart",
                     "write what it computes into the label",
-                )
-            if isinstance(one, Name) and one.text not in self._names:
-                refuse(
-                    where,
-                    f"`{one.text.strip('@')}` in `{shown(expr)}` is a table of constants whose "
-                    "index changes",
-                    "declare the table as a variable: without `const`",
                 )
         return found
 

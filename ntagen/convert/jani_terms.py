@@ -16,6 +16,7 @@ from ntagen.convert.expressions import (
     Binary,
     Choice,
     Expr,
+    Field,
     Index,
     Name,
     Number,
@@ -70,7 +71,7 @@ class JaniTerms:
         match expr:
             case Number(value):
                 return value
-            case Name() | Index():
+            case Name() | Index() | Field():
                 return self._read(place, expr)
             case Unary("-", operand):
                 return _binary("-", 0, self.value(place, operand))

@@ -15,11 +15,13 @@ from ntagen.convert.expressions import (
     Binary,
     Choice,
     Expr,
+    Field,
     Index,
     Name,
     Number,
     Unary,
     conjuncts,
+    names,
     shown,
 )
 from ntagen.convert.network import Network, has_clock, part_name, part_names, refuse
@@ -80,7 +82,7 @@ class Terms:
         match expr:
             case Number(value):
                 return f"{value}" if value >= 0 or outermost else f"({value})"
-            case Name() | Index():
+            case Name() | Index() | Field():
                 return self._read(place, expr)
             case Unary("-", operand):
                 return f"(-{self.term(place, operand)})"
@@ -150,13 +152,16 @@ class Terms:
         if base in self.arrays:
             yield f"{self.arrays[base]}[{self.term(place, index, outermost=True)}] = {value}"
             return
-        # One statement a part, chosen by the index; the value is computed once at most.
-        branches = [
-            f"if {self.term(place, index)} == {number} "
-            f"then {self.parts[self._part(base, number)]} = {value} "
-            for number in range(size)
-        ]
-        yield "else ".join(branches) + " ".join(["end"] * size)
+        if base in names(index):
+            refuse(
+                place,
+                f"the index of `{shown(update.target)}` has the array itself",
+                "give all parts of the array the same first value, or keep the index in a variable",
+            )
+        # One statement a part, of which all but one change nothing.
+        for number in range(size):
+            part = self.parts[self._part(base, number)]
+            yield f"{part} = (if {self.term(place, index)} == {number} then {value} else {part})"
 
     def _clock_value(self, place: str, expr: Expr) -> str:
         """An integer, or the sum of an integer and a clock, which comes last."""

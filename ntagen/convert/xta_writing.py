@@ -71,7 +71,7 @@ def _node_names(template: Template) -> dict[int, str]:
     found = {id(one): one.name for one in template.locations if one.name}
     for node in template.nodes:
         if id(node) not in found:
-            found[id(node)] = fresh.fresh(re.sub(r"\W", "_", f"_{node.id}"))
+            found[id(node)] = fresh.fresh(node.id)
     return found
 
 

@@ -128,7 +128,7 @@ def _source(path: Path, source_format: str, include: tuple[Path, ...]) -> Source
     beside = path.with_suffix(".q")
     if source_format in ("xta", "ta") and beside.is_file():
         queries = model.read_queries(beside)
-        echo(f"note: {_queries(len(queries))} of {beside} come along", err=True)
+        echo(f"note: read {_queries(len(queries))} of {beside}", err=True)
         return source_of(model, str(path), queries)
     return source_of(model, str(path), model.queries if source_format != "xml" else ())
 
