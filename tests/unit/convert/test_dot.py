@@ -5,7 +5,7 @@ from __future__ import annotations
 from ntagen.convert import convert
 from tests.systems import source
 
-MODEL = """chan go; process P(const int[0,1] id) { 
+MODEL = """chan go; process P(const int[0,1] id) {
   clock x; state A { x <= 3; 2 }, B, C; branchpoint F;
   commit B; urgent C; init A;
   trans A -> B { select i : int[0,1]; guard x > 1 && i == id; sync go!; assign x = 0; },

@@ -1,0 +1,4 @@
+E<> Gambler.Won
+Pr[#<=300](<> Gambler.Won)
+maxPr[#<=300]: <> Gambler.Won
+minPr[#<=300]: <> Gambler.Won

@@ -1,0 +1,2 @@
+E<> Sender.Ok
+Pr[<=5](<> Sender.Ok)
