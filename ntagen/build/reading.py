@@ -84,8 +84,7 @@ def _parsed(text: str, path: str) -> Model:
     if not text.lstrip().startswith("<"):
         raise InputError(
             f"{path}: only models in UPPAAL's XML can be edited, and this is none\n"
-            "hint: open an XTA model in UPPAAL and save it as XML; `ntagen compile` makes XML of "
-            "an environment"
+            "hint: `ntagen convert` makes XML of an XTA model or an environment"
         )
     return _Reader(path, text).model()
 

@@ -215,7 +215,7 @@ def tarzan_table(folder: Path, tck: Tck, timeout_s: float) -> None:
         word = require_same(f"{name}, states", *(one.states for one in found))
         verdicts = []
         for number, query in enumerate(asked, 1):
-            labels = re.findall(rf"tck-reach -l (query{number}(?:_1.*)?) says", exported.text)
+            labels = re.findall(rf"tck-reach -l (query{number}(?:_1[^`]*)?)`", exported.text)
             if labels:
                 reachable = tck.is_reachable(exported.text, labels[0])
                 satisfied = model.check(query.text, timeout_s=timeout_s).satisfied
