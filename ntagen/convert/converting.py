@@ -94,13 +94,13 @@ def convert(source: Source, target: str) -> Converted:
     queries = [one.formula for one in source.written.queries if one.formula.strip()]
     name = Path(source.path).stem or "model"
     if target == "tck":
-        network = network_of(source.model, source.written, source.path)
+        network = network_of(source.model, source.written, source.path, "TChecker")
         tck = written_tck(network, queries, name, source.path)
         return Converted(tck.text, None, tck.notes)
     if target == "jani":
         from ntagen.convert.jani import written_jani
 
-        network = network_of(source.model, source.written, source.path)
+        network = network_of(source.model, source.written, source.path, "JANI")
         jani = written_jani(network, queries, name, source.path)
         return Converted(jani.text, None, jani.notes)
     if target == "dot":

@@ -60,18 +60,19 @@ MOST_EDGES: Final = 100_000
 _WAY_OUT: Final = "write it with comparisons, + - * / % and assignments"
 
 
-def network_of(model: checker.Model, written: build.Model, path: str) -> Network:
+def network_of(model: checker.Model, written: build.Model, path: str, tool: str) -> Network:
     """The network of a model.
 
     Args:
         model: The model in the engine.
         written: The same model as it is written.
         path: The name of its file, for messages.
+        tool: The name of the other tool, for messages.
 
     Raises:
         InputError: The model or a label uses what no other format has.
     """
-    require_exchangeable(model, path)
+    require_exchangeable(model, written, path, tool)
     questions = Questions(written, path)
     instances = Instances(written)
     found = json.loads(model.network_json())

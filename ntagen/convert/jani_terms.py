@@ -24,7 +24,7 @@ from ntagen.convert.expressions import (
     shown,
 )
 from ntagen.convert.intervals import interval
-from ntagen.convert.network import Network, part_name, part_names, refuse
+from ntagen.convert.network import Network, has_clock, part_name, part_names, refuse
 from ntagen.values import dataclass
 
 Json = Any
@@ -104,6 +104,13 @@ class JaniTerms:
         """The variables that updates write, with their values, in order."""
         for one in updates:
             name = part_name(one.target)
+            clocks = frozenset(self.network.clocks)
+            if name in clocks and has_clock(one.value, clocks):
+                refuse(
+                    place,
+                    f"JANI cannot set a clock to `{shown(one.value)}`",
+                    "set it to an integer",
+                )
             if name is not None and name in self.names:
                 yield self.names[name], self.value(place, one.value)
                 continue

@@ -266,7 +266,9 @@ def test_what_cannot_be_kept_is_refused(text: str, message: str) -> None:
 
 
 def test_a_file_that_is_not_xml_is_named() -> None:
-    with pytest.raises(InputError, match=r"fischer\.xta: only models .*\nhint: `ntagen convert` makes XML"):
+    with pytest.raises(
+        InputError, match=r"fischer\.xta: only models .*\nhint: `ntagen convert` makes XML"
+    ):
         build.read(ROOT / "examples" / "models" / "fischer.xta")
     with pytest.raises(FileNotFoundError):
         build.read("nothing.xml")

@@ -175,6 +175,14 @@ def test_random_networks_have_the_same_states(data: st.DataObject, is_timed: boo
 
 
 REFUSED = {
+    "clock x, y; process P() { state A; init A; trans A -> A { assign x = y + 1; }; } system P;": (
+        "model.xta: template P, edge A → A, update: JANI cannot set a clock to `y + 1`",
+        "set it to an integer",
+    ),
+    "urgent chan c; process P() { state A; init A; } system P;": (
+        "model.xta: channel c: JANI has no urgent channels",
+        "use an urgent location",
+    ),
     "clock x; process P() { state A { ; 2 }; init A; } system P;": (
         "model.xta: process P, location A: a model with clocks is exported without random delays",
         "delete the rates, or the clocks",

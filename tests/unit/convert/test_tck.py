@@ -281,27 +281,40 @@ def test_random_networks_come_back(data: st.DataObject) -> None:
 
 REFUSED = {
     "urgent chan c; process P() { state A; init A; } system P;": (
-        "model.xta: channel c: the format has no urgent channels",
+        "model.xta: channel c: TChecker has no urgent channels",
         "use an urgent location",
     ),
     "chan c; chan priority c < default; process P() { state A; init A; } system P;": (
-        "model.xta: the format has no priorities",
+        "model.xta: TChecker has no priorities",
         "write them as guards",
     ),
     "clock x; process P() { state A { x' == 0 }; init A; } system P;": (
-        "model.xta: the format has no stopwatches",
+        "model.xta: TChecker has no stopwatches",
         "clocks that always run",
     ),
     "hybrid clock x; process P() { state A { x' == 2 }; init A; } system P;": (
-        "model.xta: clock x: the format has no hybrid clocks",
+        "model.xta: clock x: TChecker has no hybrid clocks",
         "use integers",
     ),
+    "int n; before_update { n = 0 } process P() { state A; init A; } system P;": (
+        "model.xta: TChecker has no before update",
+        "write into each update",
+    ),
+    "process P() { clock y, x = 3; state A; init A; } system P;": (
+        "model.xta: template P, clock x: clocks of TChecker begin with 0",
+        "set it",
+    ),
+    "int[0,2] i; int[0,2] t[3] = { 0, 1, 2 }; process P() { state A; init A; trans A -> A {"
+    " assign t[t[i]] = 1; }; } system P;": (
+        "model.xta: template P, edge A → A, update: the index of `t[t[i]]` has the array itself",
+        "keep the index in a variable",
+    ),
     "meta int n; process P() { state A; init A; } system P;": (
-        "model.xta: variable n: the format has no meta variables",
+        "model.xta: variable n: TChecker has no meta variables",
         "delete `meta`",
     ),
     "typedef scalar[3] s_t; s_t s; process P() { state A; init A; } system P;": (
-        "model.xta: variable s: the format has no scalar sets",
+        "model.xta: variable s: TChecker has no scalars",
         "int[0,N-1]",
     ),
     "process P() { state A, B; init A; trans A -u-> B { }; } system P;": (
