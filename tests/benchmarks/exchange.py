@@ -1,7 +1,7 @@
 """What converted models say in other tools: states, verdicts and probabilities side by side.
 
     python tests/benchmarks/exchange.py [--tck-reach PROGRAM] [--tchecker DIR] [--tarzan DIR]
-        [--storm PYTHON] [--uppaal DIR] [--timeout 20]
+        [--only PATTERN] [--storm PYTHON] [--uppaal DIR] [--timeout 20]
 
 PROGRAM is TChecker's ``tck-reach``, if it is not on the PATH, and DIR of ``--tchecker`` its
 sources, whose ``examples/*.sh`` print models; that of ``--tarzan`` is the sources of TARZAN, whose
@@ -185,14 +185,16 @@ def tchecker_table(folder: Path, tck: Tck, timeout_s: float) -> None:
         )
 
 
-def tarzan_table(folder: Path, tck: Tck, timeout_s: float) -> None:
-    """TARZAN's models, each in both languages and each in both tools."""
+def tarzan_table(folder: Path, tck: Tck, timeout_s: float, only: str) -> None:
+    """TARZAN's models whose names match, each in both languages and each in both tools."""
     print("\nTARZAN's pairs: states of .tck and .xta in both tools | verdicts")
     print(f"{'model':24} {'tck':>9} {'tck, us':>9} {'xta':>9} {'xta, tck':>9} | verdict")
     for path in sorted(folder.glob("TARZAN/benchmarks/*/tck/*/*.tck")):
         folder_of_xta = path.parents[2] / "xta" / path.parent.name
         pair = next(iter(sorted(folder_of_xta.glob("*.xta"))), None)
         name = path.parent.name
+        if not re.match(only, name):
+            continue
         if pair is None or path.stat().st_size > 40_000:
             print(f"{name:24} left out: {'no .xta' if pair is None else 'large'}")
             continue
@@ -314,6 +316,7 @@ def main() -> int:
     parser.add_argument("--tchecker", type=Path)
     parser.add_argument("--tck-reach")
     parser.add_argument("--tarzan", type=Path)
+    parser.add_argument("--only", default="", help="a pattern for the names of TARZAN's models")
     parser.add_argument("--storm", help="a Python with stormpy and momba")
     parser.add_argument("--uppaal", type=Path)
     parser.add_argument("--timeout", type=float, default=20.0)
@@ -328,7 +331,7 @@ def main() -> int:
         else:
             print("missing: TChecker's sources (--tchecker)")
         if given.tarzan:
-            tarzan_table(given.tarzan, tck, given.timeout)
+            tarzan_table(given.tarzan, tck, given.timeout, given.only)
         else:
             print("missing: TARZAN's sources (--tarzan)")
     if given.storm is None:
