@@ -103,9 +103,9 @@ class _Writer:
 
     def written(self, queries: Sequence[str], name: str) -> WrittenTck:
         """The whole text."""
-        # The names come before the declarations of variables, which are written already.
+        # Declarations of variables are written already; they come behind the name of the system.
         declared, self._lines = self._lines, []
-        system = Names(self._names_taken()).fresh(name)
+        system = Names(TCK_WORDS).fresh(name)
         labels, remarks = self._labelled(queries)
         synced = {one.name: synced_edges(self._network, one) for one in self._network.processes}
         vectors, events = self._vectors(synced)
@@ -115,9 +115,6 @@ class _Writer:
         head = [f"system:{system}", *declared, *(f"event:{one}" for one in names)]
         lines = [*head, *self._lines, "", *vectors, *remarks]
         return WrittenTck("\n".join(lines) + "\n", tuple(self._notes))
-
-    def _names_taken(self) -> list[str]:
-        return list(TCK_WORDS)
 
     def _require_plain(self, path: str) -> None:
         """Refuses what TChecker has no word for."""
