@@ -73,11 +73,12 @@ async function begin() {
   runs.begin(model);
   files.begin(act);
   $("restart").onclick = () => act({ do: "restart" });
-  $("work").hidden = false;
+  for (const one of document.getElementsByName("mode")) one.onchange = () => act({ do: "mode", mode: one.value });
+  // Nothing can be pressed before it works.
+  $("tools").hidden = $("work").hidden = false;
   show(view);
   processes.drawOpen();
   charts.begin();
-  for (const one of document.getElementsByName("mode")) one.onchange = () => act({ do: "mode", mode: one.value });
 }
 
 $("close").onclick = () => complain(null);
