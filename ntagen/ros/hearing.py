@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -16,7 +17,13 @@ from ntagen.openigtlink.messages import Sensor as Readings
 from ntagen.ros.bridge import Bridge, quality
 from ntagen.ros.clock import Clock
 from ntagen.ros.frames import NeedleFrame, content_of, shape_of
-from ntagen.ros.inbox import Inbox, Wanted, two_publishers
+from ntagen.ros.inbox import (
+    DISCOVERY_S,
+    Inbox,
+    Wanted,
+    two_publishers,
+    wait_until_settled,
+)
 from ntagen.ros.messages import place_of, rotation_of, stamp_of
 from ntagen.ros.topics import ENTRY, FORCE, TARGET, Topics
 from ntagen.scene import Vector
@@ -58,6 +65,7 @@ class Hearing:
         self._topics = topics
         self._needle = needle
         self._tip_frames = tip_frames
+        self._found_s = time.monotonic() + DISCOVERY_S
         self._lock = threading.Lock()
         self._told: dict[str, Vector] = {}
         self._used: dict[str, Vector] = {}
@@ -95,11 +103,14 @@ class Hearing:
             self._used[usual] = place_mm
 
     def require_one_each(self) -> None:
-        """Refuses a sensor that two nodes publish.
+        """Refuses a sensor that two nodes publish, once this node has found the others.
 
         Raises:
             DeviceError: One has two publishers.
         """
+        wait_until_settled(
+            lambda: [self._bridge.publishers(topic) for topic in self._heard], self._found_s
+        )
         self._look()
         if self.inbox.trouble:
             raise DeviceError(self.inbox.trouble)

@@ -23,6 +23,9 @@ from ntagen.values import dataclass
 DISCOVERY_S: Final = 5.0
 """Nodes find each other within this time, also on a busy machine."""
 
+SETTLED_S: Final = 1.0
+"""Nodes that were found for so long without another one are taken for all that there are; ours."""
+
 _STEP_S: Final = 0.02
 """A wait looks at the clock so often: a simulated clock does not wake anybody."""
 
@@ -240,6 +243,22 @@ def why_silent(wanted: Wanted, publishers: tuple[Publisher, ...], waited_s: floa
         f"{names} publishes {wanted.topic}, but nothing has come for {waited_s:g} s\n"
         "hint: does the sensor see the needle? Are ROS_DOMAIN_ID and the network the same for both?"
     )
+
+
+def wait_until_settled(who: Callable[[], object], until_s: float) -> None:
+    """Waits until the same nodes are found for `SETTLED_S`.
+
+    The first sample may come before the second publisher is found, and then the needle would move.
+
+    Args:
+        who: Asks which nodes are found now.
+        until_s: It waits no longer than until this time, by `time.monotonic`.
+    """
+    found, since_s = who(), time.monotonic()
+    while (now_s := time.monotonic()) < min(until_s, since_s + SETTLED_S):
+        time.sleep(_STEP_S)
+        if (newer := who()) != found:
+            found, since_s = newer, now_s
 
 
 def two_publishers(topic: str, publishers: tuple[Publisher, ...]) -> str:

@@ -6,7 +6,15 @@ import pytest
 
 from ntagen.errors import DeviceError
 from ntagen.openigtlink.messages import NEWTON, Position, Sensor
-from ntagen.ros.inbox import Inbox, Publisher, Wanted, two_publishers, why_silent
+from ntagen.ros.inbox import (
+    SETTLED_S,
+    Inbox,
+    Publisher,
+    Wanted,
+    two_publishers,
+    wait_until_settled,
+    why_silent,
+)
 
 KIND = "geometry_msgs/msg/PoseStamped"
 TIP = Wanted("/sensor/tip", KIND, False)
@@ -88,3 +96,22 @@ def test_two_publishers_are_named() -> None:
     assert two_publishers("/sensor/tip", (GOOD,)) == ""
     said = two_publishers("/sensor/tip", (GOOD, Publisher("/bag", KIND, True)))
     assert "/sensor/tip has 2 publishers: '/tracker' and '/bag'" in said
+
+
+def test_nodes_that_are_found_late_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = 0.0
+
+    def sleep(seconds: float) -> None:
+        nonlocal now_s
+        now_s += seconds
+
+    monkeypatch.setattr("ntagen.ros.inbox.time.monotonic", lambda: now_s)
+    monkeypatch.setattr("ntagen.ros.inbox.time.sleep", sleep)
+    wait_until_settled(lambda: 2 if now_s > 0.7 else 1, until_s=5.0)
+    assert now_s == pytest.approx(0.7 + SETTLED_S, abs=0.05)
+    # Nodes that come and go without end are waited for no longer than that.
+    wait_until_settled(lambda: now_s, until_s=5.0)
+    assert now_s == pytest.approx(5.0, abs=0.05)
+    # A node that has had the time to find the others does not wait.
+    wait_until_settled(lambda: 1, until_s=5.0)
+    assert now_s == pytest.approx(5.0, abs=0.05)
