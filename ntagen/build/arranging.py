@@ -27,8 +27,6 @@ def arranged(template: Template) -> diagram.Diagram:
     The structure must be right: see `ntagen.build.structure`.
     """
     ids = {id(node): str(number) for number, node in enumerate(template.nodes)}
-    nodes = template.nodes
-    fixed = [node.position for node in nodes if node.position is not None]
     drawn = diagram.Diagram(
         template.name,
         (template.parameters,) if template.parameters.strip() else (),
@@ -39,7 +37,13 @@ def arranged(template: Template) -> diagram.Diagram:
         ),
         tuple(_edge(edge, ids) for edge in template.edges),
     )
-    if fixed and len(fixed) < len(nodes):
+    return with_places(drawn)
+
+
+def with_places(drawn: diagram.Diagram) -> diagram.Diagram:
+    """The picture with a place for each part."""
+    fixed = [node for node in drawn.nodes if node.position is not None]
+    if fixed and len(fixed) < len(drawn.nodes):
         drawn = _with_new_ones_below(drawn)
     return placed(drawn)
 

@@ -80,9 +80,9 @@ def drawn_in_parts(diagram: Diagram) -> str:
     """Draws a template for a page that lights single parts of it, without heading and paper.
 
     Returns:
-        An SVG document, as in `draw`. Locations, edges and labels have these words as classes, and
-        what belongs to a location or an edge is in a group whose ``data-number`` is its place in
-        the list of the diagram.
+        An SVG document, as in `draw`. Locations, edges, branch points and labels have these words
+        as classes, and what belongs to a location, an edge or a branch point is in a group whose
+        ``data-number`` is its place in the list of the diagram.
     """
     drawn = placed(diagram)
     left, top, right, bottom = (round(one) for one in _bounds(drawn))
@@ -117,8 +117,9 @@ def _body(diagram: Diagram, *, grouped: bool = False) -> Iterator[str]:
             dashed = not edge.controllable or edge.source in branch_ids
             arrow = _arrow(edge, path, radii[edge.source], radii[edge.target], dashed=dashed)
             yield from _group("edge", number, arrow) if grouped else arrow
-    for point in diagram.branch_points:
-        yield from _branch_point(point)
+    for number, point in enumerate(diagram.branch_points):
+        dot = _branch_point(point)
+        yield from _group("branch-point", number, dot) if grouped else dot
     for number, location in enumerate(diagram.locations):
         circle = _circle(location)
         yield from _group("location", number, circle) if grouped else circle
