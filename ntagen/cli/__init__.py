@@ -61,7 +61,7 @@ COMMANDS: Final = {
 }
 """The commands in the order of the help, each with its module below here and its line there."""
 
-HIDDEN: Final = {"simulate": "models.simulate"}
+HIDDEN: Final = {"simulate": "models.simulate", "survey": "models.survey"}
 """The commands that only other parts of this program run, each with its module."""
 
 INTERNAL_ERROR: Final = 70

@@ -90,9 +90,11 @@ def command(
     server = Server(limits, port)
     try:
         if file is not None and data is not None:
-            server.open(file.name, data)
+            server.open(file.name, data, file.absolute())
         echo(f"open {server.address}")
         echo("Ctrl-C ends the server", err=True)
         server.serve()
     finally:
+        for name in server.edits.unsaved():
+            echo(f"the changes of {name} were not saved", err=True)
         server.end()

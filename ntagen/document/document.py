@@ -78,6 +78,11 @@ class Document:
         self._saved = self.text
 
     @property
+    def has_parts(self) -> bool:
+        """Whether it has parts that can be edited; XTA is one text."""
+        return self._outline is not None
+
+    @property
     def outline(self) -> Outline:
         """Its parts.
 
@@ -96,6 +101,7 @@ class Document:
             "redo": len(self._history.undone),
             "changed": self.is_changed,
             "problem": self.problem,
+            "xml": self._is_xml,
         }
         return found | ({"parts": self._outline.told()} if self._outline is not None else {})
 
@@ -137,17 +143,20 @@ class Document:
                 return
         raise InputError("this text cannot be written there\nhint: edit the whole text")
 
-    def edit(self, address: str, changed: Callable[[Outline], Sequence[Change]]) -> None:
+    def edit(
+        self, address: str, changed: Callable[[Outline], Sequence[Change]], *, join: bool = False
+    ) -> None:
         """Changes the parts of the model.
 
         Args:
             address: Where a page shows the change.
             changed: Gives the changes.
+            join: Whether this is one edit with the last one of this address.
 
         Raises:
             InputError: The model has no parts, or `changed` refuses.
         """
-        self._make(address, changed(self.outline), join=False)
+        self._make(address, changed(self.outline), join=join)
 
     def undo(self) -> str | None:
         """Takes the last edit back; returns its address, or ``None`` if there is none."""

@@ -56,11 +56,13 @@ class File:
         name: Its name.
         path: Where it is.
         kind: ``model``, ``environment`` or ``run``.
+        origin: The user's own file of which this is a copy; ``None`` if it was dropped.
     """
 
-    def __init__(self, name: str, path: Path) -> None:
+    def __init__(self, name: str, path: Path, origin: Path | None = None) -> None:
         self.name = name
         self.path = path
+        self.origin = origin
         ending = path.suffix.lower()
         self.kind = {".nsl": "environment", ".mcap": "run"}.get(ending, "model")
 
@@ -156,8 +158,8 @@ class Workshop:
                 job.cancel()
             self._folder.cleanup()
 
-    def add(self, name: str, data: bytes) -> str:
-        """Keeps a file; returns its id.
+    def add(self, name: str, data: bytes, origin: Path | None = None) -> str:
+        """Keeps a file, of which `origin` may be the original; returns its id.
 
         Raises:
             Refusal: It is empty, or of no kind that is known.
@@ -181,7 +183,7 @@ class Workshop:
             folder = self._made(f"file-{number}")
             path = folder / (safe.lstrip(".-") if Path(safe).stem.strip(".- ") else f"file{ending}")
             path.write_bytes(data)
-            self._files[number] = File(path.name, path)
+            self._files[number] = File(path.name, path, origin)
         return number
 
     def file(self, number: str) -> File:

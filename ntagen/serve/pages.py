@@ -21,6 +21,9 @@ _PAGE: Final = (
     "default-src 'none'; style-src 'nonce-{0}'; script-src 'nonce-{0}'; connect-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_SHARED: Final = ("dom.js",)
+"""Programs of the simulator that the other page uses, too."""
+
 _NOTHING: Final = "default-src 'none'; frame-ancestors 'none'"
 
 
@@ -30,34 +33,44 @@ def send_page(request: Request) -> None:
 
 
 def send_simulator(request: Request, token: str) -> None:
-    """Sends the page of simulations.
+    """Sends the page of simulations."""
+    _send_modules(request, "simulator", token)
+
+
+def send_editor(request: Request, token: str) -> None:
+    """Sends the page on which models are edited."""
+    _send_modules(request, "editor", token)
+
+
+def _send_modules(request: Request, folder: str, token: str) -> None:
+    """Sends the page of a folder.
 
     Each of its programs is asked for with the token, so the page maps their names to addresses.
     """
-    folder = resources.files("ntagen.serve") / "simulator"
-    names = [name for name in parts() if name.endswith(".js")]
-    imports = ",\n".join(f'"{name}": "/simulator/{name}?token={token}"' for name in names)
+    where = dict.fromkeys(_SHARED, "simulator") | dict.fromkeys(parts(folder), folder)
+    names = [name for name in where if name.endswith(".js")]
+    imports = ",\n".join(f'"{name}": "/{where[name]}/{name}?token={token}"' for name in names)
     words = {"IMPORTS": imports, "TOKEN": token}
-    _send(request, folder / "page.html", words)
+    _send(request, resources.files("ntagen.serve") / folder / "page.html", words)
 
 
-def send_part(request: Request, name: str) -> None:
-    """Sends a program or the style of the page of simulations.
+def send_part(request: Request, folder: str, name: str) -> None:
+    """Sends a program or the style of the page of a folder.
 
     Raises:
         Refusal: There is none by this name.
     """
-    part = parts().get(name)
+    part = parts(folder).get(name)
     if part is None:
         raise Refusal(404, "there is nothing here")
     request.send(200, _TYPES[f".{name.rpartition('.')[2]}"], part.read_bytes(), _NOTHING)
 
 
 @cache
-def parts() -> dict[str, Traversable]:
-    """The programs and the style of the page of simulations, by name."""
-    folder = resources.files("ntagen.serve") / "simulator"
-    found = sorted(folder.iterdir(), key=lambda one: one.name)
+def parts(folder: str) -> dict[str, Traversable]:
+    """The programs and the style of the page of a folder, by name."""
+    inside = resources.files("ntagen.serve") / folder
+    found = sorted(inside.iterdir(), key=lambda one: one.name)
     return {one.name: one for one in found if one.name.endswith((".js", ".css"))}
 
 

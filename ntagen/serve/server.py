@@ -6,12 +6,14 @@ The page loads nothing from elsewhere, and the work is done by processes of thei
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any, Final
 
 from ntagen.errors import InputError
+from ntagen.serve.edits import Edits
 from ntagen.serve.jobs import File, Workshop
 from ntagen.serve.loopback import Listener, Refusal, Request
-from ntagen.serve.pages import send_page, send_part, send_picture, send_simulator
+from ntagen.serve.pages import send_editor, send_page, send_part, send_picture, send_simulator
 from ntagen.serve.processes import Limits
 from ntagen.serve.simulations import Simulations
 
@@ -43,10 +45,16 @@ class Server:
         self.port: int = self._http.server_port
         self.shop = Workshop(limits)
         self.simulations = Simulations(limits)
+        self.edits = Edits(limits)
         self._first: list[str] = []
 
-    def open(self, name: str, data: bytes) -> None:
+    def open(self, name: str, data: bytes, origin: Path | None = None) -> None:
         """Adds a file that the page shows when it is opened.
+
+        Args:
+            name: Its name.
+            data: Its contents.
+            origin: Where the page may save it when it was edited; ``None`` is nowhere.
 
         Raises:
             InputError: It cannot be shown.
@@ -54,7 +62,7 @@ class Server:
         if len(data) > self.shop.limits.upload_bytes:
             raise InputError(_too_large(self.shop.limits))
         try:
-            self._first.append(self.shop.add(name, data))
+            self._first.append(self.shop.add(name, data, origin))
         except Refusal as refusal:
             raise InputError(refusal.message) from None
 
@@ -76,6 +84,7 @@ class Server:
         """The same once `serve` has ended."""
         self._http.server_close()
         self.simulations.close()
+        self.edits.close()
         self.shop.close()
 
     def route(self, request: Request, method: str, path: list[str], values: dict[str, str]) -> None:
@@ -116,7 +125,7 @@ class Server:
             case "GET", ["simulator"]:
                 send_simulator(request, self.token)
             case "GET", ["simulator", name]:
-                send_part(request, name)
+                send_part(request, "simulator", name)
             case "POST", ["api", "files", number, "simulations"]:
                 file = self.shop.file(number)
                 request.json({"simulation": simulations.add(number, file)}, 201)
@@ -128,6 +137,32 @@ class Server:
                 request.json(told(found.number, found.file))
             case "DELETE", ["api", "simulations", identity]:
                 simulations.get(identity).end()
+                request.json({})
+            case _:
+                self._route_edits(request, method, path)
+
+    def _route_edits(self, request: Request, method: str, path: list[str]) -> None:
+        """Answers a request of the page that edits models."""
+        edits, shop = self.edits, self.shop
+        match method, path:
+            case "GET", ["editor"]:
+                send_editor(request, self.token)
+            case "GET", ["editor", name]:
+                send_part(request, "editor", name)
+            case "POST", ["api", "files", number, "edits"]:
+                request.json({"edit": edits.add(number, shop.file(number))}, 201)
+            case "POST", ["api", "edits", identity]:
+                wish = _wish(request, shop.limits, 2 * shop.limits.upload_bytes)
+                request.json(edits.ask(identity, wish))
+            case "POST", ["api", "edits", identity, "files"]:
+                number = shop.add(edits.get(identity).file.name, edits.data(identity))
+                request.json(told(number, shop.file(number)), 201)
+            case "GET", ["api", "edits", identity, "text"]:
+                request.send(200, "application/octet-stream", edits.text(identity))
+            case "GET", ["api", "edits", identity, "file"]:
+                request.send(200, "application/octet-stream", edits.data(identity))
+            case "DELETE", ["api", "edits", identity]:
+                edits.get(identity).end()
                 request.json({})
             case _:
                 raise Refusal(_status(method), "there is nothing here")

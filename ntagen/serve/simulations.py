@@ -8,10 +8,7 @@ starts another one, which makes the same choices again, and nothing is lost.
 from __future__ import annotations
 
 import contextlib
-import json
-import queue
 import secrets
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -19,86 +16,13 @@ from typing import Any, Final
 
 from ntagen.serve.jobs import File
 from ntagen.serve.loopback import Refusal
-from ntagen.serve.processes import Limits, ended, started
-
-_LATE: Final = 1.1
-"""A process that answers no sooner than after its time, and this part of it more, is killed."""
-
-_LEAST_S: Final = 3.0
-"""It has at least this much time for an answer, in which it also loads the model."""
+from ntagen.serve.processes import Limits
+from ntagen.serve.workers import Gone, Worker
 
 _RECORDS: Final = 500
 """So many simulations are kept; those that were not used for the longest time go first."""
 
 _KEPT: Final = ("mode", "game", "advised", "note", "position")
-
-
-class _Gone(Exception):  # noqa: N818  it reports an event, not an error
-    """The process ended without an answer; the text says why."""
-
-
-class _Worker:
-    """The process of a simulation."""
-
-    def __init__(self, file: File, limits: Limits) -> None:
-        # One part of the time is for the process to end by itself.
-        self._wait_s = max(_LEAST_S, _LATE * limits.timeout_s)
-        options = [f"--timeout={limits.timeout_s}s", f"--memory={limits.memory_bytes}B"]
-        # Warnings about the model are told by the page of queries.
-        pipes = subprocess.PIPE, subprocess.PIPE, subprocess.DEVNULL
-        self._process = started(
-            ["simulate", file.path.name, *options], file.path.parent, limits, *pipes
-        )
-        self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
-        self.is_cancelled = False
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def ask(self, request: dict[str, Any]) -> dict[str, Any]:
-        """What it answers.
-
-        Raises:
-            _Gone: It does not.
-        """
-        stdin = self._process.stdin
-        if stdin is not None:
-            # If it has ended, the answer says so.
-            with contextlib.suppress(OSError):
-                stdin.write(json.dumps(request).encode() + b"\n")
-                stdin.flush()
-        try:
-            line = self._answers.get(timeout=self._wait_s)
-        except queue.Empty:
-            self.end()
-            raise _Gone(f"it did not answer within {self._wait_s:g} s") from None
-        if not line:
-            self.end()
-            if self.is_cancelled:
-                raise _Gone("it was cancelled")
-            code = self._process.returncode
-            raise _Gone(f"it ended with {code}; it may lack memory")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
-
-    def end(self) -> None:
-        """Kills it."""
-        ended(self._process)
-        with contextlib.suppress(OSError):
-            if self._process.stdin is not None:
-                self._process.stdin.close()
-
-    def _read(self) -> None:
-        out = self._process.stdout
-        if out is not None:
-            with out:
-                for line in out:
-                    self._answers.put(line)
-        # An empty line says that no more come.
-        self._answers.put(b"")
 
 
 class Simulation:
@@ -116,7 +40,7 @@ class Simulation:
         self.number = number
         self.file = file
         self.lock = threading.Lock()
-        self.worker: _Worker | None = None
+        self.worker: Worker | None = None
         self.used = time.monotonic()
         self._kept: dict[str, Any] = {}
 
@@ -202,7 +126,7 @@ class Simulations:
         try:
             worker, is_resumed = self._worker_of(one)
             answer = _told(worker.ask(request))
-        except _Gone as why:
+        except Gone as why:
             self._drop(one)
             raise Refusal(
                 503,
@@ -217,19 +141,19 @@ class Simulations:
             one.keep(view.pop("keep"))
         return answer | ({"resumed": True} if is_resumed else {})
 
-    def _worker_of(self, one: Simulation) -> tuple[_Worker, bool]:
+    def _worker_of(self, one: Simulation) -> tuple[Worker, bool]:
         """The process of a simulation, and whether it has just taken up what was kept.
 
         Raises:
             Refusal: Too many others compute, or what was kept is not possible.
-            _Gone: The process does not answer.
+            Gone: The process does not answer.
         """
         if one.worker is not None and one.worker.is_running:
             return one.worker, False
         self._drop(one)
         self._wait_for_room(one)
         try:
-            worker = one.worker = _Worker(one.file, self._limits)
+            worker = one.worker = _worker(one.file, self._limits)
             if one.kept:
                 _told(worker.ask(one.kept))
         except BaseException:
@@ -277,6 +201,11 @@ class Simulations:
                     self._running.discard(other)
                     return True
         return False
+
+
+def _worker(file: File, limits: Limits) -> Worker:
+    options = [f"--timeout={limits.timeout_s}s", f"--memory={limits.memory_bytes}B"]
+    return Worker(["simulate", file.path.name, *options], file.path.parent, limits)
 
 
 @contextlib.contextmanager
