@@ -106,6 +106,10 @@ lock: | .venv ## Update requirements-dev.lock to the newest versions that pyproj
 	$(BIN)/python -m uv pip compile --quiet --universal --python-version 3.11 --upgrade --extra dev --generate-hashes \
 	  --no-annotate --no-emit-index-url --custom-compile-command 'make lock' --output-file $(LOCK) pyproject.toml
 
+.PHONY: bundle
+bundle: ## Build the library of the page that edits models, from editors/bundle (needs node and npm)
+	cd editors/bundle && npm ci --ignore-scripts --no-audit --no-fund && node build.mjs
+
 .PHONY: picture
 picture: $(INSTALLED) ## Draw examples/scene.png, the picture in the README
 	$(BIN)/ntagen plot examples/paper.nsl -o examples/scene.png --plans 10

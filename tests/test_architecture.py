@@ -82,6 +82,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.policy": {"errors"},
     "checker.agents": {"errors", "checker.policy"},
     "checker.stepwise": {"errors", "checker.errors", "_checker"},
+    "checker.survey": {"_checker"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
     | {"checker.constants", "checker.policy", "checker.stepwise"}
@@ -99,7 +100,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}
     | {"checker.picture", "checker.play", "checker.queries", "checker.runs", "checker.strategy"},
-    "serve": {"errors"},
+    "document": {"errors", "files", "build", "checker.picture", "checker.survey"},
+    "serve": {"document", "errors", "files"},
     "watch": {"drive", "errors", "plan", "plot", "scene", "serve", "shapes"},
     "editor": {"nsl", "parameters", "values", "version"},
     "needle": BASE,
@@ -173,7 +175,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"checker.picture", "report", "system"}
     | {"editor", "serve", "simulator", "verifyta", "watch"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
-    | {"checker.agents", "convert"},
+    | {"checker.agents", "checker.survey", "convert"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
     "__main__": {"cli"},
 }

@@ -7,7 +7,7 @@ and the quotes of attributes, line ends, the byte order mark and the encoding.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any
 
 from ntagen.checker.picture.svg import drawn_in_parts
 from ntagen.document.content import (
@@ -25,8 +25,7 @@ from ntagen.document.markup import applied
 from ntagen.document.outline import WHOLE, Outline
 from ntagen.document.texts import text_rewritten, text_set
 from ntagen.errors import InputError
-
-MODELS: Final = (".xml", ".xta", ".ta")
+from ntagen.files import MODEL_BYTES
 
 
 class Document:
@@ -37,8 +36,8 @@ class Document:
         problem: Why its parts cannot be edited; empty if they can.
     """
 
-    def __init__(self, data: bytes) -> None:
-        """Reads the bytes of a file.
+    def __init__(self, data: bytes, most_bytes: int = MODEL_BYTES) -> None:
+        """Reads the bytes of a file, whose text may grow to so many bytes.
 
         Raises:
             InputError: They are not text.
@@ -46,6 +45,7 @@ class Document:
         self._encoding, text = decoded(data)
         self._history = History(text)
         self._saved = text
+        self._most_bytes = most_bytes
         self._is_xml = text.lstrip().startswith(b"<")
         line_end = "\r\n" if text.count(b"\r\n") * 2 > text.count(b"\n") else "\n"
         self._form = Form(line_end, self._encoding.has, is_xml=self._is_xml)
@@ -182,6 +182,12 @@ class Document:
 
     def _make(self, address: str, changes: Sequence[Change], *, join: bool) -> None:
         if changes:
+            grown = sum(len(one.text) - (one.end - one.start) for one in changes)
+            if grown > 0 and len(self.text) + grown > self._most_bytes:
+                raise InputError(
+                    f"the model becomes larger than {self._most_bytes / (1 << 20):g} MiB\n"
+                    "hint: start the server with a greater limit: ntagen serve --upload 100MiB"
+                )
             self._history.make(address, changes, join=join)
             self._read()
 

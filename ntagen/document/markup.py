@@ -154,10 +154,10 @@ def _unit_of(data: bytes, parent: Element) -> bytes:
     """How much deeper the children of an element stand than itself, or those of elements near."""
     near: Element | None = parent
     while near is not None:
-        own = indent_of(data, near)
+        own = indent_of(data, near).strip(b"\r\n")
         for child in near.children:
-            indent = indent_of(data, child)
-            if own and indent.startswith(own) and len(indent) > len(own):
+            indent = indent_of(data, child).strip(b"\r\n")
+            if indent.startswith(own) and len(indent) > len(own):
                 return indent[len(own) :]
         near = near.parent
     return _UNIT

@@ -47,7 +47,7 @@ class Editing:
         data = file.path.read_bytes()
         self.number = number
         self.file = file
-        self.document = Document(data)
+        self.document = Document(data, limits.upload_bytes)
         self.lock = threading.Lock()
         self.asking = threading.Lock()
         self.used = time.monotonic()
@@ -75,9 +75,6 @@ class Editing:
             self._require_version(wish)
             parts = self.document.has_parts
             address = fulfil(self.document, wish)
-            if len(self.document.text) > self._limits.upload_bytes:
-                self.document.undo()
-                raise InputError("the model becomes larger than the server allows")
             told = self.told()
             if wish.get("do") == "text" and parts and self.document.has_parts:
                 del told["parts"]
