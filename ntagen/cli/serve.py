@@ -69,7 +69,8 @@ def command(
     with the token in the address. Each check is a process of its own, which you can cancel.
 
     "Simulate" walks through a model step by step: symbolic or with exact times, along a trace, at
-    random, or against the strategy of a game.
+    random, or against the strategy of a game. "Edit" changes a model; only its "Save" writes FILE,
+    and what was not changed stays byte for byte as it was.
 
     \b
     Examples:

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from ntagen.document.document import Document
 from ntagen.document.names import Names
+from ntagen.document.outline import WHOLE
 from ntagen.document.wishes import fulfil, number_of, text_of
 from ntagen.errors import InputError
 from ntagen.files import read_file, write_files
@@ -76,7 +77,7 @@ class Editing:
             parts = self.document.has_parts
             address = fulfil(self.document, wish)
             told = self.told()
-            if wish.get("do") == "text" and parts and self.document.has_parts:
+            if wish.get("do") == "text" and address != WHOLE and parts:
                 del told["parts"]
             return told | {"address": address}
 

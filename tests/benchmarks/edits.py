@@ -53,7 +53,7 @@ def look_at(
 ) -> None:
     """Counts what a model shows."""
     try:
-        checker.load(path)
+        checker.load_file(path)
     except (NtagenError, OSError):
         counts["not loadable"] += 1
         return

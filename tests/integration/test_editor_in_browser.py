@@ -144,7 +144,7 @@ def test_parts_are_added_and_a_reload_loses_nothing(
     page.wait_for_selector("#edges button:has-text('Ajar → Shut: since > 4')")
     # A location is dragged.
     page.wait_for_selector("#drawing .location")
-    box = page.locator("#drawing .location circle").nth(2).bounding_box()
+    box = page.locator("#drawing .location").nth(2).locator("circle").first.bounding_box()
     page.mouse.move(box["x"] + 8, box["y"] + 8)
     page.mouse.down()
     page.mouse.move(box["x"] + 40, box["y"] + 68, steps=4)

@@ -7,7 +7,7 @@ import {
 import { made } from "dom.js";
 import { lookOf } from "language.js";
 import { flushWith, inquire, keepText, on, sent, state, textAt } from "model.js";
-import { attempt, complain, tell } from "server.js";
+import { attempt, complain, post, tell } from "server.js";
 
 const TYPED_MS = 120, JOIN_MS = 900, GROUP_MS = 6000;
 const nonce = document.querySelector("script").nonce;
@@ -29,6 +29,11 @@ export async function flush() {
 }
 
 flushWith(flush);
+
+// The page goes away: what was typed last is sent without waiting.
+export function sendAtOnce() {
+  for (const { address, view } of waiting) post({ do: "text", address, text: view.state.doc.toString(), version: state.version });
+}
 
 // Does something; if what was typed last is refused, that is given up instead.
 export async function giveUp(work) {
@@ -133,10 +138,13 @@ export function fieldFor(address, title, { large = false, text = null } = {}) {
   return made("div", { class: large ? "field whole" : "field", "data-address": address }, made("span", { class: "title" }, title), field.view.dom);
 }
 
-// Forgets all fields; another view is shown.
-export function clear() {
-  for (const field of fields.values()) field.view.destroy();
-  fields.clear();
+// Forgets the fields whose addresses begin so; something else is shown in their place.
+export function clear(beginning = "") {
+  for (const [address, field] of fields) {
+    if (!address.startsWith(beginning)) continue;
+    field.view.destroy();
+    fields.delete(address);
+  }
 }
 
 // Puts the cursor at a place of a field that is shown; whether it is.

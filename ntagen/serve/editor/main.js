@@ -78,7 +78,7 @@ async function modelChanged(told) {
   $("state").className = state.changed ? "note changed" : "note";
   document.title = `${state.changed ? "* " : ""}${state.name}: edit`;
   // A text that was typed here is shown already.
-  if (!told.parts && told.address !== undefined && !state.problem && shown !== "text" && isThere(shown)) return settle();
+  if (told.wish === "text") return settle();
   if (told.address === undefined) return;
   if (shown === "text" && (told.address === "text" || !state.parts)) {
     await readWhole();
@@ -88,9 +88,13 @@ async function modelChanged(told) {
   const view = viewOf(told.address || shown);
   if (view === shown && isThere(view) && shape === shapeOf(view)) {
     fields.refresh();
-    if (view.startsWith("templates/")) refreshTemplate();
+    if (view.startsWith("templates/")) {
+      refreshTemplate();
+      choose(told.address);
+    }
     showOutline(shown, go);
-    if (told.moved) return;
+    if (told.wish === "undo" || told.wish === "redo") fields.focus({ address: told.address });
+    return;
   }
   await show({ address: told.address || (isThere(shown) ? shown : "") });
 }
@@ -158,6 +162,7 @@ $("simulate").onclick = () => attempt(async () => {
 });
 $("add-template").onclick = () => dialog("New template", [{ name: "name", label: "Name", example: "Gate" }], "Add", (values) => change({ do: "add-template", ...values }));
 $("close").onclick = () => complain(null);
+addEventListener("pagehide", fields.sendAtOnce);
 addEventListener("hashchange", () => location.reload());
 addEventListener("keydown", (event) => {
   const isTyping = event.target.closest?.(".cm-editor, input, select, dialog");

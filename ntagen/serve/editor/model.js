@@ -13,8 +13,9 @@ let flushing = async () => {};
 export const flushWith = (work) => { flushing = work; };
 
 export function accept(told) {
-  Object.assign(state, told);
-  if (!told.parts && told.problem) state.parts = null;
+  const { wish, address, ...news } = told;
+  Object.assign(state, news);
+  if (state.problem) state.parts = null;
   emit("model", told);
   lookForMistakes();
 }
@@ -28,7 +29,7 @@ export async function change(wish) {
 export function sent(wish) {
   return inTurn(async () => {
     const told = await request({ ...wish, version: state.version });
-    accept(told);
+    accept({ ...told, wish: wish.do });
     return told;
   });
 }

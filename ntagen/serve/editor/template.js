@@ -2,7 +2,7 @@
 import { dialog } from "dialogs.js";
 import { made } from "dom.js";
 import { Drawing } from "drawing.js";
-import { fieldFor, focus } from "fields.js";
+import { clear, fieldFor, focus } from "fields.js";
 import { change, state } from "model.js";
 import { attempt } from "server.js";
 
@@ -52,7 +52,14 @@ export function showTemplate(which, view, address) {
 // Shows the newest texts; the parts are the same.
 export function refreshTemplate() {
   showLists();
+  if (chosen) list.querySelector("h2").textContent = headingOf(chosen);
   attempt(() => drawing.draw());
+}
+
+function headingOf(address) {
+  const [, , kind, inner] = address.split("/"), part = template()[kind][inner];
+  if (kind === "edges") return `Edge ${titleOf(part)}`;
+  return kind === "locations" ? `Location ${nameOf(part)}` : `Branch point ${part.id}`;
 }
 
 function showLists() {
@@ -76,8 +83,9 @@ export function choose(address) {
   if (!part) return;
   const own = `${base()}/${kind}/${inner}`;
   if (chosen !== own) {
+    if (chosen) clear(`${chosen}/`);
     chosen = own;
-    const parts = [made("h2", {}, { locations: `Location ${nameOf(part)}`, branch_points: `Branch point ${part.id}`, edges: `Edge ${titleOf(part)}` }[kind])];
+    const parts = [made("h2", {}, headingOf(own))];
     if (kind === "locations") parts.push(...ofLocation(own, part));
     if (kind === "edges") parts.push(...ofEdge(own, part));
     for (const label of Object.keys(part.texts ?? {})) parts.push(fieldFor(`${own}/${label}`, LABELS[label] ?? label));
