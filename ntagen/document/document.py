@@ -93,9 +93,9 @@ class Document:
             raise InputError(f"{self.problem}\nhint: edit the whole text, or undo")
         return self._outline
 
-    def told(self) -> dict[str, Any]:
-        """What a page shows of it; without parts it has only its whole text."""
-        found = {
+    def told(self, *, with_parts: bool = True) -> dict[str, Any]:
+        """What a page shows of it; ``parts`` only if it has some, and they are asked for."""
+        found: dict[str, Any] = {
             "version": self.version,
             "undo": len(self._history.done),
             "redo": len(self._history.undone),
@@ -103,7 +103,9 @@ class Document:
             "problem": self.problem,
             "xml": self._is_xml,
         }
-        return found | ({"parts": self._outline.told()} if self._outline is not None else {})
+        if with_parts and self._outline is not None:
+            found["parts"] = self._outline.told()
+        return found
 
     def content(self, address: str) -> Content | None:
         """A text of the model; ``None`` if the file does not have it yet.

@@ -57,10 +57,11 @@ class Editing:
         self._worker: Worker | None = None
         self._names: Names | None = None
 
-    def told(self) -> dict[str, Any]:
+    def told(self, *, with_parts: bool = True) -> dict[str, Any]:
         """What the page shows; the lock is held."""
-        found = {"name": self.file.name, "file": self.number}
-        return found | self.document.told() | {"savable": self.file.origin is not None}
+        found: dict[str, Any] = {"name": self.file.name, "file": self.number}
+        found |= {"savable": self.file.origin is not None}
+        return found | self.document.told(with_parts=with_parts)
 
     def change(self, wish: dict[str, Any]) -> dict[str, Any]:
         """Fulfils a wish of the page; see `ntagen.document.wishes`.
@@ -74,11 +75,10 @@ class Editing:
         """
         with self.lock:
             self._require_version(wish)
-            parts = self.document.has_parts
             address = fulfil(self.document, wish)
-            told = self.told()
-            if wish.get("do") == "text" and address != WHOLE and parts:
-                del told["parts"]
+            # The page knows what it has typed into a part.
+            is_typed = wish.get("do") == "text" and address != WHOLE
+            told = self.told(with_parts=not is_typed)
             return told | {"address": address}
 
     def ask(self, wish: dict[str, Any]) -> dict[str, Any]:

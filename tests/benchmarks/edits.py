@@ -1,8 +1,9 @@
-"""Models saved unchanged and after one edit: bytes that differ, hunks of `diff -u`, and times.
+"""Models saved unchanged and after one edit: bytes that differ, hunks, and seconds.
 
 Usage: edits.py FOLDER [--seed N]. All models below the folder that the engine loads are read by the
 editor of `ntagen serve` and saved: the file must be equal byte for byte. Then one of its texts,
 chosen at random, is changed: `diff -u` must have one hunk, and undo must give the file back.
+Times are those of the processor.
 """
 
 from __future__ import annotations
@@ -65,11 +66,11 @@ def look_at(
     content = document.content(address)
     old = "" if content is None else content.text
     at = chance.randrange(len(old) + 1)
-    began = time.perf_counter()
+    began = time.process_time()
     document.set_text(address, old[:at] + chance.choice(TYPED) + old[at:])
-    edited = time.perf_counter()
+    edited = time.process_time()
     Names(document, survey_json(Texts(str(path), document.text.decode()))).mistakes()
-    times.append((edited - began, time.perf_counter() - edited, data.count(b"\n"), path))
+    times.append((edited - began, time.process_time() - edited, data.count(b"\n"), path))
     counts[f"edits with {hunks(data, document.file())} hunks"] += 1
     document.undo()
     counts["undone equal" if document.file() == data else "undone DIFFERENT"] += 1
