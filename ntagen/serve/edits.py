@@ -103,7 +103,7 @@ class Editing:
         """Writes the file back.
 
         Raises:
-            InputError: The file lacks characters, or has another name than its path.
+            InputError: The encoding of the file lacks a character.
             Refusal: It was dropped and has no place, cannot be written, or is another one now.
         """
         path = self.file.origin
@@ -134,6 +134,21 @@ class Editing:
         if worker is not None:
             worker.is_cancelled = True
             worker.end()
+
+    @property
+    def has_process(self) -> bool:
+        """Whether it has a process, for the next question."""
+        return self._worker is not None and self._worker.is_running
+
+    def rest(self) -> None:
+        """Ends its process if nothing is asked of it just now."""
+        if self.asking.acquire(blocking=False):
+            try:
+                if self._worker is not None:
+                    self._worker.end()
+                    self._worker = None
+            finally:
+                self.asking.release()
 
     def _require_version(self, wish: dict[str, Any]) -> None:
         if wish.get("version") != self.document.version:
@@ -281,8 +296,17 @@ class Edits:
                 case "save":
                     return one.save(wish)
                 case "mistakes" | "complete" | "define":
+                    self._make_room(one)
                     return one.ask(wish)
                 case _:
                     return one.change(wish)
         except InputError as error:
             raise Refusal(400, str(error)) from None
+
+    def _make_room(self, one: Editing) -> None:
+        """Ends the processes that were not used for the longest time, if there are many."""
+        with self._lock:
+            others = [other for other in self._all.values() if other is not one]
+        others = sorted((other for other in others if other.has_process), key=lambda one: one.used)
+        for other in others[: max(0, len(others) + 1 - self._limits.simulations)]:
+            other.rest()

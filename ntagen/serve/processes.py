@@ -29,8 +29,8 @@ class Limits:
         upload_bytes: The greatest size of a file.
         jobs: At most so many workers at a time.
         files: At most so many files are kept; the oldest goes first.
-        simulations: At most so many simulations have a process; that of the one that was not used
-            for the longest time ends first.
+        simulations: At most so many simulations have a process, and so many models that are edited;
+            that of the one that was not used for the longest time ends first.
     """
 
     timeout_s: float = 60.0

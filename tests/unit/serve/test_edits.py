@@ -179,6 +179,15 @@ def test_the_process_may_end_and_the_edits_stay(server: Server, editor: Editor) 
     assert "'nope'" in editor.ask("mistakes")["mistakes"][0]["message"]
 
 
+def test_only_some_models_have_a_process(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server.edits, "_limits", Limits(simulations=2))
+    editors = [Editor(server, server.shop.add(f"g{n}.xml", GATE.encode())) for n in range(4)]
+    for _ in range(2):
+        for one in editors:
+            assert one.ask("mistakes")["mistakes"] == []
+            assert sum(found.has_process for found in server.edits._all.values()) <= 2
+
+
 def test_xta_is_one_text(server: Server) -> None:
     data = b"process P() { state A; init A; }\r\nsystem P;\r\n"
     editor = Editor(server, server.shop.add("p.xta", data))
