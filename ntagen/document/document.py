@@ -90,7 +90,8 @@ class Document:
             InputError: The file has none that can be edited.
         """
         if self._outline is None:
-            raise InputError(f"{self.problem}\nhint: edit the whole text, or undo")
+            why = self.problem or "a model that is no XML is one text"
+            raise InputError(f"{why}\nhint: edit the whole text")
         return self._outline
 
     def told(self, *, with_parts: bool = True) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def fulfil(document: Document, wish: _Wish) -> str:
     Raises:
         InputError: The wish cannot be fulfilled.
     """
-    action = wish.get("do")
+    action = text_of(wish, "do")
     if action == "undo":
         return document.undo() or ""
     if action == "redo":
@@ -130,14 +130,14 @@ def _newest(outline: Outline, address: str, kind: str) -> str:
 
 _Doing = Callable[[Outline, str, _Wish], list[Change]]
 
-_ADDING: Final[dict[object, tuple[str, _Doing]]] = {
+_ADDING: Final[dict[str, tuple[str, _Doing]]] = {
     "add-template": ("templates", _template),
     "add-location": ("locations", _location),
     "add-branch-point": ("branch_points", _branch_point),
     "add-edge": ("edges", _edge),
     "add-query": ("queries", _query),
 }
-_CHANGING: Final[dict[object, _Doing]] = {
+_CHANGING: Final[dict[str, _Doing]] = {
     "remove": lambda outline, address, _: part_removed(outline, address),
     "move": lambda outline, address, wish: moved(
         outline, address, number_of(wish, "x"), number_of(wish, "y")

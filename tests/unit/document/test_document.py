@@ -218,6 +218,8 @@ def test_the_text_of_a_model_that_is_no_xml_is_one_text() -> None:
     document = Document(data)
     assert not document.has_parts
     assert not document.problem
+    with pytest.raises(InputError, match="is one text"):
+        fulfil(document, {"do": "add-template", "name": "Q"})
     fulfil(
         document,
         {"do": "text", "address": "text", "text": "process Q() { state A; init A; }\nsystem P;\n"},
@@ -241,6 +243,8 @@ def test_a_file_that_is_not_well_formed_is_edited_as_a_whole_and_comes_back() ->
     ("wish", "message"),
     [
         ({"do": "format"}, "nothing that can be done"),
+        ({"do": ["text"]}, "do is no text"),
+        ({}, "nothing that can be done"),
         ({"do": "text", "address": "templates/9/name", "text": ""}, "no templates/9"),
         ({"do": "text", "address": "templates/0/edges/0/color", "text": ""}, "no templates"),
         ({"do": "text", "address": "templates/-1/name", "text": ""}, "no templates"),
