@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ntagen.document.content import Change
 from ntagen.document.markup import New, attribute_set, inserted, removed
-from ntagen.document.outline import LOCATION_KINDS, Outline, end_of, kind_of
+from ntagen.document.outline import LOCATION_KINDS, Outline, end_of, kind_of, nodes_of
 from ntagen.errors import InputError
 
 
@@ -76,6 +76,26 @@ def kind_set(outline: Outline, address: str, kind: str) -> list[Change]:
         return [inserted(outline.data, part, New(kind), "urgent")]
     fresh = Change(marks[0].start, marks[0].end, f"<{kind}/>".encode())
     return [fresh, *(removed(outline.data, one) for one in marks[1:])]
+
+
+def end_set(outline: Outline, address: str, end: str, identity: str) -> list[Change]:
+    """An edge leaves (``source``) or enters (``target``) another location or branch point.
+
+    Raises:
+        InputError: There is no such edge, end, location or branch point.
+    """
+    edge = outline.part(address)
+    found = edge.first(end) if edge.tag == "transition" and end in ("source", "target") else None
+    template = edge.parent
+    if found is None or template is None:
+        raise InputError("only edges have a source and a target")
+    if identity not in {one.attributes.get("id", "").strip() for one in nodes_of(template)}:
+        raise InputError(
+            f"the template has no location {identity[:80]!r}\nhint: choose another one"
+        )
+    if end_of(edge, end) == identity:
+        return []
+    return [attribute_set(outline.data, found, "ref", identity)]
 
 
 def controllable_set(outline: Outline, address: str, *, controllable: bool) -> list[Change]:

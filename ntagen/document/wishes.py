@@ -16,7 +16,7 @@ from ntagen.document.content import Change, require_characters
 from ntagen.document.document import Document
 from ntagen.document.moving import arranged, moved, nail_moved, nail_removed
 from ntagen.document.outline import EDGE_LABELS, Outline
-from ntagen.document.parts import controllable_set, initial_set, kind_set, part_removed
+from ntagen.document.parts import controllable_set, end_set, initial_set, kind_set, part_removed
 from ntagen.errors import InputError
 
 _Wish = Mapping[str, Any]
@@ -150,6 +150,9 @@ _CHANGING: Final[dict[str, _Doing]] = {
     ),
     "initial": lambda outline, address, _: initial_set(outline, address),
     "kind": lambda outline, address, wish: kind_set(outline, address, text_of(wish, "kind")),
+    "end": lambda outline, address, wish: end_set(
+        outline, address, text_of(wish, "end"), text_of(wish, "to")
+    ),
     "controllable": lambda outline, address, wish: controllable_set(
         outline, address, controllable=wish.get("controllable") is not False
     ),

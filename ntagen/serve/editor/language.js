@@ -58,10 +58,10 @@ const theme = EditorView.theme({
   ".cm-scroller": { fontFamily: "ui-monospace, monospace", lineHeight: "1.5" },
   ".cm-content": { caretColor: "var(--text)" },
   ".cm-cursor": { borderLeftColor: "var(--text)", borderLeftWidth: "2px" },
-  "&.cm-focused > .cm-scroller > .cm-selectionLayer .cm-selectionBackground, .cm-selectionBackground": { backgroundColor: "var(--zone)" },
+  "&.cm-focused > .cm-scroller > .cm-selectionLayer .cm-selectionBackground, .cm-selectionBackground": { backgroundColor: "var(--faint)" },
   ".cm-gutters": { color: "var(--soft)", backgroundColor: "var(--panel)", border: "0" },
   ".cm-activeLine, .cm-activeLineGutter": { backgroundColor: "transparent" },
-  ".cm-selectionMatch": { backgroundColor: "var(--faint)" },
+  ".cm-selectionMatch": { backgroundColor: "transparent", outline: "1px dotted var(--line)" },
   "&.cm-focused .cm-matchingBracket": { backgroundColor: "var(--faint)", outline: "1px solid var(--line)" },
   "&.cm-focused .cm-nonmatchingBracket": { backgroundColor: "var(--warning-page)" },
   ".cm-tooltip, .cm-panels": { color: "var(--text)", backgroundColor: "var(--panel)", border: "1px solid var(--line)" },
@@ -73,7 +73,7 @@ const theme = EditorView.theme({
   ".cm-diagnostic": { color: "var(--text)", whiteSpace: "pre-wrap" },
   ".cm-lintRange-error": { backgroundImage: "none", textDecoration: "underline wavy var(--warning) 1.5px", textUnderlineOffset: "3px" },
   ".cm-lintRange-warning": { backgroundImage: "none", textDecoration: "underline dotted var(--weight) 2px", textUnderlineOffset: "3px" },
-  ".cm-searchMatch": { backgroundColor: "var(--zone)" },
+  ".cm-searchMatch": { backgroundColor: "var(--faint)", outline: "1px solid var(--line)" },
   ".cm-hover": { padding: "4px 8px", maxWidth: "480px", whiteSpace: "pre-wrap", fontFamily: "ui-monospace, monospace", fontSize: "12px" },
 });
 

@@ -104,12 +104,14 @@ function ofLocation(address, part) {
 
 function ofEdge(address, part) {
   const owner = made("input", { type: "checkbox", checked: part.controllable, change: (event) => attempt(() => change({ do: "controllable", address, controllable: event.target.checked })) });
+  const end = (name, title) => made("label", {}, `${title} `, made("select", { change: (event) => attempt(() => change({ do: "end", address, end: name, to: event.target.value })) },
+    ...ends().map(([value, label]) => made("option", { value, selected: part[name] === value }, label))));
   const middle = () => {
     const at = (id) => [...template().locations, ...template().branch_points].find((one) => one.id === id)?.place ?? [0, 0];
     const [a, b] = [part.nails.at(-1) ?? at(part.source), at(part.target)];
     return [Math.round((a[0] + b[0]) / 2), Math.round((a[1] + b[1]) / 2)];
   };
-  return [made("div", { class: "bar" }, made("label", {}, owner, " controllable"),
+  return [made("div", { class: "bar" }, end("source", "From"), end("target", "To")), made("div", { class: "bar" }, made("label", {}, owner, " controllable"),
     button("Add bend", () => { const [x, y] = middle(); return change({ do: "move-bend", address, number: part.nails.length, x, y }); }),
     part.nails.length ? button("Remove last bend", () => change({ do: "remove-bend", address, number: part.nails.length - 1 })) : null)];
 }

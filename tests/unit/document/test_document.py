@@ -168,6 +168,8 @@ def test_kinds_owners_and_starts_change() -> None:
     assert document.file() == DATA
     document, _ = edited("initial", "templates/0/locations/1")
     assert document.file() == DATA.replace(b'init ref="id0"', b'init ref="id1"')
+    document, _ = edited("end", "templates/0/edges/0", end="target", to="id0")
+    assert document.file() == DATA.replace(b'target ref="id1"', b'target ref="id0"')
     document, _ = edited("controllable", "templates/0/edges/0", controllable=False)
     assert b'<transition controllable="false">' in document.file()
 
@@ -262,6 +264,12 @@ def test_a_file_that_is_not_well_formed_is_edited_as_a_whole_and_comes_back() ->
             {"do": "move-bend", "address": "templates/0/edges/1", "number": 3, "x": 0, "y": 0},
             "bend",
         ),
+        ({"do": "end", "address": "templates/0/edges/1", "end": "source", "to": "id2"}, "'id2'"),
+        (
+            {"do": "end", "address": "templates/0/edges/1", "end": "label", "to": "id1"},
+            "only edges",
+        ),
+        ({"do": "end", "address": "queries/0", "end": "source", "to": "id1"}, "only edges"),
         ({"do": "initial", "address": "templates/0/edges/1"}, "starts in a location"),
         ({"do": "remove", "address": "declaration"}, "no declaration"),
     ],

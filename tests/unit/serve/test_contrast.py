@@ -40,6 +40,11 @@ TEXTS = [
     ("text", "node"),
     ("warning", "warning-page"),
     ("warning", "page"),
+    # The editor: words in a field, those that are chosen, and lists beside it.
+    *((text, "field") for text in ("update", "sync", "weight", "warning")),
+    *((text, "faint") for text in ("text", "soft", "update", "sync", "weight", "guard")),
+    ("warning", "panel"),
+    ("text", "warning-page"),
 ]
 SIGNS = [
     *((sign, "page") for sign in ("enabled", "taken", "drawn", "current", "accent", "line")),
@@ -94,7 +99,8 @@ def test_colours_of_the_page_of_queries_stand_out() -> None:
 def test_each_colour_is_known_in_light_and_dark() -> None:
     assert LIGHT.keys() == DARK.keys()
     used = set(re.findall(r"var\(--([\w-]+)\)", STYLE))
+    for path in (Path(pages.__file__).parent / "editor").glob("*[!r].*s"):
+        used |= set(re.findall(r"var\(--([\w-]+)\)", path.read_text("utf-8")))
     assert used <= LIGHT.keys()
     checked = {name for pair in TEXTS + SIGNS for name in pair}
-    # Nothing is read from what only divides areas.
-    assert used - checked == {"faint"}
+    assert used - checked == set()
