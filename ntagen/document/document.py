@@ -142,7 +142,7 @@ class Document:
             changes = changed(self.outline, address, text)
             after, _ = self._outline_of(applied(self.text, changes)[0])
             if after is not None and _text_at(after, address) == text:
-                self._make(address, changes, join=join)
+                self._make(address, changes, join=join, outline=after)
                 return
         raise InputError("this text cannot be written there\nhint: edit the whole text")
 
@@ -183,7 +183,15 @@ class Document:
             self._read()
         return address
 
-    def _make(self, address: str, changes: Sequence[Change], *, join: bool) -> None:
+    def _make(
+        self,
+        address: str,
+        changes: Sequence[Change],
+        *,
+        join: bool,
+        outline: Outline | None = None,
+    ) -> None:
+        """Makes changes, after which the parts are those of `outline` if it is given."""
         if changes:
             grown = sum(len(one.text) - (one.end - one.start) for one in changes)
             if grown > 0 and len(self.text) + grown > self._most_bytes:
@@ -192,6 +200,7 @@ class Document:
                     "hint: start the server with a greater limit: ntagen serve --upload 100MiB"
                 )
             self._history.make(address, changes, join=join)
+            self._outline = outline or self._outline
             self._read()
 
     def _read(self) -> None:

@@ -14,15 +14,17 @@ from typing import Any, Final
 import msgspec
 
 from ntagen.checker.survey import Place, Survey, Symbol
-from ntagen.document.content import Content
+from ntagen.document.content import Content, content_of, whole_content
 from ntagen.document.document import Document
-from ntagen.document.outline import WHOLE
+from ntagen.document.outline import WHOLE, Outline
+from ntagen.errors import InputError
 
 _WORD: Final = re.compile(r"[A-Za-z_]\w*$", re.ASCII)
 _WHOLE_WORD: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _CHAIN: Final = re.compile(r"((?:[A-Za-z_]\w*(?:\s*\[[^\[\]]*\])*\s*\.\s*)+)$", re.ASCII)
 _INDEX: Final = re.compile(r"\[[^\[\]]*\]")
 _MOST_CHAIN: Final = 2000
+_MOST_WORD: Final = 200
 
 _OF_DECLARATIONS: Final = (
     *("bool", "broadcast", "chan", "clock", "const", "double", "else", "exists", "false", "for"),
@@ -46,11 +48,15 @@ class Names:
     """
 
     def __init__(self, document: Document, words: str | bytes) -> None:
-        """Reads what the engine says of the text of a document, as it is now."""
+        """Reads what the engine says of the text of a document, as it is now.
+
+        The document may change later; places are those of this version.
+        """
         self.version = document.version
-        self._document = document
+        self._data = document.text
+        self._outline = document.outline if document.has_parts else None
         self._survey = msgspec.json.decode(words, type=Survey)
-        self._texts = _texts_of(document)
+        self._texts = _texts_of(self._outline)
         self._contents: dict[str, Content | None] = {}
 
     def mistakes(self, *, whole: bool = False) -> list[dict[str, Any]]:
@@ -71,11 +77,12 @@ class Names:
             for one in self._survey.mistakes
         ]
 
-    def completions(self, address: str, index: int) -> dict[str, Any]:
-        """What may stand at a place.
+    def completions(self, address: str, text: str, index: int) -> dict[str, Any]:
+        """What may stand at a place. A text that was typed since then is completed, too.
 
         Args:
             address: The address of a text.
+            text: The text as it is now.
             index: The place in it.
 
         Returns:
@@ -83,20 +90,19 @@ class Names:
             ``label``, a ``kind``, a ``detail`` and an ``info``.
 
         Raises:
-            InputError: There can be no such text.
+            InputError: There was no such text.
         """
-        content = self._content(address)
-        text = "" if content is None else content.text
         at = _characters(text, index)
-        typed = _WORD.search(text, max(0, at - 200), at)
+        typed = _WORD.search(text, max(0, at - _MOST_WORD), at)
         start = typed.start() if typed else at
-        where = 0 if content is None else content.byte_at(start)
-        chain = _CHAIN.search(text[max(0, start - _MOST_CHAIN) : start])
-        if chain:
-            found = self._members(chain[1], self._scope(address, where))
-            words: tuple[str, ...] = ()
+        content = self._content(address)
+        where = 0 if content is None else content.byte_at(min(start, len(content.text)))
+        scope = self._scope(address, where)
+        words: tuple[str, ...] = ()
+        if chain := _CHAIN.search(text[max(0, start - _MOST_CHAIN) : start]):
+            found = self._members(chain[1], scope)
         else:
-            found = list(self._scope(address, where).values())
+            found = list(scope.values())
             kind = address.rpartition("/")[2]
             words = _OF_DECLARATIONS if kind in _WITH_TYPES else _OF_LABELS
             words = _OF_QUERIES if kind == "formula" else words
@@ -126,7 +132,14 @@ class Names:
     def _content(self, address: str) -> Content | None:
         """A text; the places of its characters are found once."""
         if address not in self._contents:
-            self._contents[address] = self._document.content(address)
+            found = None
+            if address == WHOLE:
+                found = whole_content(self._data)
+            elif self._outline is None:
+                raise InputError(f"the model has no {address[:80]}\nhint: reload the page")
+            elif (element := self._outline.text_element(address)) is not None:
+                found = content_of(self._data, element)
+            self._contents[address] = found
         return self._contents[address]
 
     def _symbol_at(self, byte: int) -> Symbol | None:
@@ -180,11 +193,11 @@ class Names:
         return {"address": address, "from": _units(text, first), "to": _units(text, last)}
 
 
-def _texts_of(document: Document) -> tuple[list[int], list[str]]:
+def _texts_of(outline: Outline | None) -> tuple[list[int], list[str]]:
     """Where the texts of a model begin, in order, and their addresses."""
-    if not document.has_parts:
+    if outline is None:
         return [], []
-    found = sorted((element.open_end, name) for name, element in document.outline.texts())
+    found = sorted((element.open_end, name) for name, element in outline.texts())
     return [start for start, _ in found], [name for _, name in found]
 
 

@@ -84,16 +84,23 @@ class Editing:
             InputError: There is no such text.
             Refusal: The process ended without an answer.
         """
-        with self.asking:
-            names = self._survey()
+        is_completed = wish.get("do") == "complete"
+        # Completions do not wait until what was typed last is looked at.
+        names = self._names if is_completed else None
+        if names is None:
+            with self.asking:
+                names = self._survey()
         with self.lock:
+            if is_completed and names is not None:
+                address, at = text_of(wish, "address"), number_of(wish, "at")
+                content = self.document.content(address)
+                return names.completions(address, "" if content is None else content.text, at)
             if names is None or names.version != self.document.version:
                 return {"version": self.document.version, "late": True}
             found = {"version": names.version}
             if wish.get("do") == "mistakes":
                 return found | {"mistakes": names.mistakes(whole=wish.get("whole") is True)}
-            asked = names.completions if wish.get("do") == "complete" else names.definition
-            return found | asked(text_of(wish, "address"), number_of(wish, "at"))
+            return found | names.definition(text_of(wish, "address"), number_of(wish, "at"))
 
     def save(self, wish: dict[str, Any]) -> dict[str, Any]:
         """Writes the file back.

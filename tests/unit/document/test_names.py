@@ -23,6 +23,11 @@ def told(text: str = GATE, name: str = "gate.xml", **texts: str) -> tuple[Docume
     return document, Names(document, survey_json(Texts(name, document.text.decode())))
 
 
+def completed(document: Document, names: Names, address: str, at: int) -> dict[str, Any]:
+    content = document.content(address)
+    return names.completions(address, "" if content is None else content.text, at)
+
+
 def labels(found: dict[str, Any]) -> set[str]:
     return {one["label"] for one in found["options"]}
 
@@ -49,26 +54,35 @@ def test_a_model_without_mistakes_has_none() -> None:
 
 
 def test_names_of_the_place_are_completed() -> None:
-    _, names = told(templates__0__edges__0__guard="count < 9 && sin")
-    found = names.completions(GUARD, 16)
+    document, names = told(templates__0__edges__0__guard="count < 9 && sin")
+    found = completed(document, names, GUARD, 16)
     assert found["from"] == 13
     assert {"since", "quick", "count", "LIMIT", "forall"} <= labels(found)
     assert not {"Open", "A[]", "typedef"} & labels(found) - {"Open"}
     (since,) = (one for one in found["options"] if one["label"] == "since")
     assert (since["kind"], since["detail"]) == ("clock", "clock since")
     # A label that the file does not have yet knows what its template knows.
-    assert "since" in labels(names.completions("templates/0/edges/1/guard", 0))
-    assert "since" not in labels(names.completions("templates/1/edges/0/guard", 0))
-    assert {"A[]", "Gate"} <= labels(names.completions("queries/0/formula", 0))
+    assert "since" in labels(completed(document, names, "templates/0/edges/1/guard", 0))
+    assert "since" not in labels(completed(document, names, "templates/1/edges/0/guard", 0))
+    assert {"A[]", "Gate"} <= labels(completed(document, names, "queries/0/formula", 0))
+
+
+def test_what_was_typed_since_then_is_completed() -> None:
+    document, names = told()
+    fulfil(document, {"do": "text", "address": "declaration", "text": "int n;"})
+    fulfil(document, {"do": "text", "address": GUARD, "text": "count < 9 && since >= 1 && LIM"})
+    found = completed(document, names, GUARD, 30)
+    assert found["from"] == 27
+    assert "LIMIT" in labels(found)
 
 
 def test_what_follows_a_dot_is_completed() -> None:
-    _, names = told(queries__0__formula="E<> Gate.Op")
-    found = names.completions("queries/0/formula", 11)
+    document, names = told(queries__0__formula="E<> Gate.Op")
+    found = completed(document, names, "queries/0/formula", 11)
     assert found["from"] == 9
     assert {"Open", "Shut", "since"} <= labels(found)
     assert "count" not in labels(found)
-    assert labels(names.completions("queries/0/formula", 4)) >= {"Gate", "count"}
+    assert labels(completed(document, names, "queries/0/formula", 4)) >= {"Gate", "count"}
 
 
 def test_fields_of_fields_are_completed() -> None:
@@ -76,9 +90,9 @@ def test_fields_of_fields_are_completed() -> None:
         "typedef struct { int width; } part;\nstruct { part left[2]; } whole;\n"
         "process P() { state A; init A; trans A -> A { guard whole.left[1].w; }; }\nsystem P;\n"
     )
-    _, names = told(text, "model.xta")
+    document, names = told(text, "model.xta")
     at = text.index("left[1].w") + len("left[1].w")
-    assert labels(names.completions("text", at)) == {"width"}
+    assert labels(completed(document, names, "text", at)) == {"width"}
 
 
 @pytest.mark.parametrize(
