@@ -360,7 +360,7 @@ def test_a_check_is_cancelled_and_too_many_are_refused(server: Server) -> None:
 
 
 def test_a_search_has_limits() -> None:
-    with running(Limits(timeout_s=0.3)) as server:
+    with running(Limits(timeout_s=2.0)) as server:
         number = dropped(server, "endless.xta", ENDLESS)
         report = ended(server, started(server, number, action="check", query="A[] a <= 90"))
     assert (report["exit"], report["answers"][0]["stop"]) == (3, "time")
