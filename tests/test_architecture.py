@@ -79,6 +79,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
+    "checker.survey": {"_checker"},
     "checker.policy": {"errors"},
     "checker.agents": {"errors", "checker.policy"},
     "checker.stepwise": {"errors", "checker.errors", "_checker"},
@@ -97,6 +98,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "convert": {"build", "errors", "checker"}
     | {"checker.facts", "checker.picture", "checker.queries"},
     "verifyta": {"errors", "files", "checker"},
+    "xta": set(),
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}
     | {"checker.picture", "checker.play", "checker.queries", "checker.runs", "checker.strategy"},
@@ -173,7 +175,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "version",
     }
     | {"checker.picture", "report", "system"}
-    | {"editor", "serve", "simulator", "verifyta", "watch"}
+    | {"checker.survey", "editor", "serve", "simulator", "verifyta", "watch", "xta"},
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents", "checker.survey", "convert"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},

@@ -56,8 +56,8 @@ COMMANDS: Final = {
     "replay": ("needle.replay", "Repeat the decisions of a logged run and compare them."),
     "report": ("needle.run_report", "Make a page of a logged run, for a lab notebook."),
     "verifyta": ("models.verifyta", "Stand in for UPPAAL's verifyta: its options, output, files."),
-    "fmt": ("needle.fmt", "Format environment files."),
-    "lsp": ("needle.lsp", "Answer an editor about environment files."),
+    "fmt": ("needle.fmt", "Format environments and textual models."),
+    "lsp": ("needle.lsp", "Answer an editor about environments and models."),
 }
 """The commands in the order of the help, each with its module below here and its line there."""
 

@@ -1,4 +1,4 @@
-"""`ntagen fmt`: brings environment files into the standard layout."""
+"""`ntagen fmt`: brings environment files and textual models into their standard layouts."""
 
 from __future__ import annotations
 
@@ -8,24 +8,28 @@ from pathlib import Path
 import click
 
 from ntagen.cli.terminal import echo, echo_exactly
+from ntagen.errors import InputError
 from ntagen.files import write_files
 
 _STDIN = "-"
+_TEXTUAL = (".xta", ".ta")
+_OTHERS = (".xml", ".q")
 
 
 @click.command(name="fmt")
-@click.argument("files", nargs=-1, required=True, metavar="ENV.nsl...")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
 @click.option("--check", is_flag=True, help="Change nothing; exit with 1 if a file would change.")
 @click.pass_context
 def command(ctx: click.Context, files: tuple[str, ...], check: bool) -> None:
-    """Bring environment files into the standard layout, in place.
+    """Bring environments (.nsl) and textual models (.xta, .ta) into the standard layout, in place.
 
     Comments stay, and the meaning does not change. A file with syntax errors is left unchanged. A
-    single - reads standard input and writes to standard output.
+    single - reads an environment from standard input and writes to standard output.
 
     \b
     Example:
       ntagen fmt examples/*.nsl
+      ntagen fmt model.xta
       ntagen fmt --check env.nsl
     """  # noqa: D301
     from ntagen.nsl import Diagnostic, SourceError
@@ -57,13 +61,19 @@ def _formatted(name: str) -> tuple[str, str]:
     """The text of a file before and after.
 
     Raises:
-        SourceError: The file cannot be read, or has syntax errors.
+        InputError: The file has no standard layout, cannot be read, or has syntax errors.
     """
     from ntagen.nsl import SourceError, format_text
     from ntagen.nsl.diagnostics import Reporter
     from ntagen.nsl.reading import decode_source, read_source
     from ntagen.nsl.source import MAX_SOURCE_BYTES
 
+    ending = Path(name).suffix.lower()
+    if ending in _OTHERS:
+        raise InputError(
+            f"{name} has no standard layout\n"
+            "hint: environments (.nsl) and textual models (.xta, .ta) have one"
+        )
     reporter = Reporter()
     if name == _STDIN:
         data = sys.stdin.buffer.read(MAX_SOURCE_BYTES + 1)
@@ -72,4 +82,32 @@ def _formatted(name: str) -> tuple[str, str]:
         source = read_source(name, reporter)
     if source is None:
         raise SourceError(reporter.diagnostics)
+    if ending in _TEXTUAL:
+        return source.text, _format_model(source.text, source.path)
     return source.text, format_text(source.text, source.path)
+
+
+def _format_model(text: str, path: str) -> str:
+    """The text of a model in the standard layout.
+
+    Raises:
+        SourceError: It has syntax errors.
+    """
+    from ntagen.checker.survey import Texts, survey
+    from ntagen.nsl import Diagnostic, SourceError
+    from ntagen.nsl.source import Source
+    from ntagen.xta import format_model
+
+    source = Source(path, text)
+    mistakes = []
+    for one in survey(Texts(path, text)).mistakes:
+        if one.is_of_form:
+            start, end = (one.at.start, one.at.end) if one.at else (0, 0)
+            line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
+            found = (path, line, column, max(1, end - start), one.message, source.line(line))
+            mistakes.append(
+                Diagnostic(one.code, one.severity, *found, notes=one.notes, hint=one.hint)
+            )
+    if mistakes:
+        raise SourceError(mistakes)
+    return format_model(text)
