@@ -105,7 +105,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "document": {"errors", "files", "build", "checker.picture", "checker.survey"},
     "serve": {"document", "errors", "files"},
     "watch": {"drive", "errors", "plan", "plot", "scene", "serve", "shapes"},
-    "editor": {"nsl", "parameters", "values", "version"},
+    "editor": {"nsl", "parameters", "values", "version"}
+    | {"checker", "checker.survey", "explanations", "files", "serve", "xta"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},

@@ -1,8 +1,10 @@
-"""Finds the mistakes of texts in a second process, which can be stopped at any moment.
+"""Looks at texts in a second process, which can be stopped at any moment.
 
 A check of an environment with large meshes can take a minute: the distances around them depend on
 the needle, too, so each key that changes a number there asks for new ones. The server goes on
-answering meanwhile, and a text that is out of date is not worked on any longer.
+answering meanwhile, and a text that is out of date is not worked on any longer. A model takes some
+hundredths of a second, less than another process takes to start: work that nobody waits for any
+more has a moment left in which it may end.
 
 Invariants: there is at most one process, and it works on at most one text; after a check that was
 given up it is gone, and the next check starts another one.
@@ -12,9 +14,12 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from typing import Any
 
+from ntagen.checker.survey import Texts, survey_json
 from ntagen.editor import language
 from ntagen.nsl import Diagnostic
 
@@ -26,7 +31,13 @@ class CheckEndedError(Exception):
 class Checks:
     """Asks the second process, one text after the other."""
 
-    def __init__(self) -> None:
+    def __init__(self, patience_s: float = 0.0) -> None:
+        """Begins with no process.
+
+        Args:
+            patience_s: So long work may go on that nobody waits for any more.
+        """
+        self._patience_s = patience_s
         self._one_at_a_time = asyncio.Lock()
         self._worker: tuple[BaseProcess, Connection] | None = None
 
@@ -36,23 +47,38 @@ class Checks:
         Raises:
             CheckEndedError: The process ended before it had an answer.
         """
+        found: tuple[Diagnostic, ...] = await self._ask(language.mistakes, text, path)
+        return found
+
+    async def survey(self, texts: Texts, allow_external: tuple[str, ...]) -> str:
+        """As `survey_json`, in the same way."""
+        found: str = await self._ask(survey_json, texts, allow_external)
+        return found
+
+    async def _ask(self, work: Callable[..., Any], *arguments: object) -> Any:  # noqa: ANN401
         async with self._one_at_a_time:
             if self._worker is None:
                 self._worker = _started()
             _, pipe = self._worker
             is_done = False
             try:
-                pipe.send((text, path))
-                found: tuple[Diagnostic, ...] = await asyncio.to_thread(pipe.recv)
+                pipe.send((work, arguments))
+                answer = asyncio.ensure_future(asyncio.to_thread(pipe.recv))
+                try:
+                    found = await asyncio.shield(answer)
+                except asyncio.CancelledError:
+                    done, _ = await asyncio.wait({answer}, timeout=self._patience_s)
+                    is_done = bool(done) and answer.exception() is None
+                    raise
                 is_done = True
             except (EOFError, OSError) as error:
                 raise CheckEndedError from error
             finally:
                 if not is_done:
-                    self._stop()
+                    self.stop()
         return found
 
-    def _stop(self) -> None:
+    def stop(self) -> None:
         """Ends the process; whoever still reads from it meets the end of the pipe."""
         if self._worker is not None:
             process, _ = self._worker
@@ -77,7 +103,7 @@ def _answer(pipe: Connection) -> None:
     """Answers until the server is gone."""
     while True:
         try:
-            text, path = pipe.recv()
+            work, arguments = pipe.recv()
         except (EOFError, KeyboardInterrupt):
             return
-        pipe.send(language.mistakes(text, path))
+        pipe.send(work(*arguments))

@@ -17,7 +17,6 @@ from itertools import pairwise
 from typing import Final, Literal
 
 from ntagen.nsl import Diagnostic, SourceError, loads_task
-from ntagen.nsl.diagnostics import CAPTIONS, KINDS, page_of
 from ntagen.nsl.driving import CHOICES
 from ntagen.nsl.grammar import UnexpectedTokenError, read_statement
 from ntagen.nsl.lexer import tokenise
@@ -41,7 +40,6 @@ WordKind = Literal["keyword", "setting", "name", "choice"]
 
 _WORD: Final = re.compile(r"`(\w+)")
 _CODE: Final = re.compile(r"`[^`]*`")
-_EXAMPLE: Final = re.compile(r"^```([a-z]+) ([a-z]+)$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +80,6 @@ def mistakes(text: str, path: str) -> tuple[Diagnostic, ...]:
         return loads_task(text, path).warnings
     except SourceError as error:
         return error.diagnostics
-
-
-def explained(code: str) -> str:
-    """What a code of a mistake means, in Markdown: the text of `ntagen explain`."""
-    kind = next(kind for kind in KINDS.values() if kind.code == code)
-    # Editors do not show the words after the language of an example.
-    page = _EXAMPLE.sub(lambda found: f"{CAPTIONS[found[2]]}\n\n```{found[1]}", page_of(kind))
-    return f"**{kind.severity}[{kind.code}]: {kind.name}**\n\n{page.strip()}"
 
 
 def meaning(text: str, offset: int) -> tuple[str, int, int] | None:
