@@ -51,11 +51,13 @@ class Models:
         self._surveys = surveys
         self._running: dict[Pair, asyncio.Task[None]] = {}
         self._without_model: set[str] = set()
+        self._seen: set[str] = set()
 
     def look(self, uri: str) -> None:
         """Looks for mistakes of a text; what was begun for it before is given up."""
         pair = self.pair(uri)
         if pair is None:
+            self._desk.publish(uri, [], self._desk.version(uri))
             return
         self._give_up(pair)
         if pair.model is None and uri not in self._without_model:
@@ -70,6 +72,7 @@ class Models:
 
     def take_back(self, uri: str) -> None:
         """Takes back the mistakes of a text that was closed, and of the text beside it."""
+        self._seen.discard(uri)
         pair = pair_of(path_of(uri), self._desk.is_there)
         if any(self._desk.is_open(one) for one in pair.paths):
             return
@@ -127,10 +130,15 @@ class Models:
         )
 
     def pair(self, uri: str) -> Pair | None:
-        """The pair of a text; ``None`` if it is XML of another kind."""
+        """The pair of a text; ``None`` if it is XML of another kind.
+
+        A text that was a model stays one while it is open: its first line may be typed anew.
+        """
         path = path_of(uri)
-        if path.lower().endswith(".xml") and _NTA.match(self._desk.text(uri).source) is None:
-            return None
+        if path.lower().endswith(".xml") and uri not in self._seen:
+            if _NTA.match(self._desk.text(uri).source) is None:
+                return None
+            self._seen.add(uri)
         return pair_of(path, self._desk.is_there)
 
     def texts(self, pair: Pair) -> Texts:
