@@ -6,7 +6,8 @@ A real server answers a client over its pipes. Each edit inserts, removes or rep
 characters at a random place, as people and slips do; after a while the text is that of the file
 again. Time counts from sending the new text until the mistakes of this version have come. Every
 50th edit also asks for everything else at a random place: hover, completion, definition, and so on.
-The largest models are taken that have at most 2,000 lines; ``--folder`` adds those of a folder.
+The largest models are taken that have at most 2,000 lines, one of each folder; ``--folder`` adds
+folders to those of the corpus.
 """
 
 from __future__ import annotations
@@ -47,14 +48,14 @@ PIECES = [
 
 
 def models(folders: Sequence[Path], number: int) -> list[Path]:
-    """The largest models of folders that are not too long."""
-    found: list[tuple[int, Path]] = []
-    for folder in folders:
-        for path in folder.rglob("*"):
-            if path.suffix in (".xml", ".xta", ".ta"):
-                lines = path.read_bytes().count(b"\n")
-                found += [(lines, path)] if lines <= MOST_LINES else []
-    return [path for _, path in sorted(found, reverse=True)[:number]]
+    """The largest models that are not too long, one of each folder: others are much like it."""
+    largest: dict[Path, tuple[int, Path]] = {}
+    for path in (one for folder in folders for one in sorted(folder.rglob("*"))):
+        if path.suffix in (".xml", ".xta", ".ta"):
+            lines = path.read_bytes().count(b"\n")
+            if lines <= MOST_LINES:
+                largest[path.parent] = max(largest.get(path.parent, (0, path)), (lines, path))
+    return [path for _, path in sorted(largest.values(), reverse=True)[:number]]
 
 
 def edits(text: str, draw: random.Random) -> Iterator[tuple[int, int, str]]:

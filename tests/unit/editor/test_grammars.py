@@ -7,9 +7,12 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from ntagen.nsl.driving import CHOICES
 from ntagen.nsl.tokens import KEYWORDS, WORDS
 from ntagen.parameters import BY_WORDS
+from ntagen.xta import MODEL_WORDS, QUERY_WORDS
 
 EDITORS = Path(__file__).parents[3] / "editors"
 CHOSEN = {word for words in CHOICES.values() for word in words}
@@ -59,6 +62,20 @@ def test_vim_knows_all_words() -> None:
     assert keywords("nslChoice") >= CHOSEN
     settings = re.findall(r"^syntax match nslSetting /\\<(.*)\\>/ contained$", text, re.MULTILINE)
     assert {one.replace("\\s\\+", " ") for one in settings} == set(BY_WORDS)
+
+
+MODELS = [("xta", "xta", MODEL_WORDS), ("uppaalquery", "query", QUERY_WORDS)]
+
+
+@pytest.mark.parametrize(("name", "group", "words"), MODELS)
+def test_both_know_all_words_of_models(name: str, group: str, words: frozenset[str]) -> None:
+    grammar = json.loads((EDITORS / f"vscode/syntaxes/{name}.tmLanguage.json").read_text("utf-8"))
+    coloured = [one["match"] for one in grammar["patterns"] if "match" in one]
+    for word in words:
+        assert any(re.fullmatch(pattern, word) for pattern in coloured), word
+    vim = (EDITORS / "vim" / "syntax" / f"{name}.vim").read_text("utf-8")
+    rows = re.findall(rf"^syntax keyword {group}\w+ (.*)$", vim, re.MULTILINE)
+    assert words <= {word for row in rows for word in row.split()}
 
 
 def test_the_extension_starts_the_server() -> None:
