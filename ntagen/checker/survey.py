@@ -21,6 +21,9 @@ MODEL: Final = 0
 QUERIES: Final = 1
 """The number of a file in a place."""
 
+OF_FORM: Final = "E01"
+"""What the codes of mistakes of form begin with."""
+
 SymbolKind = Literal[
     "constant",
     "variable",
@@ -89,7 +92,7 @@ class Mistake:
     @property
     def is_of_form(self) -> bool:
         """Whether the text is not even well-formed here, so names may be missing around it."""
-        return self.severity == "error" and self.code.startswith("E01")
+        return self.code.startswith(OF_FORM)
 
 
 @dataclass(frozen=True, slots=True)

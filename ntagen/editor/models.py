@@ -7,7 +7,6 @@ since are not. Mistakes are looked for at once: that takes less time than a rest
 from __future__ import annotations
 
 import asyncio
-import re
 from typing import Final
 
 from lsprotocol import types
@@ -16,12 +15,10 @@ from ntagen.checker.survey import MODEL, QUERIES, Mistake, Place, Symbol, Symbol
 from ntagen.editor.checks import CheckEndedError
 from ntagen.editor.completing import Language, Possible, part_of_xml, possible
 from ntagen.editor.desk import SEVERITIES, Desk, path_of
-from ntagen.editor.pairs import MODELS, Pair, kind_of, pair_of
+from ntagen.editor.pairs import MODELS, Pair, kind_of, pair_of, says_it_is_a_model
 from ntagen.editor.renaming import Renaming, RenamingError, renamed, renaming_at
 from ntagen.editor.surveys import Looked, OutdatedError, Surveys
 from ntagen.xta import format_model
-
-_NTA: Final = re.compile(r"\A\ufeff?(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<nta\b", re.DOTALL)
 
 _KINDS: Final[dict[str, types.CompletionItemKind]] = {
     "constant": types.CompletionItemKind.Constant,
@@ -136,7 +133,7 @@ class Models:
         """
         path = path_of(uri)
         if path.lower().endswith(".xml") and uri not in self._seen:
-            if _NTA.match(self._desk.text(uri).source) is None:
+            if not says_it_is_a_model(self._desk.text(uri).source):
                 return None
             self._seen.add(uri)
         return pair_of(path, self._desk.is_there)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import PurePath
 from typing import Final, Literal
@@ -12,6 +13,8 @@ Kind = Literal["environment", "model", "queries"]
 
 MODELS: Final = (".xml", ".xta", ".ta")
 """The endings of models. Of several with one name, the first has the queries."""
+
+_NTA: Final = re.compile(r"\A\ufeff?(?:\s|<\?.*?\?>|<!--.*?-->|<!DOCTYPE[^>]*>)*<nta\b", re.DOTALL)
 
 _QUERIES: Final = ".q"
 
@@ -35,6 +38,11 @@ def kind_of(path: str) -> Kind | None:
     if ending in MODELS:
         return "model"
     return {".nsl": "environment", _QUERIES: "queries"}.get(ending)  # type: ignore[return-value]
+
+
+def says_it_is_a_model(text: str) -> bool:
+    """Whether a text in XML is a model: its first element is ``<nta>``."""
+    return _NTA.match(text) is not None
 
 
 def pair_of(path: str, is_there: Callable[[str], bool]) -> Pair:

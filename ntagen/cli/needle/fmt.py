@@ -93,21 +93,12 @@ def _format_model(text: str, path: str) -> str:
     Raises:
         SourceError: It has syntax errors.
     """
-    from ntagen.checker.survey import Texts, survey
-    from ntagen.nsl import Diagnostic, SourceError
-    from ntagen.nsl.source import Source
+    from ntagen.checker.survey import OF_FORM, Texts
+    from ntagen.cli.mistakes import mistakes_of
+    from ntagen.nsl import SourceError
     from ntagen.xta import format_model
 
-    source = Source(path, text)
-    mistakes = []
-    for one in survey(Texts(path, text)).mistakes:
-        if one.is_of_form:
-            start, end = (one.at.start, one.at.end) if one.at else (0, 0)
-            line, column = text.count("\n", 0, start) + 1, start - text.rfind("\n", 0, start)
-            found = (path, line, column, max(1, end - start), one.message, source.line(line))
-            mistakes.append(
-                Diagnostic(one.code, one.severity, *found, notes=one.notes, hint=one.hint)
-            )
+    mistakes = [one for one in mistakes_of(Texts(path, text)) if one.code.startswith(OF_FORM)]
     if mistakes:
         raise SourceError(mistakes)
     return format_model(text)

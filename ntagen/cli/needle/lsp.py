@@ -1,4 +1,4 @@
-"""`ntagen lsp`: the language server for environments."""
+"""`ntagen lsp`: the language server for environments, models and queries."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from ntagen.errors import InputError
     help="Talk over standard input and output. It is the only way; some editors write this option.",
 )
 def command() -> None:
-    """Answer an editor about environments (.nsl), over standard input and output.
+    """Answer an editor over standard input and output.
 
-    Editors start it; docs/editors.md says how to set up two of them. It speaks the language server
-    protocol: mistakes while you type, what words mean, completion, layout, names.
+    It knows environments (.nsl), models (.xta, .ta, and .xml of UPPAAL) and queries (.q, those of
+    the model with the same name beside it). Editors start it; docs/editors.md says how to set up
+    two of them. It speaks the language server protocol: mistakes while you type, what words mean,
+    completion, declarations and uses of names, renaming, layout, and answers of queries.
 
     \b
     Example (an editor writes it):
