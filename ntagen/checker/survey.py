@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple, TypeVar
 
 import msgspec
+import numpy as np
 
 import ntagen._checker as _checker
 from ntagen.values import dataclass
@@ -220,11 +221,10 @@ def _starts(text: str) -> list[int] | None:
     """The character at each byte of a text as UTF-8; ``None`` if both count alike."""
     if text.isascii():
         return None
-    found: list[int] = []
-    for number, character in enumerate(text):
-        found += [number] * len(character.encode("utf-8", "replace"))
-    found.append(len(text))
-    return found
+    data = np.frombuffer(text.encode("utf-8", "replace"), np.uint8)
+    is_first = (data & 0xC0) != 0x80
+    counted: list[int] = (np.cumsum(is_first) - 1).tolist()
+    return [*counted, len(text)]
 
 
 def _in_characters(found: Survey, starts: list[list[int] | None]) -> Survey:
