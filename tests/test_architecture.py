@@ -79,7 +79,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     | {"errors", "checker.distribution", "checker.picture", "checker.trajectories"},
     "checker.options": {"checker.queries", "checker.strategy"},
     "checker.constants": set(),
-    "checker.survey": {"_checker"},
     "checker.policy": {"errors"},
     "checker.agents": {"errors", "checker.policy"},
     "checker.stepwise": {"errors", "checker.errors", "_checker"},
@@ -176,7 +175,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "version",
     }
     | {"checker.picture", "report", "system"}
-    | {"checker.survey", "editor", "serve", "simulator", "verifyta", "watch", "xta"},
+    | {"checker.survey", "editor", "serve", "simulator", "verifyta", "watch", "xta"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents", "checker.survey", "convert"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},

@@ -62,10 +62,10 @@ class Use(NamedTuple):
 
 
 class Area(NamedTuple):
-    """A part of a text in which symbols may be used, beside those of the areas around it."""
+    """A part of a text in which the symbols of a scope may be used, and those around it."""
 
     at: Place
-    symbols: list[int]
+    scope: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +144,7 @@ class Survey:
         uses: Where names are used; declarations are not among them.
         everywhere: The symbols that may be used in the whole model.
         areas: Where others may be used, the inner places behind the outer ones.
+        scopes: The symbols of the areas.
         groups: The symbols that may follow a dot.
         queries: Those of the model, then those of the other file.
     """
@@ -153,6 +154,7 @@ class Survey:
     uses: tuple[Use, ...]
     everywhere: tuple[int, ...]
     areas: tuple[Area, ...]
+    scopes: tuple[tuple[int, ...], ...]
     groups: tuple[tuple[int, ...], ...]
     queries: tuple[Asked, ...]
 
@@ -245,6 +247,6 @@ def _in_characters(found: Survey, starts: list[list[int] | None]) -> Survey:
         mistakes=tuple(map(moved, found.mistakes)),
         symbols=tuple(map(moved, found.symbols)),
         uses=tuple(Use(counted(one.at), one.symbol) for one in found.uses),
-        areas=tuple(Area(counted(one.at), one.symbols) for one in found.areas),
+        areas=tuple(Area(counted(one.at), one.scope) for one in found.areas),
         queries=tuple(map(moved, found.queries)),
     )

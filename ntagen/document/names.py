@@ -163,7 +163,8 @@ class Names:
             content = self._content(name)
             if content is not None:
                 around = [one for one in survey.areas if one.at.start == content.start]
-        numbers = [*survey.everywhere, *(number for one in around for number in one.symbols)]
+        inner = (number for one in around for number in survey.scopes[one.scope])
+        numbers = [*survey.everywhere, *inner]
         symbols = (survey.symbols[number] for number in numbers)
         return {one.name: one for one in symbols}
 

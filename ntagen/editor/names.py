@@ -58,7 +58,7 @@ class Names:
         numbers = list(survey.everywhere)
         for area in survey.areas:
             if _covers(area, file, offset):
-                numbers += area.symbols
+                numbers += survey.scopes[area.scope]
         if self._is_asked(file, offset):
             numbers += self._processes()
         found: dict[str, Symbol] = {}
@@ -90,9 +90,9 @@ class Names:
 
     def _processes(self) -> Iterator[int]:
         """What the system declares, which all queries may use."""
-        for area in self.survey.areas:
-            if any(self.survey.symbols[one].kind == "process" for one in area.symbols):
-                yield from area.symbols
+        for symbols in self.survey.scopes:
+            if any(self.survey.symbols[one].kind == "process" for one in symbols):
+                yield from symbols
 
 
 def _covers(area: Area, file: int, offset: int) -> bool:

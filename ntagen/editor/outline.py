@@ -29,9 +29,9 @@ _KINDS: Final[dict[SymbolKind, types.SymbolKind]] = {
 def outline(survey: Survey, file: int, text: Text) -> list[types.DocumentSymbol]:
     """The declarations and queries of a text, in their order."""
     numbers = list(survey.everywhere)
-    for area in survey.areas:
-        if any(survey.symbols[one].kind in ("process", "strategy") for one in area.symbols):
-            numbers += area.symbols
+    for symbols in survey.scopes:
+        if any(survey.symbols[one].kind in ("process", "strategy") for one in symbols):
+            numbers += symbols
     shown = [(at, _symbol(survey, one, at, text)) for one, at in _in(survey, numbers, file)]
     for one in survey.queries:
         if one.at is not None and one.at.file == file:

@@ -30,7 +30,7 @@ from ntagen.editor.surveys import Surveys
 from ntagen.editor.verdicts import Verdicts
 from ntagen.explanations import explanations
 from ntagen.nsl.diagnostics import CAPTIONS
-from ntagen.serve.jobs import Limits
+from ntagen.serve.processes import Limits
 from ntagen.version import VERSION
 
 _EXAMPLE: Final = re.compile(r"^```([a-z]+) ([a-z]+)$", re.MULTILINE)

@@ -15,7 +15,8 @@ from typing import Any, Final
 from ntagen import checker
 from ntagen.checker.survey import Asked, Texts
 from ntagen.editor.pairs import Pair
-from ntagen.serve.jobs import Job, Limits
+from ntagen.serve.jobs import Job
+from ntagen.serve.processes import Limits
 from ntagen.values import dataclass
 
 _LOOK_S: Final = 0.05

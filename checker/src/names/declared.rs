@@ -13,6 +13,8 @@ pub struct Names {
     pub everywhere: Vec<usize>,
     /// Where others may be used, the inner places behind the outer ones.
     pub areas: Vec<Area>,
+    /// The symbols of the areas, by [`Area::scope`].
+    pub scopes: Vec<Vec<usize>>,
     /// The symbols that may follow a dot, by [`Symbol::members`].
     pub groups: Vec<Vec<usize>>,
 }
@@ -64,10 +66,10 @@ pub struct Use {
 }
 
 /// A part of a text in which symbols may be used, beside those of the areas around it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Area {
     /// Where.
     pub span: Span,
-    /// The symbols.
-    pub symbols: Vec<usize>,
+    /// The scope whose symbols they are.
+    pub scope: usize,
 }

@@ -83,15 +83,24 @@ impl<'a> Resolver<'a> {
 
     /// Ends the innermost scope, and notes where its names may be used.
     pub(super) fn leave(&mut self) {
-        let Some(scope) = self.open.pop() else { return };
-        for hull in scope.hulls {
-            let span = self.reached(hull, scope.reach);
+        let Some(Open {
+            symbols,
+            hulls,
+            reach,
+            ..
+        }) = self.open.pop()
+        else {
+            return;
+        };
+        let scope = self.names.scopes.len();
+        for hull in hulls {
+            let span = self.reached(hull, reach);
             self.note(span);
-            if !scope.symbols.is_empty() {
-                let symbols = scope.symbols.clone();
-                self.names.areas.push(Area { span, symbols });
+            if !symbols.is_empty() {
+                self.names.areas.push(Area { span, scope });
             }
         }
+        self.names.scopes.push(symbols);
     }
 
     fn reached(&self, hull: Span, reach: Reach) -> Span {

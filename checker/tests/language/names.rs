@@ -155,7 +155,7 @@ fn names_may_be_used_where_their_scope_reaches() {
         let areas = read.names.areas.iter();
         let here = areas
             .filter(|one| read.in_file(one.span) && (one.span.start..=one.span.end).contains(&at));
-        let symbols = here.flat_map(|one| &one.symbols);
+        let symbols = here.flat_map(|one| &read.names.scopes[one.scope]);
         let mut names: Vec<&str> = symbols
             .map(|&one| read.names.symbols[one].name.as_str())
             .collect();

@@ -21,7 +21,8 @@ pub fn survey(survey: &Survey, paths: &[&str]) -> Json {
         "symbols": each(&names.symbols, |one| places.symbol(one)),
         "uses": placed(names.uses.iter().map(|one| (places.of(one.span), json!(one.symbol)))),
         "everywhere": names.everywhere,
-        "areas": placed(names.areas.iter().map(|one| (places.of(one.span), json!(one.symbols)))),
+        "areas": placed(names.areas.iter().map(|one| (places.of(one.span), json!(one.scope)))),
+        "scopes": names.scopes,
         "groups": names.groups,
         "queries": each(&survey.queries, |one| places.query(one)),
     })
