@@ -96,6 +96,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "build": {"errors", "files", "checker", "checker.picture"},
     "convert": {"build", "errors", "checker"}
     | {"checker.facts", "checker.picture", "checker.queries"},
+    "suites": {"build", "checker", "checker.runs", "errors", "files"},
+    "mutation": {"build", "checker", "checker.runs", "errors", "suites"},
     "verifyta": {"errors", "files", "checker"},
     "xta": set(),
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
@@ -176,6 +178,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     }
     | {"checker.picture", "report", "system"}
     | {"checker.survey", "editor", "serve", "simulator", "verifyta", "watch", "xta"}
+    | {"build", "mutation", "suites"}
     | {"checker", "checker.facts", "checker.play", "checker.runs", "checker.strategy"}
     | {"checker.agents", "checker.survey", "convert"},
     "pytest_plugin": {"checker", "checker.queries", "errors", "loading"},
@@ -212,7 +215,7 @@ ONLY_IN: dict[str, set[str]] = {
     "pytest": {"pytest_plugin"},
     "rich": {"cli"},
     "lark": {"nsl"},
-    "jinja2": {"render"},
+    "jinja2": {"render", "suites"},
     "markupsafe": {"render"},
     "matplotlib": {"checker.picture", "experiment", "plot"},
     "scipy": {"experiment", "imaging", "needle", "plan", "traces"},

@@ -42,6 +42,7 @@ COMMANDS: Final = {
     "play": ("models.play", "Play a timed game against a strategy."),
     "convert": ("models.convert", "Turn a model into the format of another tool."),
     "info": ("models.info", "Show what is in a model or an environment."),
+    "test": ("models.test", "Make a test suite of a model: traces that cover it."),
     "explain": ("explain", "Explain a diagnostic: what it means and how to fix it."),
     "plot": ("plot", "Draw a scene, its plans, a run or a model."),
     "serve": ("serve", "Show models, tasks and runs on a page in the browser."),
