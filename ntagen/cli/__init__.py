@@ -43,6 +43,7 @@ COMMANDS: Final = {
     "convert": ("models.convert", "Turn a model into the format of another tool."),
     "info": ("models.info", "Show what is in a model or an environment."),
     "test": ("models.test", "Make a test suite of a model: traces that cover it."),
+    "mutate": ("models.mutate", "Make mutants of a model, and tell what kills them."),
     "explain": ("explain", "Explain a diagnostic: what it means and how to fix it."),
     "plot": ("plot", "Draw a scene, its plans, a run or a model."),
     "serve": ("serve", "Show models, tasks and runs on a page in the browser."),
