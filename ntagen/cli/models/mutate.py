@@ -173,10 +173,10 @@ def _object(path: Path, judge: Judge, judged: Sequence[Judged]) -> dict[str, Any
 def _show(judge: Judge, judged: Sequence[Judged], tests: Sequence[str]) -> None:
     """Prints a table by operator, one by query and test, and what survives."""
     fates = ("killed", "survived", "unknown", "invalid")
-    counts = Counter((one.mutant.operator, one.fate) for one in judged)
+    counts: Counter[tuple[str, str]] = Counter((one.mutant.operator, one.fate) for one in judged)
     operators = dict.fromkeys(one.mutant.operator for one in judged)
     rows = [[name, *(str(counts[name, fate]) for fate in fates)] for name in operators]
-    totals = Counter(one.fate for one in judged)
+    totals: Counter[str] = Counter(one.fate for one in judged)
     print_table(
         ["operator", *fates],
         [*rows, ["all", *(str(totals[fate]) for fate in fates)]],
