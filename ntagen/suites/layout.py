@@ -67,7 +67,7 @@ def written_model(model: LoadedModel) -> build.Model:
     if not model.text.lstrip("\ufeff \t\r\n").startswith("<"):
         raise InputError(
             "this needs a model in UPPAAL's XML, and the file is XTA\n"
-            "hint: open it in UPPAAL's editor, and save it as .xml"
+            "hint: `ntagen convert MODEL.xta -o MODEL.xml` makes XML of it"
         )
     return build.parse(model.text)
 
