@@ -181,4 +181,4 @@ def test_a_model_without_xml_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     path.write_text("process T() { state A; init A; } system T;")
     assert load(path.read_text())
     assert main(["test", str(path)]) == 2
-    assert "save it as .xml" in capsys.readouterr().err
+    assert "ntagen convert" in capsys.readouterr().err
