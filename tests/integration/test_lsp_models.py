@@ -141,11 +141,10 @@ def test_places_in_xml_are_those_of_the_file(tmp_path: Path) -> None:
 def test_other_xml_has_no_answers(tmp_path: Path) -> None:
     async def session(client: Editor, model: str, _queries: str) -> None:
         other = "<project><name>P</name></project>"
-        client.show(model, other)
+        assert await client.open(model, other) == []
         assert await client.hover(model, other, "P") is None
         assert await words_at(client, model, types.Position(0, 16)) == []
-        client.press(model, 2, XML.replace("limit = 3", "limit = x3"))
-        assert await client.mistakes(model) != []
+        assert await client.change(model, 2, XML.replace("limit = 3", "limit = x3")) != []
 
     run(tmp_path, session, "a.xml", XML)
 
