@@ -83,6 +83,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "checker.agents": {"errors", "checker.policy"},
     "checker.stepwise": {"errors", "checker.errors", "_checker"},
     "checker.survey": {"_checker"},
+    "checker.names": {"checker.survey"},
     "checker.model": {"errors", "files", "_checker"}
     | {"checker.answer", "checker.edges", "checker.errors", "checker.facts", "checker.runs"}
     | {"checker.constants", "checker.policy", "checker.stepwise"}
@@ -103,11 +104,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "gymnasium": {"errors", "loading", "checker", "checker.policy", "checker.stepwise"},
     "simulator": {"errors", "checker", "checker.constraints", "checker.errors", "checker.facts"}
     | {"checker.picture", "checker.play", "checker.queries", "checker.runs", "checker.strategy"},
-    "document": {"errors", "files", "build", "checker.picture", "checker.survey"},
+    "document": {"errors", "files", "build", "checker.names", "checker.picture"}
+    | {"checker.survey"},
     "serve": {"document", "errors", "files"},
     "watch": {"drive", "errors", "plan", "plot", "scene", "serve", "shapes"},
     "editor": {"nsl", "parameters", "values", "version"}
-    | {"checker", "checker.survey", "explanations", "files", "serve", "xta"},
+    | {"checker", "checker.names", "checker.survey", "explanations", "files", "serve", "xta"},
     "needle": BASE,
     "plan": BASE | {"needle", "render", "checker"},
     "grbl": {"errors", "hardware", "units"},

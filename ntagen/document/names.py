@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterable
+from functools import cached_property
 from typing import Any, Final
 
 import msgspec
 
-from ntagen.checker.survey import Place, Survey, Symbol
+from ntagen.checker.names import Names as SurveyedNames
+from ntagen.checker.survey import MODEL, Place, Survey
 from ntagen.document.content import Content, content_of, whole_content
 from ntagen.document.document import Document
 from ntagen.document.outline import WHOLE, Outline
@@ -97,12 +98,13 @@ class Names:
         start = typed.start() if typed else at
         content = self._content(address)
         where = 0 if content is None else content.byte_at(min(start, len(content.text)))
-        scope = self._scope(address, where)
+        where = self._read_at(address, where)
         words: tuple[str, ...] = ()
         if chain := _CHAIN.search(text[max(0, start - _MOST_CHAIN) : start]):
-            found = self._members(chain[1], scope)
+            parts = _WHOLE_WORD.findall(_INDEX.sub("", chain[1]))
+            found = self._names.members(MODEL, where, parts)
         else:
-            found = list(scope.values())
+            found = list(self._names.usable(MODEL, where).values())
             kind = address.rpartition("/")[2]
             words = _OF_DECLARATIONS if kind in _WITH_TYPES else _OF_LABELS
             words = _OF_QUERIES if kind == "formula" else words
@@ -123,9 +125,10 @@ class Names:
         if content is None:
             return {}
         at = content.byte_at(_characters(content.text, index))
-        symbol = self._symbol_at(at)
-        if symbol is None:
+        named = self._names.at(MODEL, at)
+        if named is None:
             return {}
+        symbol, _ = named
         told = {"name": symbol.name, "detail": symbol.detail, "comment": symbol.comment}
         return told | {"at": self._told(symbol.at)}
 
@@ -142,41 +145,20 @@ class Names:
             self._contents[address] = found
         return self._contents[address]
 
-    def _symbol_at(self, byte: int) -> Symbol | None:
-        """The symbol that is used or declared at a byte, or ends in front of it."""
-        symbols = self._survey.symbols
-        for use in self._survey.uses:
-            if use.at.start <= byte <= use.at.end:
-                return symbols[use.symbol]
-        for one in symbols:
-            if one.at is not None and one.at.start <= byte <= one.at.end:
-                return one
-        return None
+    @cached_property
+    def _names(self) -> SurveyedNames:
+        return SurveyedNames(self._survey)
 
-    def _scope(self, address: str, byte: int) -> dict[str, Symbol]:
-        """The symbols that may be used at a place, by name; inner ones hide outer ones."""
-        survey = self._survey
-        around = [one for one in survey.areas if one.at.start <= byte <= one.at.end]
-        if not around and address.startswith("templates/"):
-            # A text that is empty, or not understood: what its template has at its name.
-            name = "/".join([*address.split("/")[:2], "name"])
-            content = self._content(name)
+    def _read_at(self, address: str, byte: int) -> int:
+        """Where to ask what may be used at a byte.
+
+        A text that is empty, or not understood, has what its template has at its name.
+        """
+        if address.startswith("templates/") and not self._names.is_read(MODEL, byte):
+            content = self._content("/".join([*address.split("/")[:2], "name"]))
             if content is not None:
-                around = [one for one in survey.areas if one.at.start == content.start]
-        inner = (number for one in around for number in survey.scopes[one.scope])
-        numbers = [*survey.everywhere, *inner]
-        symbols = (survey.symbols[number] for number in numbers)
-        return {one.name: one for one in symbols}
-
-    def _members(self, chain: str, scope: dict[str, Symbol]) -> list[Symbol]:
-        """What may follow names with dots, such as ``Gate.`` or ``jobs[i].``."""
-        found: Iterable[Symbol] = scope.values()
-        for name in _WHOLE_WORD.findall(_INDEX.sub("", chain)):
-            symbol = next((one for one in found if one.name == name), None)
-            if symbol is None or symbol.members is None:
-                return []
-            found = [self._survey.symbols[one] for one in self._survey.groups[symbol.members]]
-        return list(found)
+                return content.start
+        return byte
 
     def _told(self, place: Place | None, *, whole: bool = False) -> dict[str, Any] | None:
         if place is None:

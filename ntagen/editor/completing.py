@@ -10,8 +10,8 @@ from collections import deque
 from html import unescape
 from typing import Final, Literal
 
+from ntagen.checker.names import Names
 from ntagen.checker.survey import Symbol, SymbolKind
-from ntagen.editor.names import Names
 from ntagen.values import dataclass
 from ntagen.xta import FUNCTIONS, MODEL_WORDS, QUERY_WORDS, tokenise
 

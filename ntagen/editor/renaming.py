@@ -8,8 +8,8 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Awaitable, Callable, Sequence
 
+from ntagen.checker.names import Names
 from ntagen.checker.survey import Place, Survey, Texts
-from ntagen.editor.names import Names
 from ntagen.values import dataclass
 from ntagen.xta import is_name
 

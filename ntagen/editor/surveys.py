@@ -10,9 +10,9 @@ import asyncio
 import contextlib
 from typing import Final
 
+from ntagen.checker.names import Names
 from ntagen.checker.survey import Survey, Texts, read_survey
 from ntagen.editor.checks import CheckEndedError, Checks
-from ntagen.editor.names import Names
 from ntagen.editor.pairs import Pair
 from ntagen.values import dataclass
 

@@ -1,7 +1,6 @@
 """What the names of a model stand for at a place, from a survey of it.
 
-Places are characters. All is told from the survey; the texts are looked at only for what was not
-read as a name, such as the word that is being typed.
+Places count as those of the survey do. All is told from it, and the texts are not looked at.
 """
 
 from __future__ import annotations
@@ -52,13 +51,16 @@ class Names:
             if number == symbol and (with_declaration or place != declared)
         ]
 
+    def is_read(self, file: int, offset: int) -> bool:
+        """Whether a place is in a part of a text in which names of its own may be used."""
+        return any(self._around(file, offset))
+
     def usable(self, file: int, offset: int) -> dict[str, Symbol]:
         """The symbols that may be used at a place by their names, the innermost ones last."""
         survey = self.survey
         numbers = list(survey.everywhere)
-        for area in survey.areas:
-            if _covers(area, file, offset):
-                numbers += survey.scopes[area.scope]
+        for area in self._around(file, offset):
+            numbers += survey.scopes[area.scope]
         if self._is_asked(file, offset):
             numbers += self._processes()
         found: dict[str, Symbol] = {}
@@ -75,6 +77,11 @@ class Names:
         for name in chain[1:]:
             symbol = next((one for one in self._group(symbol) if one.name == name), None)
         return list(self._group(symbol))
+
+    def _around(self, file: int, offset: int) -> Iterator[Area]:
+        for area in self.survey.areas:
+            if area.at.file == file and area.at.start <= offset <= area.at.end:
+                yield area
 
     def _group(self, symbol: Symbol | None) -> Iterator[Symbol]:
         if symbol is not None and symbol.members is not None:
@@ -93,7 +100,3 @@ class Names:
         for symbols in self.survey.scopes:
             if any(self.survey.symbols[one].kind == "process" for one in symbols):
                 yield from symbols
-
-
-def _covers(area: Area, file: int, offset: int) -> bool:
-    return area.at.file == file and area.at.start <= offset <= area.at.end
